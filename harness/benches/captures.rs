@@ -97,6 +97,25 @@ fn vcd_written(bencher: divan::Bencher<'_, '_>, vectors: bool) {
     });
 }
 
+/// The levels of the lines, decoded.
+#[divan::bench(sample_count = 5)]
+fn vcd_read(bencher: divan::Bencher<'_, '_>) {
+    let mut file = Vec::new();
+    vcd::write(&million(), Rate::Baud38400, Signals::Lines, &mut file).expect("a Vec");
+    bencher
+        .counter(ItemsCount::new(BYTES))
+        .bench_local(|| read(&file, None).expect("a capture"));
+}
+
+#[divan::bench(sample_count = 5)]
+fn csv_read(bencher: divan::Bencher<'_, '_>) {
+    let mut file = Vec::new();
+    csv::write(&million(), &mut file).expect("a Vec");
+    bencher
+        .counter(ItemsCount::new(BYTES))
+        .bench_local(|| read(&file, None).expect("a capture"));
+}
+
 #[divan::bench(sample_count = 10)]
 fn csv_written(bencher: divan::Bencher<'_, '_>) {
     let traces = million();

@@ -53,6 +53,7 @@ use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
+use crate::report::pcapng_telegrams::PacketOctet;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Options, Rig, SessionError};
 use crate::scenario::plan::Plan;
@@ -68,7 +69,8 @@ pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
 use commands::{DriveCommand, RigName};
 use harness_proto::can::Frame;
-use harness_proto::line::Rate;
+use harness_proto::line::{Format, Rate};
+use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::{Carried, Trace};
@@ -219,6 +221,26 @@ fn shared(traces: &[Trace]) -> Option<Bus> {
     let mut channels = traces.iter().flat_map(|trace| &trace.channels);
     let to_all = channels.any(|channel| channel.from.is_none() && channel.to.is_none());
     to_all.then_some(Bus::Nordac)
+}
+
+/// The formats that a line of octets may have: that of a bus whose stations share it, or that of a ring. The usual one first.
+pub(crate) fn line_formats(shared: bool) -> Vec<Format> {
+    match shared {
+        true => {
+            let usual = BusRate::default();
+            let others = BusRate::ALL.into_iter().filter(|own| *own != usual);
+            std::iter::once(usual)
+                .chain(others)
+                .map(BusRate::format)
+                .collect()
+        }
+        false => Rate::ALL.into_iter().map(Format::from).collect(),
+    }
+}
+
+/// Who sent the octets of a line that stations share, recorded at one place; `None` for a master. `octet` is the time of an octet.
+pub(crate) fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
+    nordac::senders::senders(octets, octet)
 }
 
 /// Whether these are traces of a bus whose stations share one line; those of a ring have tables and pictures of their own.

@@ -1,7 +1,10 @@
 //! Captures of frames: link type 227 of pcapng, the log of candump, the JSON of `drivebench trace`.
 
-use super::{Capture, CaptureError};
+use super::import::Logged;
+use super::telegrams::LATEST;
+use super::{Capture, CaptureError, Imported, NamedLink, Target};
 use crate::buses::sender_of;
+use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
 use harness_proto::can::{BitRate, BusError, Frame, Id};
 use harness_proto::line::Rate;
@@ -128,13 +131,13 @@ fn id_is_remote(header: &[u8]) -> bool {
 }
 
 /// Reads the log that candump writes with `-l` or `-L`: `(1436509052.249713) can0 201#3D4000`, and the direction behind it in newer
-/// versions. Lines of error frames are passed over.
+/// versions. Lines of error frames are passed over and counted. `links` chooses an interface where there are several.
 ///
 /// # Errors
-/// A line that is none of such a log.
-pub(super) fn candump(bytes: &[u8]) -> Result<Capture, CaptureError> {
+/// A line that is none of such a log; frames of several interfaces.
+pub(super) fn candump(bytes: &[u8], links: &[NamedLink]) -> Result<Imported, CaptureError> {
     let text = String::from_utf8_lossy(bytes);
-    let mut frames = Vec::new();
+    let (mut frames, mut errors) = (Vec::new(), 0);
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
@@ -144,9 +147,88 @@ pub(super) fn candump(bytes: &[u8]) -> Result<Capture, CaptureError> {
             place: format!("line {}", number + 1),
             what,
         })?;
-        frames.extend(read);
+        errors += usize::from(read.is_none());
+        let interface = line.split_whitespace().nth(1).unwrap_or_default();
+        frames.extend(read.map(|own| (interface, own)));
     }
-    Ok(assemble(frames, None))
+    let mut notes = Vec::new();
+    if errors > 0 {
+        notes.push(format!(
+            "{} not read: the log does not say which frame it ended",
+            counted(errors, "error frame")
+        ));
+    }
+    let frames = one_bus(frames, links, &mut notes)?;
+    let capture = assemble(frames, None);
+    Ok(Imported { capture, notes })
+}
+
+/// The capture of a log in ASC, of which the times may be before 0.
+///
+/// # Errors
+/// Times too far apart; frames of several channels.
+pub(super) fn asc(
+    (logged, mut notes): (Vec<Logged>, Vec<String>),
+    links: &[NamedLink],
+) -> Result<Imported, CaptureError> {
+    let first = logged.iter().map(|own| own.at).min().unwrap_or(0).min(0);
+    let mut frames = Vec::new();
+    for own in &logged {
+        let since = own.at.checked_sub(first).map(i64::cast_unsigned);
+        let nanos = since.map(|own| Span::from_units(own).as_nanos());
+        let nanos = nanos
+            .filter(|own| *own <= LATEST)
+            .ok_or_else(|| CaptureError::Link {
+                place: "the log".to_owned(),
+                what: "times are more than a year apart".to_owned(),
+            })?;
+        frames.push((own.channel.as_str(), FrameRead { nanos, ..own.frame }));
+    }
+    let frames = one_bus(frames, links, &mut notes)?;
+    let capture = assemble(frames, None);
+    Ok(Imported { capture, notes })
+}
+
+/// The frames of one interface: that which `links` names, or the only one.
+fn one_bus(
+    frames: Vec<(&str, FrameRead)>,
+    links: &[NamedLink],
+    notes: &mut Vec<String>,
+) -> Result<Vec<FrameRead>, CaptureError> {
+    let wrong = |what: String| CaptureError::Link {
+        place: "the log".to_owned(),
+        what,
+    };
+    let mut names: Vec<&str> = frames.iter().map(|own| own.0).collect();
+    names.sort_unstable();
+    names.dedup();
+    let chosen = links.iter().find(|own| own.target == Target::Bus);
+    let chosen = chosen.and_then(|own| own.channel.as_deref());
+    let name = match (chosen, names.as_slice()) {
+        (None, [] | [_]) => return Ok(frames.into_iter().map(|own| own.1).collect()),
+        (None, [first, ..]) => {
+            return Err(wrong(format!(
+                "it has frames of {}; choose one of {}, as in `--link bus={first}`",
+                counted(names.len(), "interface"),
+                names.join(", ")
+            )));
+        }
+        (Some(name), names) if names.contains(&name) => name,
+        (Some(name), names) => {
+            return Err(wrong(format!(
+                "no interface is named `{name}`; it has {}",
+                names.join(", ")
+            )));
+        }
+    };
+    let all = frames.len();
+    let own = frames.into_iter().filter(|own| own.0 == name);
+    let own: Vec<FrameRead> = own.map(|own| own.1).collect();
+    if own.len() < all {
+        let left = counted(all - own.len(), "frame");
+        notes.push(format!("{left} of other interfaces not read"));
+    }
+    Ok(own)
 }
 
 /// A line of the log; `None` for an error frame.
@@ -282,7 +364,7 @@ mod tests {
     /// Lines of candump, with the direction that newer versions write, and one of an error frame.
     #[test]
     fn a_log_of_candump_is_read() {
-        let log = "(1436509052.249713) can0 201#3D4000\n(1436509052.249999) vcan0 181#40810100 R\n\n\
+        let log = "(1436509052.249713) can0 201#3D4000\n(1436509052.249999) can0 181#40810100 R\n\n\
                    (1436509052.250100) can0 20000088#0000000000000000\n(1436509052.250200) can0 00000201#R3\n";
         let capture = super::super::read(log.as_bytes(), None).expect("a capture");
         let read: Vec<_> = frames(&capture)

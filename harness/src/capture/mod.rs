@@ -1,7 +1,6 @@
 //! Captures: what the links of a ring carried, read from a file of any program.
 //!
-//! [`read`] takes pcapng of link types 250 and 227, the JSON of `drivebench trace` and the log of candump. A capture can be shown in every form that a run can,
-//! compared with another ([`diff()`]), turned into a scenario ([`scenario`]), and so be judged against the model
+//! [`read`] takes the files of many programs (`import` has the table of formats). A capture can be shown in every form that a run can, compared with another ([`diff()`]), turned into a scenario ([`scenario`]), and so be judged against the model
 //! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
 //! compared.
 //!
@@ -13,12 +12,15 @@ pub(crate) mod faults;
 pub mod frame_diff;
 mod frames;
 pub mod fuzz;
+mod import;
+mod pcap;
 mod pcapng;
 mod telegrams;
 
 pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
 pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario};
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
+pub use import::{Imported, NamedLink, Settings, Target, Uart};
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};
@@ -53,10 +55,14 @@ pub enum CaptureError {
     TooLong,
     /// It is of another kind.
     #[error(
-        "neither pcapng, nor a trace in JSON, nor a log of candump: the file begins with {0}; Wireshark writes pcapng with \
-         \"Save As\", `drivebench trace --format json` a trace, `candump -L` a log"
+        "the file is no capture that can be read; it looks like {looks}. These formats are read: {formats}"
     )]
-    Foreign(String),
+    Foreign {
+        /// What it looks like, and what to do about it.
+        looks: String,
+        /// The formats that are read.
+        formats: String,
+    },
     /// Something in it cannot be.
     #[error("at byte {offset} of the file: {what}")]
     At {
@@ -75,11 +81,11 @@ pub enum CaptureError {
     },
 }
 
-/// Reads a file; the rate is taken where it does not say one.
+/// Reads a file.
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_file(path: &Path, rate: Option<Rate>) -> Result<Capture, CaptureError> {
+pub fn read_file(path: &Path, settings: &Settings) -> Result<Imported, CaptureError> {
     let failed =
         |error: std::io::Error| CaptureError::File(path.display().to_string(), error.to_string());
     let mut file = regular::open_input(path)
@@ -87,7 +93,7 @@ pub fn read_file(path: &Path, rate: Option<Rate>) -> Result<Capture, CaptureErro
         .take(MAX_FILE + 1);
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(failed)?;
-    read(&bytes, rate)
+    read_with(&bytes, settings)
 }
 
 /// Reads the bytes of a file; the rate is taken where it does not say one.
@@ -95,36 +101,31 @@ pub fn read_file(path: &Path, rate: Option<Rate>) -> Result<Capture, CaptureErro
 /// # Errors
 /// [`CaptureError`], but not that of the file itself.
 pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
+    let settings = Settings {
+        rate,
+        ..Settings::default()
+    };
+    read_with(bytes, &settings).map(|own| own.capture)
+}
+
+/// Reads the bytes of a file.
+///
+/// # Errors
+/// [`CaptureError`], but not that of the file itself.
+pub fn read_with(bytes: &[u8], settings: &Settings) -> Result<Imported, CaptureError> {
     if bytes.len() as u64 > MAX_FILE {
         return Err(CaptureError::TooLong);
     }
-    let text = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
-    if bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]) {
-        pcapng::read(bytes, rate)
-    } else if text == Some(&b'(') {
-        frames::candump(bytes)
-    } else if text == Some(&b'{') && frames::is_json(bytes) {
-        frames::json(bytes)
-    } else if text == Some(&b'{') && telegrams::is_json(bytes) {
-        telegrams::json(bytes)
-    } else if text == Some(&b'{') {
-        crate::buses::rings::capture::json::read(bytes, rate)
-    } else {
-        let begins = bytes.iter().take(8).map(|byte| format!("{byte:02X}"));
-        let begins: Vec<_> = begins.collect();
-        Err(CaptureError::Foreign(match begins.len() {
-            0 => "nothing: it is empty".to_owned(),
-            _ => begins.join(" "),
-        }))
-    }
+    import::read(bytes, settings)
 }
 
 /// Whether a file looks like a capture, and not like a scenario.
 #[must_use]
 pub fn is_capture(path: &Path) -> bool {
-    let mut start = [0; 4];
-    let read = regular::open(path, Links::Follow).and_then(|mut file| file.read(&mut start));
-    matches!(read, Ok(1..)) && (start == [0x0A, 0x0D, 0x0D, 0x0A] || b"{(".contains(&start[0]))
+    let mut start = Vec::new();
+    let read = regular::open(path, Links::Follow)
+        .and_then(|file| file.take(4_096).read_to_end(&mut start));
+    read.is_ok() && import::is_known(&start)
 }
 
 /// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.

@@ -17,6 +17,7 @@ use crate::report::pcapng_telegrams::{PacketOctet, octet_time, octets, station};
 use harness_proto::can::BitRate;
 use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
+use std::borrow::Cow;
 
 /// Option of an interface: seconds to be added to its times.
 const IF_TSOFFSET: u16 = 14;
@@ -59,21 +60,16 @@ struct Byte {
 
 /// Reads a file.
 pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
-    let mut reader = Reader {
-        bytes,
-        big: false,
-        interfaces: Vec::new(),
-        section: 0,
-        speed: None,
-        bit_rate: None,
-        found: Vec::new(),
-        octets: Vec::new(),
-        frames: Vec::new(),
-    };
+    let mut reader = Reader::new(bytes);
     let mut offset = 0;
     while offset < bytes.len() {
         offset = reader.block(offset)?;
     }
+    finish(reader, rate)
+}
+
+/// The capture of all packets.
+pub(super) fn finish(reader: Reader<'_>, rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let known = reader.interfaces;
     if !known.iter().any(Option::is_some) {
         return Err(CaptureError::Link {
@@ -147,10 +143,10 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
     )
 }
 
-struct Reader<'b> {
-    bytes: &'b [u8],
+pub(super) struct Reader<'b> {
+    pub(super) bytes: &'b [u8],
     /// The section's numbers have the high byte first.
-    big: bool,
+    pub(super) big: bool,
     /// Of all sections, one behind the other; `None` for those of another link type.
     interfaces: Vec<Option<Interface>>,
     /// The first interface of the present section.
@@ -162,8 +158,27 @@ struct Reader<'b> {
     frames: Vec<FrameRead>,
 }
 
-impl Reader<'_> {
-    fn wrong<T>(&self, offset: usize, what: impl Into<String>) -> Result<T, CaptureError> {
+impl<'b> Reader<'b> {
+    /// A reader that has read nothing yet.
+    pub(super) fn new(bytes: &'b [u8]) -> Self {
+        Self {
+            bytes,
+            big: false,
+            interfaces: Vec::new(),
+            section: 0,
+            speed: None,
+            bit_rate: None,
+            found: Vec::new(),
+            octets: Vec::new(),
+            frames: Vec::new(),
+        }
+    }
+
+    pub(super) fn wrong<T>(
+        &self,
+        offset: usize,
+        what: impl Into<String>,
+    ) -> Result<T, CaptureError> {
         let what = what.into();
         Err(CaptureError::At { offset, what })
     }
@@ -188,7 +203,7 @@ impl Reader<'_> {
         })
     }
 
-    fn u32(&self, offset: usize, end: usize) -> Result<u32, CaptureError> {
+    pub(super) fn u32(&self, offset: usize, end: usize) -> Result<u32, CaptureError> {
         let bytes = self.take(offset, end)?;
         Ok(if self.big {
             u32::from_be_bytes(bytes)
@@ -317,10 +332,20 @@ impl Reader<'_> {
             }
             Ok(())
         })?;
+        let own = |(from, to): (usize, usize)| String::from_utf8_lossy(&self.bytes[from..to]);
+        let name = name.map(|place| (place.0, own(place)));
+        self.describe((start, link_type), name, (resolution, offset, speed))
+    }
+
+    /// An interface of a link type that is read: its place in the file; its name with the place of that; its resolution, offset and speed.
+    pub(super) fn describe(
+        &mut self,
+        (start, link_type): (usize, u16),
+        name: Option<(usize, Cow<'_, str>)>,
+        (resolution, offset, speed): (u8, i64, Option<u64>),
+    ) -> Result<(), CaptureError> {
         if link_type == pcapng_frames::LINK_TYPE {
-            let name = name.map_or("".into(), |(from, to)| {
-                String::from_utf8_lossy(&self.bytes[from..to])
-            });
+            let name = name.map_or("".into(), |own| own.1);
             let carries = Carries::Frames(Sender::named(name.trim_end_matches('\0')));
             let bits = speed.and_then(|speed| u32::try_from(speed).ok());
             self.bit_rate = self
@@ -334,13 +359,12 @@ impl Reader<'_> {
             }));
             return Ok(());
         }
-        let Some((from, to)) = name else {
+        let Some((from, text)) = name else {
             return self.wrong(
                 start,
                 "this interface has no name: a link is expected, such as 98->97",
             );
         };
-        let text = String::from_utf8_lossy(&self.bytes[from..to]);
         let text = text.trim_end_matches('\0');
         let link = ends(text).map(|(ring, from, to)| Carries::Link(ring, from, to));
         let alone = || station(text).map(Carries::Station);
@@ -380,12 +404,23 @@ impl Reader<'_> {
             );
         };
         let captured = usize::try_from(self.u32(start + 12, end)?).unwrap_or(usize::MAX);
-        let data = start + 20;
+        self.content((interface, nanos), (start + 20, captured, end))
+    }
+
+    /// What a packet holds: of this interface, at this time; where its data begins, how long it is, and where its options end.
+    pub(super) fn content(
+        &mut self,
+        (interface, nanos): (usize, u64),
+        (data, captured, end): (usize, usize, usize),
+    ) -> Result<(), CaptureError> {
+        let Some(Some(known)) = self.interfaces.get(interface) else {
+            return Ok(());
+        };
         if let Carries::Frames(sender) = known.carries {
             return self.frame((data, captured, end), nanos, sender);
         }
         if captured < HEADER || captured > end - data.min(end) {
-            return self.wrong(start + 12, format!("a packet of {captured} bytes: at least the {HEADER} of its header, and at most its block, are expected"));
+            return self.wrong(data, format!("a packet of {captured} bytes: at least the {HEADER} of its header, and at most its block, are expected"));
         }
         let event = self.bytes[data + 8];
         let payload = data + HEADER..data + captured;
@@ -546,7 +581,7 @@ fn sent(comment: &[u8]) -> Option<Option<u8>> {
 }
 
 /// A time in nanoseconds; `None` where it is out of all range. A resolution is a power of 10, or of 2 with its high bit set.
-fn nanoseconds(ticks: u64, resolution: u8, offset: i64) -> Option<u64> {
+pub(super) fn nanoseconds(ticks: u64, resolution: u8, offset: i64) -> Option<u64> {
     const SECOND: u128 = 1_000_000_000;
     // The most nanoseconds that an `Instant` can hold.
     const MOST: u128 = u64::MAX as u128 / 4;

@@ -44,7 +44,7 @@ pub(super) fn assemble(
 }
 
 /// The latest time, in nanoseconds, that an octet may have: a year.
-const LATEST: u64 = 365 * DAY;
+pub(super) const LATEST: u64 = 365 * DAY;
 
 #[derive(Deserialize)]
 struct Object {

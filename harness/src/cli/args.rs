@@ -9,6 +9,7 @@ use super::shrink::ShrinkArguments;
 use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
 use crate::buses::rings::rig::named::ring_size;
+use crate::capture::{NamedLink, Uart};
 use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
@@ -308,7 +309,7 @@ pub struct TraceOutput {
 /// For `import`.
 #[derive(Clone, Debug, Args)]
 pub struct ImportArguments {
-    /// The capture: pcapng with one interface per link, named as in 98->97, of CAN, or of PROFIBUS; the JSON of `trace`; the log of candump.
+    /// The capture: pcapng, pcap, what `trace` writes, VCD, Saleae's and sigrok's files, the log of candump, ASC.
     pub file: PathBuf,
     /// Show the capture in this format instead of comparing it.
     #[arg(long, value_enum, conflicts_with = "scenario")]
@@ -323,9 +324,9 @@ pub struct ImportArguments {
     /// Permitted difference of times, such as 2ms for a real clock; by default 2 ns.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub tolerance: Option<Duration>,
-    /// Bit rate of the line, if the capture does not state it.
-    #[arg(long, value_name = "RATE", value_parser = rate)]
-    pub line: Option<Rate>,
+    /// How the file is read.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
     /// How it is shown and where it goes.
     #[command(flatten)]
     pub showing: TraceOutput,
@@ -343,9 +344,44 @@ pub struct DiffArguments {
     /// Permitted difference of times, such as 2ms; by default 2 ns.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub tolerance: Option<Duration>,
-    /// Bit rate of the line, if a capture does not state it.
+    /// How the files are read.
+    #[command(flatten)]
+    pub reading: ReadingArguments,
+}
+
+/// What a file with a capture does not say itself.
+#[derive(Clone, Debug, Args)]
+pub struct ReadingArguments {
+    /// Bit rate of the line, if the capture does not state it.
     #[arg(long, value_name = "RATE", value_parser = rate)]
     pub line: Option<Rate>,
+    /// A channel of the file is this link: 98->97=CHANNEL, master->99=CHANNEL, 0->master=CHANNEL; on a shared line bus=CHANNEL, master=CHANNEL,
+    /// "slave 8=CHANNEL". Without =CHANNEL it is the only channel. May be given several times.
+    #[arg(long, value_name = "LINK=CHANNEL")]
+    pub link: Vec<NamedLink>,
+    /// How levels of a line are decoded, such as "38400 8O1" or "38400 8O1 inverted"; by default, `auto`, the bus's format with the rate and
+    /// polarity that fit.
+    #[arg(long, value_name = "FORMAT", value_parser = uart)]
+    pub uart: Option<UartChoice>,
+    /// Samples per second, if a table of samples does not state it.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    pub samples: Option<u64>,
+}
+
+/// A format that is given or to be found.
+#[derive(Clone, Copy, Debug)]
+pub enum UartChoice {
+    /// It is found.
+    Auto,
+    /// It is this.
+    Given(Uart),
+}
+
+fn uart(text: &str) -> Result<UartChoice, String> {
+    match text {
+        "auto" => Ok(UartChoice::Auto),
+        text => text.parse().map(UartChoice::Given),
+    }
 }
 
 /// For `manual`.

@@ -1,6 +1,6 @@
 //! `drivebench import`, `diff`, `dissector`, `dbc` and `gsd`: captures that are read, and what helps to read them elsewhere.
 
-use super::args::{DiffArguments, ImportArguments};
+use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
@@ -8,7 +8,8 @@ use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
+    Capture, ComparedRun, Judged, Options, Settings, diff as compare, is_capture, judge, read_file,
+    scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -17,7 +18,6 @@ use crate::regular;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
-use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -45,7 +45,7 @@ pub(crate) fn gsd(output: &mut Output) -> std::io::Result<Exit> {
 /// Reads a capture and judges it, shows it or makes a scenario of it.
 pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
     let path = &arguments.file;
-    let Some(capture) = read(path, arguments.line, output) else {
+    let Some(capture) = read(path, &arguments.reading, output) else {
         return Ok(Exit::Usage);
     };
     let title = title(path);
@@ -164,9 +164,24 @@ fn of_shared_line(
     }
 }
 
-fn read(path: &Path, rate: Option<Rate>, output: &mut Output) -> Option<Capture> {
-    match read_file(path, rate) {
-        Ok(capture) => Some(capture),
+/// Reads a capture, and says what was found and not read in it.
+fn read(path: &Path, reading: &ReadingArguments, output: &mut Output) -> Option<Capture> {
+    let settings = Settings {
+        rate: reading.line,
+        uart: match reading.uart {
+            Some(UartChoice::Given(uart)) => Some(uart),
+            Some(UartChoice::Auto) | None => None,
+        },
+        samples: reading.samples,
+        links: reading.link.clone(),
+    };
+    match read_file(path, &settings) {
+        Ok(imported) => {
+            for note in &imported.notes {
+                output.say(&format!("  note: {note}\n"));
+            }
+            Some(imported.capture)
+        }
         Err(error) => {
             output.complain(&format!("{}: {error}", path.display()));
             None
@@ -309,7 +324,7 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
 /// A capture, or a scenario that is played.
 fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<Capture> {
     if is_capture(path) {
-        return read(path, arguments.line, output);
+        return read(path, &arguments.reading, output);
     }
     let sources = match sources(&[path.to_owned()]) {
         Ok(sources) => sources,

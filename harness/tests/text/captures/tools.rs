@@ -25,6 +25,29 @@ fn output(program: &str, arguments: &[&str]) -> Option<String> {
     Some(text)
 }
 
+/// sigrok reads our VCD and writes it again as VCD and as csv: both are read back as the same bytes.
+#[test]
+fn what_sigrok_writes_is_read() {
+    let capture = built_in("10.1-read-byte");
+    let mut lines = Vec::new();
+    vcd::write(&capture.traces, capture.rate, Signals::Lines, &mut lines).expect("a Vec");
+    let ours = file("sigrok.vcd");
+    std::fs::write(&ours, &lines).expect("room");
+    for form in ["vcd", "csv"] {
+        let arguments = ["-i", ours.to_str().expect("a name"), "-I", "vcd", "-O", form];
+        let Some(text) = output("sigrok-cli", &arguments) else {
+            return;
+        };
+        let again = read(text.as_bytes(), None).unwrap_or_else(|error| panic!("{form}: {error}"));
+        let received = |capture: &Capture| -> Vec<Vec<Option<u8>>> {
+            let links = capture.traces.iter().flat_map(|own| &own.channels);
+            links.map(|own| own.octets().iter().map(|own| own.received).collect()).collect()
+        };
+        assert_eq!(received(&again), received(&capture), "{form}");
+        assert_eq!(again.rate, capture.rate);
+    }
+}
+
 /// Bytes and what is wrong with them, as sigrok's decoder says for one line.
 fn decoded(path: &str, line: &str) -> Option<Vec<(u8, &'static str)>> {
     let decoder = format!("uart:rx={line}:baudrate=38400:parity=odd");

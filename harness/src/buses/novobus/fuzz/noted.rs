@@ -81,7 +81,7 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
         Err(error) => {
             let what = match error {
                 CaptureError::At { what, .. } | CaptureError::Link { what, .. } => shape(&what),
-                CaptureError::Foreign(_) => "it begins differently".to_owned(),
+                CaptureError::Foreign { .. } => "it begins differently".to_owned(),
                 other => shape(&other.to_string()),
             };
             return notes.note(|| Feature::new("", format!("no capture, {form}"), what));

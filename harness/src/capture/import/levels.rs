@@ -1,0 +1,86 @@
+//! The level of a line over time, as logic analysers record it.
+
+use super::numbers::Time;
+
+/// The level of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Level {
+    /// 0.
+    Low,
+    /// 1.
+    High,
+    /// Nothing was recorded.
+    Unknown,
+}
+
+impl Level {
+    /// The level of a character: `0`, `1`, or `X` and `Z`, which are unknown. `None` for others.
+    pub(super) const fn of(character: u8) -> Option<Self> {
+        match character {
+            b'0' => Some(Self::Low),
+            b'1' => Some(Self::High),
+            b'x' | b'X' | b'z' | b'Z' => Some(Self::Unknown),
+            _ => None,
+        }
+    }
+}
+
+/// A change: from this time on the line has this level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Change {
+    pub(super) at: Time,
+    pub(super) level: Level,
+}
+
+/// What a line did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Levels {
+    changes: Vec<Change>,
+    /// Until when the last level is known to have lasted, where the file says so.
+    pub(super) end: Option<Time>,
+}
+
+impl Levels {
+    /// The changes, each later than the one before it and to another level.
+    pub(super) fn changes(&self) -> &[Change] {
+        &self.changes
+    }
+
+    /// The line has this level from `at` on. Of several levels at one time the last counts; `false` where the time goes back.
+    pub(super) fn push(&mut self, at: Time, level: Level) -> bool {
+        if let Some(last) = self.changes.last() {
+            if at < last.at {
+                return false;
+            }
+            if at == last.at {
+                self.changes.pop();
+            }
+        }
+        if self.changes.last().is_none_or(|last| last.level != level) {
+            self.changes.push(Change { at, level });
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_changes_are_kept() {
+        let mut levels = Levels::default();
+        for (at, level) in [
+            (0, Level::High),
+            (1, Level::High),
+            (2, Level::Low),
+            (2, Level::High),
+            (3, Level::Low),
+        ] {
+            assert!(levels.push(at, level));
+        }
+        assert!(!levels.push(2, Level::High));
+        let at: Vec<_> = levels.changes().iter().map(|own| own.at).collect();
+        assert_eq!(at, [0, 3]);
+    }
+}

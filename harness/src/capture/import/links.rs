@@ -1,0 +1,324 @@
+//! From the channels of a file to the links of a bus: which channel is which link, and how its levels are decoded.
+
+use super::super::telegrams::{DAY, LATEST, assemble};
+use super::super::{Assembly, CaptureError, ends, line_byte};
+use super::levels::Levels;
+use super::numbers::Time;
+use super::uart::{OctetRead, Uart, decode, find};
+use super::{Imported, Settings};
+use crate::buses;
+use crate::counted::counted;
+use crate::report::pcapng_telegrams::{PacketOctet, station};
+use harness_proto::line::{Format, Rate};
+use harness_proto::time::Span;
+use std::str::FromStr;
+
+/// What a channel is the record of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// A link of a ring: the ring, counted from 0, and the ends of the link; `None` is the master.
+    Link(usize, Option<u8>, Option<u8>),
+    /// What one station sends on a line that all share; `None` is the master.
+    Station(Option<u8>),
+    /// A line that all stations share.
+    Bus,
+}
+
+impl Target {
+    /// By the name of a link or a station: `98->97`, `2:0->master`, `master`, `slave 8`.
+    fn named(name: &str) -> Option<Self> {
+        if name == "bus" {
+            return Some(Self::Bus);
+        }
+        let link = ends(name).map(|(ring, from, to)| Self::Link(ring, from, to));
+        link.or_else(|| station(name).map(Self::Station))
+    }
+
+    /// By the name of a channel; names of links as our VCD has them too: `98_to_97_line`.
+    fn of_channel(name: &str) -> Option<Self> {
+        let plain = || {
+            let name = name.strip_suffix("_line")?;
+            Self::named(&name.replace("_to_", "->").replace("ring2_", "2:"))
+        };
+        Self::named(name).or_else(plain)
+    }
+}
+
+/// Which channel of a file is which link: `98->97=Channel 0`, or `98->97` for the only channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedLink {
+    /// The link as it was given.
+    pub link: String,
+    /// The same, read.
+    pub target: Target,
+    /// The name of the channel; `None` for the only one.
+    pub channel: Option<String>,
+}
+
+impl FromStr for NamedLink {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (link, channel) = match text.split_once('=') {
+            Some((link, channel)) => (link, Some(channel.to_owned())),
+            None => (text, None),
+        };
+        let target = Target::named(link).ok_or_else(|| {
+            format!(
+                "`{link}` is neither a link nor a station; `98->97=CHANNEL`, `master->99=CHANNEL` or `0->master=CHANNEL` is expected for a ring; \
+                 `bus=CHANNEL`, `master=CHANNEL` or `slave 8=CHANNEL` for a line that stations share"
+            )
+        })?;
+        Ok(Self {
+            link: link.to_owned(),
+            target,
+            channel,
+        })
+    }
+}
+
+/// What a channel of a file recorded.
+#[derive(Clone, Debug)]
+pub(super) enum Signal {
+    /// The level of a line.
+    Levels(Levels),
+    /// Octets that the other program has decoded.
+    Octets(Vec<OctetRead>),
+}
+
+/// A channel of a file.
+#[derive(Clone, Debug)]
+pub(super) struct ChannelRead {
+    /// Its name, and others that it may be called by.
+    pub(super) names: Vec<String>,
+    pub(super) signal: Signal,
+}
+
+/// A channel of which is known what it is the record of.
+struct Chosen {
+    target: Target,
+    channel: ChannelRead,
+}
+
+fn wrong(what: String) -> CaptureError {
+    CaptureError::Link {
+        place: "the channels".to_owned(),
+        what,
+    }
+}
+
+fn listed(channels: &[ChannelRead]) -> String {
+    const SHOWN: usize = 12;
+    let names = channels.iter().filter_map(|own| own.names.first());
+    let mut shown: Vec<String> = names.take(SHOWN).map(|own| format!("`{own}`")).collect();
+    if channels.len() > SHOWN {
+        shown.push(format!("{} more", channels.len() - SHOWN));
+    }
+    shown.join(", ")
+}
+
+/// The channels that are links, by what the user says and by their names; and what is to be told about the others.
+fn choose(
+    mut channels: Vec<ChannelRead>,
+    settings: &Settings,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Chosen>, CaptureError> {
+    let mut targets: Vec<Option<Target>> = vec![None; channels.len()];
+    for own in &settings.links {
+        let place = match &own.channel {
+            Some(name) => channels
+                .iter()
+                .position(|channel| channel.names.contains(name)),
+            None if channels.len() == 1 => Some(0),
+            None => {
+                let names = listed(&channels);
+                return Err(wrong(format!(
+                    "`--link {}` does not say which channel of {names} it is: `--link {}=CHANNEL` expected",
+                    own.link, own.link
+                )));
+            }
+        };
+        let Some(place) = place else {
+            let name = own.channel.as_deref().unwrap_or_default();
+            let names = listed(&channels);
+            return Err(wrong(format!(
+                "no channel is named `{name}`; the file has {names}"
+            )));
+        };
+        targets[place] = Some(own.target);
+    }
+    if settings.links.is_empty() {
+        for (channel, target) in channels.iter().zip(&mut targets) {
+            *target = channel.names.iter().find_map(|own| Target::of_channel(own));
+        }
+    }
+    if targets.iter().all(Option::is_none) {
+        let name = channels.first().and_then(|own| own.names.first());
+        let name = name.map_or("CHANNEL", String::as_str);
+        return Err(wrong(format!(
+            "none of {} is named as a link; say which link a channel is, as in `--link \"98->97={name}\"`, or as in `--link \
+             \"master={name}\"` for a line that stations share",
+            listed(&channels)
+        )));
+    }
+    let mut chosen: Vec<Chosen> = Vec::new();
+    let mut left = Vec::new();
+    for (channel, target) in channels.drain(..).zip(targets) {
+        match target {
+            Some(target) if chosen.iter().any(|own| own.target == target) => {
+                let names = channel.names.first().cloned().unwrap_or_default();
+                return Err(wrong(format!(
+                    "`{names}` is the second channel of the same link; one expected"
+                )));
+            }
+            Some(target) => chosen.push(Chosen { target, channel }),
+            None => left.push(channel),
+        }
+    }
+    if !left.is_empty() {
+        notes.push(format!(
+            "{} not read: no link is named for {}",
+            counted(left.len(), "channel"),
+            listed(&left)
+        ));
+    }
+    Ok(chosen)
+}
+
+/// The format of the lines: as it was given, or as it is found.
+fn format(
+    chosen: &[Chosen],
+    settings: &Settings,
+    shared: bool,
+    notes: &mut Vec<String>,
+) -> Result<Uart, CaptureError> {
+    if let Some(uart) = settings.uart {
+        return Ok(uart);
+    }
+    let formats = match settings.rate.filter(|_| !shared) {
+        Some(rate) => vec![Format::from(rate)],
+        None => buses::line_formats(shared),
+    };
+    let lines: Vec<&Levels> = chosen
+        .iter()
+        .filter_map(|own| match &own.channel.signal {
+            Signal::Levels(levels) => Some(levels),
+            Signal::Octets(_) => None,
+        })
+        .collect();
+    if !lines.is_empty() {
+        let (uart, told) = find(&lines, &formats).map_err(wrong)?;
+        notes.push(told);
+        return Ok(uart);
+    }
+    // The slowest rate at which no octet begins before the one in front of it has ended; a tenth for clocks that differ.
+    let starts = chosen.iter().filter_map(|own| match &own.channel.signal {
+        Signal::Octets(octets) => Some(octets.windows(2)),
+        Signal::Levels(_) => None,
+    });
+    let gaps = starts.flatten().map(|two| two[1].start - two[0].start);
+    let closest = gaps.filter(|gap| *gap > 0).min().unwrap_or(Time::MAX);
+    let fits = |own: &&Format| own.octet_time().units() / 10 * 9 <= closest.cast_unsigned();
+    let mut fitting: Vec<&Format> = formats.iter().filter(fits).collect();
+    fitting.sort_by_key(|own| own.bits_per_second);
+    // A line with pauses everywhere says little: the bus's usual rate then.
+    let usual = fitting.iter().find(|own| ***own == formats[0]);
+    let near = |own: &&&Format| own.octet_time().units() / 10 * 11 >= closest.cast_unsigned();
+    let found = fitting.iter().find(near).or(usual).or(fitting.first());
+    let format = found.map_or(formats[0], |own| **own);
+    Ok(Uart {
+        format,
+        inverted: false,
+    })
+}
+
+/// The capture of the channels of a file.
+///
+/// # Errors
+/// No channel is a link, they are of two kinds of buses, or their levels are no octets.
+pub(super) fn settle(
+    channels: Vec<ChannelRead>,
+    settings: &Settings,
+    mut notes: Vec<String>,
+) -> Result<Imported, CaptureError> {
+    let chosen = choose(channels, settings, &mut notes)?;
+    let of_ring = |own: &Chosen| matches!(own.target, Target::Link(..));
+    let (links, all) = (
+        chosen.iter().filter(|own| of_ring(own)).count(),
+        chosen.len(),
+    );
+    let bus = chosen.iter().any(|own| own.target == Target::Bus);
+    if (links != 0 && links != all) || (bus && all > 1) {
+        return Err(wrong(
+            "links of a ring, stations of a shared line, or one `bus` are expected, and not several of these: import them one after the other"
+                .to_owned(),
+        ));
+    }
+    let shared = links == 0;
+    let uart = format(&chosen, settings, shared, &mut notes)?;
+    let octet = uart.format.octet_time();
+    let lines: Vec<(Target, Vec<OctetRead>)> = chosen
+        .into_iter()
+        .map(|own| {
+            let octets = match own.channel.signal {
+                Signal::Levels(levels) => decode(&levels, uart, usize::MAX),
+                Signal::Octets(octets) => octets,
+            };
+            (own.target, octets)
+        })
+        .collect();
+    let starts = lines.iter().flat_map(|(_, own)| own);
+    let first = starts.map(|own| own.start).min().unwrap_or(0);
+    let base = match first {
+        0.. if Span::from_units(first.cast_unsigned()).as_nanos() <= DAY => 0,
+        _ => first,
+    };
+    let nanos = |start: Time| {
+        let since = u64::try_from(start.checked_sub(base)?).ok()?;
+        let nanos = (Span::from_units(since) + octet).as_nanos();
+        (nanos <= LATEST).then_some(nanos)
+    };
+    let late = || wrong("times are more than a year apart".to_owned());
+    if shared {
+        let mut all = Vec::new();
+        let mut stations = Vec::new();
+        for (target, octets) in lines {
+            let read = |own: OctetRead| {
+                Ok(PacketOctet {
+                    nanos: nanos(own.start).ok_or_else(late)?,
+                    sent: Some(own.byte),
+                    received: Some(own.byte),
+                    error: own.error,
+                })
+            };
+            let octets: Vec<PacketOctet> = octets
+                .into_iter()
+                .map(read)
+                .collect::<Result<_, CaptureError>>()?;
+            let senders = match target {
+                Target::Station(own) => {
+                    stations.push(own);
+                    vec![own; octets.len()]
+                }
+                Target::Bus | Target::Link(..) => buses::senders(&octets, octet),
+            };
+            all.extend(senders.into_iter().zip(octets));
+        }
+        let capture = assemble(stations.into_iter(), all, octet);
+        return Ok(Imported { capture, notes });
+    }
+    let mut assembly = Assembly::default();
+    for (target, octets) in lines {
+        let Target::Link(ring, from, to) = target else {
+            continue;
+        };
+        let link = assembly.link(ring, from, to);
+        for own in octets {
+            let (at, byte) = (nanos(own.start).ok_or_else(late)?, Some(own.byte));
+            link.bytes.push(line_byte(at, byte, byte, own.error));
+        }
+    }
+    let rate = Rate::from_bits_per_second(uart.format.bits_per_second);
+    let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
+    Ok(Imported { capture, notes })
+}

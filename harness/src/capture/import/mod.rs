@@ -1,0 +1,282 @@
+//! Files of other programs: one table of the formats that are read ([`FORMATS`]).
+//!
+//! Each format says by the first bytes whether a file is of it, and reads it: into a capture, where the file says which links it
+//! is of, or into channels, of which the user says which links they are ([`NamedLink`]). Levels of a line are decoded by a receiver of
+//! octets ([`Uart`]), whose format is given or found.
+
+mod asc;
+mod levels;
+mod links;
+mod numbers;
+mod own;
+mod saleae;
+mod sigrok;
+mod table;
+mod uart;
+mod vcd;
+
+pub(super) use asc::Logged;
+pub use links::{NamedLink, Target};
+pub use uart::Uart;
+
+use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
+use crate::buses;
+use harness_proto::line::Rate;
+use links::ChannelRead;
+
+/// What is known of a file beside its bytes.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// The rate of a ring's line, where the file does not say it.
+    pub rate: Option<Rate>,
+    /// The format of lines of which the file has the levels; found where it is not given.
+    pub uart: Option<Uart>,
+    /// Samples a second, where the file has neither them nor times.
+    pub samples: Option<u64>,
+    /// Which channel is which link.
+    pub links: Vec<NamedLink>,
+}
+
+/// A capture, and what is to be told about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Imported {
+    /// The capture.
+    pub capture: Capture,
+    /// What was found and what was not read, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl From<Capture> for Imported {
+    fn from(capture: Capture) -> Self {
+        let notes = Vec::new();
+        Self { capture, notes }
+    }
+}
+
+/// Channels, and what is to be told about them.
+type Channels = (Vec<ChannelRead>, Vec<String>);
+
+/// How the files of a format are read.
+#[derive(Clone, Copy)]
+enum Reader {
+    /// The file says which links it is of.
+    Whole(fn(&[u8], &Settings) -> Result<Imported, CaptureError>),
+    /// The file has channels.
+    Channels(fn(&[u8], &Settings) -> Result<Channels, CaptureError>),
+}
+
+/// A format of files.
+struct Format {
+    name: &'static str,
+    recognised: fn(&[u8]) -> bool,
+    reader: Reader,
+}
+
+const fn whole(
+    name: &'static str,
+    recognised: fn(&[u8]) -> bool,
+    reader: fn(&[u8], &Settings) -> Result<Imported, CaptureError>,
+) -> Format {
+    let reader = Reader::Whole(reader);
+    Format {
+        name,
+        recognised,
+        reader,
+    }
+}
+
+const fn channels(
+    name: &'static str,
+    recognised: fn(&[u8]) -> bool,
+    reader: fn(&[u8], &Settings) -> Result<Channels, CaptureError>,
+) -> Format {
+    let reader = Reader::Channels(reader);
+    Format {
+        name,
+        recognised,
+        reader,
+    }
+}
+
+/// The first byte that is no white space.
+fn first(bytes: &[u8]) -> Option<u8> {
+    bytes
+        .iter()
+        .copied()
+        .find(|byte| !byte.is_ascii_whitespace())
+}
+
+/// The formats; a file is of the first one that recognises it.
+const FORMATS: [Format; 16] = [
+    whole(
+        "pcapng (Wireshark)",
+        |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
+        |bytes, settings| Ok(pcapng::read(bytes, settings.rate)?.into()),
+    ),
+    whole(
+        "pcap (tcpdump, Wireshark)",
+        pcap::recognised,
+        |bytes, settings| {
+            let link = settings.links.first().map(|own| own.link.as_str());
+            Ok(pcap::read(bytes, settings.rate, link)?.into())
+        },
+    ),
+    whole(
+        "log of candump",
+        |bytes| first(bytes) == Some(b'('),
+        |bytes, settings| frames::candump(bytes, &settings.links),
+    ),
+    whole(
+        "frames in JSON",
+        |bytes| first(bytes) == Some(b'{') && frames::is_json(bytes),
+        |bytes, _| Ok(frames::json(bytes)?.into()),
+    ),
+    whole(
+        "telegrams in JSON",
+        |bytes| first(bytes) == Some(b'{') && telegrams::is_json(bytes),
+        |bytes, _| Ok(telegrams::json(bytes)?.into()),
+    ),
+    whole(
+        "trace in JSON",
+        |bytes| first(bytes) == Some(b'{'),
+        |bytes, settings| Ok(buses::rings::capture::json::read(bytes, settings.rate)?.into()),
+    ),
+    whole("bytes in csv", own::is_bytes, |bytes, settings| {
+        Ok(own::bytes(bytes, settings.rate)?.into())
+    }),
+    whole("frames in csv", own::is_frames, |bytes, _| {
+        Ok(own::frames(bytes)?.into())
+    }),
+    whole("telegrams in csv", own::is_telegrams, own::telegrams),
+    whole("ASC (Vector)", asc::recognised, |bytes, settings| {
+        frames::asc(asc::read(bytes)?, &settings.links)
+    }),
+    channels("VCD", vcd::recognised, |bytes, _| vcd::read(bytes)),
+    channels(
+        "binary levels (Saleae Logic)",
+        |bytes| bytes.starts_with(saleae::BINARY),
+        |bytes, _| saleae::binary(bytes),
+    ),
+    channels("csv (sigrok)", sigrok::recognised, |bytes, settings| {
+        sigrok::read(bytes, settings.samples)
+    }),
+    channels(
+        "table of octets (Saleae Logic)",
+        saleae::is_data_table,
+        |bytes, _| saleae::data_table(bytes),
+    ),
+    channels(
+        "text of octets (Saleae Logic)",
+        saleae::is_analyser,
+        |bytes, _| saleae::analyser(bytes),
+    ),
+    channels(
+        "csv of levels (Saleae Logic)",
+        saleae::is_levels,
+        |bytes, _| saleae::levels(bytes),
+    ),
+];
+
+/// Formats that are not read, by their first bytes, with what to do instead.
+const FOREIGN: [(&[u8], &str); 12] = [
+    (
+        b"PK\x03\x04",
+        "a zip archive, as .sal and .sr files are; export the levels from Logic as csv or binary, or write a VCD with `sigrok-cli -i \
+         FILE.sr -O vcd -o FILE.vcd`",
+    ),
+    (
+        b"\x1F\x8B",
+        "compressed with gzip; decompress it with `gunzip`",
+    ),
+    (
+        b"\x28\xB5\x2F\xFD",
+        "compressed with zstd; decompress it with `unzstd`",
+    ),
+    (
+        b"BZh",
+        "compressed with bzip2; decompress it with `bunzip2`",
+    ),
+    (
+        b"LOGG",
+        "a BLF log by Vector; save it as ASC, or convert it with python-can's `can_logconvert FILE.blf FILE.asc`",
+    ),
+    (
+        b"MDF     ",
+        "an MDF log; convert it with python-can's `can_logconvert FILE.mf4 FILE.asc`",
+    ),
+    (
+        b";$FILEVERSION",
+        "a trace by PEAK; convert it with python-can's `can_logconvert FILE.trc FILE.asc`",
+    ),
+    (b"\xFF\xFE", "text in UTF-16; save it as UTF-8"),
+    (b"\xFE\xFF", "text in UTF-16; save it as UTF-8"),
+    (
+        b"snoop\0\0\0",
+        "a snoop file; save it as pcapng in Wireshark",
+    ),
+    (b"\x89PNG", "a picture; a capture is expected"),
+    (
+        b"SQLite format 3",
+        "a database; export a capture from its program",
+    ),
+];
+
+/// Without the mark that some programs write in front of UTF-8.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
+fn format(bytes: &[u8]) -> Option<&'static Format> {
+    FORMATS.iter().find(|own| (own.recognised)(bytes))
+}
+
+/// Whether bytes are the beginning of a capture in any format.
+pub(super) fn is_known(start: &[u8]) -> bool {
+    format(without_mark(start)).is_some()
+}
+
+/// Reads the bytes of a file.
+///
+/// # Errors
+/// [`CaptureError`].
+pub(super) fn read(bytes: &[u8], settings: &Settings) -> Result<Imported, CaptureError> {
+    let bytes = without_mark(bytes);
+    let Some(format) = format(bytes) else {
+        return Err(foreign(bytes));
+    };
+    match format.reader {
+        Reader::Whole(read) => read(bytes, settings),
+        Reader::Channels(read) => {
+            let (channels, notes) = read(bytes, settings)?;
+            links::settle(channels, settings, notes)
+        }
+    }
+}
+
+/// What a file that is not read looks like.
+fn foreign(bytes: &[u8]) -> CaptureError {
+    let known = FOREIGN.iter().find(|own| bytes.starts_with(own.0));
+    let line = table::first_line(bytes).trim();
+    let text = !line.is_empty() && !line.chars().any(char::is_control);
+    let looks = match known {
+        Some((_, looks)) => (*looks).to_owned(),
+        None if bytes.is_empty() => "nothing: it is empty".to_owned(),
+        None if text => {
+            let shown: String = line.chars().take(60).collect();
+            format!("text that begins with {shown:?}")
+        }
+        None => {
+            let begins = bytes.iter().take(8).map(|byte| format!("{byte:02X}"));
+            let begins: Vec<_> = begins.collect();
+            format!("unknown: it begins with the bytes {}", begins.join(" "))
+        }
+    };
+    let names: Vec<_> = FORMATS.iter().map(|own| own.name).collect();
+    CaptureError::Foreign {
+        looks,
+        formats: names.join(", "),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,119 @@
+//! Tables of text: rows of columns, with the character between them as the first line has it.
+
+use super::super::CaptureError;
+use csv::{ByteRecord, Reader, ReaderBuilder};
+use std::borrow::Cow;
+
+/// A table that is being read.
+pub(super) struct Table<'b> {
+    reader: Reader<&'b [u8]>,
+    /// The names of the columns.
+    pub(super) columns: Vec<String>,
+    /// The row, from [`Table::next`].
+    record: ByteRecord,
+}
+
+/// The first line of a text.
+pub(super) fn first_line(bytes: &[u8]) -> &str {
+    // A heading is no longer than that.
+    let start = &bytes[..bytes.len().min(65_536)];
+    let line = start.split(|own| matches!(own, b'\n' | b'\r')).next();
+    let line = line.unwrap_or_default();
+    std::str::from_utf8(line).unwrap_or_default()
+}
+
+/// The character between the columns of a line: the most frequent of comma, semicolon and tabulator.
+fn separator(line: &str) -> u8 {
+    let count = |own: u8| line.bytes().filter(|other| *other == own).count();
+    // Of equal counts the last wins.
+    let most = b"\t;,".iter().copied().max_by_key(|own| count(*own));
+    most.unwrap_or(b',')
+}
+
+/// The names of the columns of a line; none where it is no text.
+pub(super) fn columns(line: &str) -> Vec<String> {
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(separator(line))
+        .from_reader(line.as_bytes());
+    let record = reader.records().next().and_then(Result::ok);
+    let names = record.iter().flat_map(|own| own.iter());
+    names.map(|own| own.trim().to_owned()).collect()
+}
+
+impl<'b> Table<'b> {
+    /// A table whose first line has the names.
+    pub(super) fn new(bytes: &'b [u8]) -> Self {
+        let line = first_line(bytes);
+        let reader = ReaderBuilder::new()
+            .flexible(true)
+            .delimiter(separator(line))
+            .from_reader(bytes);
+        Self {
+            reader,
+            columns: columns(line),
+            record: ByteRecord::new(),
+        }
+    }
+
+    /// Where a column is, by its name.
+    ///
+    /// # Errors
+    /// There is none of that name.
+    pub(super) fn column(&self, name: &str) -> Result<usize, CaptureError> {
+        self.find(name).ok_or_else(|| CaptureError::Link {
+            place: "line 1".to_owned(),
+            what: format!("no column is named `{name}`"),
+        })
+    }
+
+    /// Where a column is, by its name.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        let mut columns = self.columns.iter();
+        columns.position(|own| own.eq_ignore_ascii_case(name))
+    }
+
+    /// Goes to the next row; `false` behind the last one.
+    ///
+    /// # Errors
+    /// The text cannot be read on.
+    pub(super) fn next(&mut self) -> Result<bool, CaptureError> {
+        self.reader
+            .read_byte_record(&mut self.record)
+            .map_err(|error| CaptureError::Link {
+                place: format!("line {}", self.reader.position().line()),
+                what: error.to_string(),
+            })
+    }
+
+    /// How many fields the row has.
+    pub(super) fn fields(&self) -> usize {
+        self.record.len()
+    }
+
+    /// A field of the row as it is; empty where the row is shorter.
+    pub(super) fn raw(&self, column: usize) -> &[u8] {
+        self.record.get(column).unwrap_or_default()
+    }
+
+    /// A field of the row as a text.
+    pub(super) fn text(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.raw(column))
+    }
+
+    /// An error in the row.
+    pub(super) fn wrong(&self, what: impl Into<String>) -> CaptureError {
+        let line = self.record.position().map_or(1, csv::Position::line);
+        CaptureError::Link {
+            place: format!("line {line}"),
+            what: what.into(),
+        }
+    }
+
+    /// An error in a field of the row, which is shown.
+    pub(super) fn wrong_field(&self, column: usize, expected: &str) -> CaptureError {
+        let shown: String = self.text(column).chars().take(40).collect();
+        let name = self.columns.get(column).map_or("", String::as_str);
+        self.wrong(format!("`{name}` is {shown:?}: {expected}"))
+    }
+}

@@ -1,0 +1,654 @@
+//! Files as other programs write them, typed by what their documents say.
+
+use super::super::{Capture, CaptureError, read, read_with};
+use super::*;
+use crate::report::pcapng::name;
+use crate::report::vcd::Signals;
+use harness_proto::line::{LineError, Parity, Rate};
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::{Channel, LineByte, Trace};
+use std::fmt::Write as _;
+
+fn settings(links: &[&str]) -> Settings {
+    let links = links.iter().map(|own| own.parse().expect("a link"));
+    Settings {
+        links: links.collect(),
+        ..Settings::default()
+    }
+}
+
+fn with_uart(links: &[&str], uart: &str) -> Settings {
+    Settings {
+        uart: Some(uart.parse().expect("a format")),
+        ..settings(links)
+    }
+}
+
+fn imported(file: impl AsRef<[u8]>, settings: &Settings) -> Imported {
+    read_with(file.as_ref(), settings).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refused(file: impl AsRef<[u8]>, settings: &Settings) -> String {
+    read_with(file.as_ref(), settings)
+        .expect_err("refused")
+        .to_string()
+}
+
+fn shared(trace: &Trace) -> bool {
+    let mut channels = trace.channels.iter();
+    channels.any(|own| own.from.is_none() && own.to.is_none())
+}
+
+/// What channels carried: `98->97: 88 FE! ...`, with `!` behind a damaged octet.
+fn shown(capture: &Capture) -> String {
+    let mut text = String::new();
+    for (ring, trace) in capture.traces.iter().enumerate() {
+        for channel in &trace.channels {
+            let _infallible = match (channel.from, channel.to) {
+                (from, None) if shared(trace) => write!(text, "{from:?}:"),
+                _ => write!(text, "{}:", name(ring, channel)),
+            };
+            for own in channel.octets() {
+                let mark = match own.error {
+                    None => "",
+                    Some(LineError::Parity) => "p",
+                    Some(LineError::Framing) => "f",
+                    Some(LineError::Break) => "b",
+                    Some(LineError::Overrun) => "o",
+                };
+                let byte = own.received.unwrap_or_default();
+                let _infallible = write!(text, " {byte:02X}{mark}");
+            }
+            for own in channel.frames() {
+                let _infallible = write!(text, " {}", own.frame);
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// The changes of a line that carries octets at these bit times: time in bits, level.
+fn drawn(octets: &[u8], parity: Parity, gap: u64) -> Vec<(u64, bool)> {
+    let mut changes = vec![(0, true)];
+    let mut at = 20;
+    for byte in octets {
+        let odd = byte.count_ones() % 2 == 0;
+        let mut bits: Vec<bool> = vec![false];
+        bits.extend((0..8).map(|bit| byte >> bit & 1 == 1));
+        match parity {
+            Parity::None => {}
+            Parity::Odd => bits.push(odd),
+            Parity::Even => bits.push(!odd),
+        }
+        bits.push(true);
+        for bit in bits {
+            if changes.last().is_some_and(|own| own.1 != bit) {
+                changes.push((at, bit));
+            }
+            at += 1;
+        }
+        at += gap;
+    }
+    changes
+}
+
+/// Octets with every number of ones, in an order in which both parities occur.
+fn many() -> Vec<u8> {
+    (0..200_u32).map(|own| (own * 73 % 256) as u8).collect()
+}
+
+fn hex(octets: &[u8]) -> String {
+    octets.iter().map(|own| format!(" {own:02X}")).collect()
+}
+
+/// A digital.csv of Logic 2 with one channel.
+fn digital(changes: &[(u64, bool)], rate: f64) -> String {
+    let mut text = "Time [s],Line\n".to_owned();
+    for (bits, level) in changes {
+        let _infallible = writeln!(text, "{:.12},{}", *bits as f64 / rate, u8::from(*level));
+    }
+    text
+}
+
+#[test]
+fn levels_become_octets_at_every_rate_of_a_ring() {
+    for rate in Rate::ALL {
+        for inverted in [false, true] {
+            let changes = drawn(&many(), Parity::Odd, 3);
+            let changes: Vec<_> = changes
+                .iter()
+                .map(|own| (own.0, own.1 != inverted))
+                .collect();
+            let file = digital(&changes, f64::from(rate.bits_per_second()));
+            let found = imported(&file, &settings(&["1->0=Line"]));
+            assert_eq!(shown(&found.capture), format!("1->0:{}\n", hex(&many())));
+            assert_eq!(found.capture.rate, rate);
+            let word = if inverted { " inverted" } else { "" };
+            let bits = rate.bits_per_second();
+            assert!(
+                found.notes[0].starts_with(&format!("the line is {bits} 8O1{word} with 0 of")),
+                "{:?}",
+                found.notes
+            );
+        }
+    }
+}
+
+/// The parity is the bus's: a station with another one is damaged and not taken for right.
+#[test]
+fn another_parity_is_not_taken_for_right() {
+    let file = digital(&drawn(&many(), Parity::Even, 3), 38_400.0);
+    let found = imported(&file, &settings(&["1->0=Line"]));
+    let octets = found.capture.traces[0].channels[0].octets();
+    let damaged = octets.iter().filter(|own| own.error.is_some()).count();
+    assert_eq!((octets.len(), damaged), (200, 200));
+    assert!(
+        found.notes[0].contains("explains it better: 38400 8E1 with 0 of 200"),
+        "{:?}",
+        found.notes
+    );
+    let given = imported(&file, &with_uart(&["1->0=Line"], "38400 8E1"));
+    assert_eq!(shown(&given.capture), format!("1->0:{}\n", hex(&many())));
+    // Half of the rate of the line fits no format.
+    let file = digital(&drawn(&many(), Parity::Odd, 0), 31_250.0);
+    let words = refused(&file, &settings(&["1->0=Line"]));
+    assert!(
+        words.contains("no format of the bus fits the line"),
+        "{words}"
+    );
+    assert!(words.contains("--uart"), "{words}");
+}
+
+/// A bad stop bit, a break of twelve bits, a pulse that is no start bit, and a part that was not recorded.
+#[test]
+fn what_a_receiver_sees() {
+    let file = "Time [s],1->0\n0,1\n0.001,0\n0.002,1\n0.030,0\n0.0301,1\n0.040,0\n0.043,X\n0.05,1\n0.060,0\n0.061,1\n";
+    let found = imported(file, &with_uart(&[], "1000 8N1"));
+    assert_eq!(shown(&found.capture), "1->0: FF FF\n");
+    let low = "Time [s],1->0\n0,1\n0.001,0\n0.013,1\n0.020,0\n0.023,1\n0.029,0\n0.0308,1\n0.05,1\n";
+    let found = imported(low, &with_uart(&[], "1000 8N1"));
+    assert_eq!(shown(&found.capture), "1->0: 00b FCf\n");
+    let at = found.capture.traces[0].channels[0].octets()[1].at;
+    assert_eq!(at, Instant::START + Span::from_millis(30));
+}
+
+#[test]
+fn vcd_of_any_writer() {
+    // One line, no $dumpvars, a fractional time, an identifier of two names, vectors, reals, comments, and an end within a number.
+    let mut text = "$comment made by hand $end $timescale 1 us $end $scope module top $end $var wire 1 ! tx $end $var wire 1 ! alias $end \
+                    $var wire 8 % bus $end $var real 64 & volts $end $upscope $end $enddefinitions $end #0 1! bx % r1.5 & "
+        .to_owned();
+    for (bits, level) in drawn(&[0x88, 0xFE, 0x01], Parity::Odd, 2) {
+        let us = (bits + 1) as f64 / 0.0096;
+        let _infallible = write!(text, "#{us:.3} b{}  ! $comment x $end ", u8::from(level));
+    }
+    text.push_str("#99999 #12");
+    for name in ["tx", "alias", "top.alias"] {
+        let found = imported(&text, &settings(&[&format!("master->1={name}")]));
+        assert_eq!(shown(&found.capture), "master->1: 88 FE 01\n", "{name}");
+        assert!(found.notes[0].contains("ends in the middle of `#12`"));
+    }
+    let words = refused(&text, &settings(&[]));
+    assert!(words.contains("none of `tx` is named as a link"), "{words}");
+    for (file, expected) in [
+        ("$timescale 3 ns $end", "a time scale of `3ns`"),
+        ("$var wire 1 ! a $end", "`$enddefinitions` is expected"),
+        (
+            "$enddefinitions $end #5 #3 ",
+            "before the one in front of it",
+        ),
+        (
+            "$var wire 1 ! a $end $enddefinitions $end #x 1!",
+            "`#x` is no time",
+        ),
+        (
+            "$var wire 1 ! a $end $enddefinitions $end #0 7! ",
+            "`7` is no level",
+        ),
+    ] {
+        let words = refused(file, &settings(&[]));
+        assert!(words.contains(expected), "{file}: {words}");
+    }
+}
+
+/// `libsigrok` writes all values of a time on one line (0.5.2).
+#[test]
+fn vcd_of_sigrok() {
+    let mut text = "META samplerate: 1000000\n$timescale 1 us $end\n$scope module libsigrok $end\n$var wire 1 ! 1->0 $end\n$var wire 1 \" B $end\n$upscope $end\n\
+                    $enddefinitions $end\n#0 1! 0\"\n"
+        .to_owned();
+    for (bits, level) in drawn(&[0x12], Parity::Odd, 2) {
+        let _infallible = writeln!(text, "#{} {}!", bits * 104 + 1, u8::from(level));
+    }
+    text.push_str("#9000\n");
+    let found = imported(&text, &settings(&[]));
+    assert_eq!(shown(&found.capture), "1->0: 12\n");
+    assert!(found.notes[0].contains("1 channel not read: no link is named for `B`"));
+}
+
+/// Our own VCD and csv, read again: what the receiver saw survives.
+#[test]
+fn our_own_files_survive() {
+    let byte = |place: u64, received, error| {
+        let at = Instant::START + Rate::Baud38400.byte_time() * (place + 1);
+        LineByte::seen(at, Some(0x88), received, error)
+    };
+    let line = vec![
+        byte(0, Some(0x88), None),
+        byte(1, Some(0x89), Some(LineError::Parity)),
+        byte(2, Some(0x88), Some(LineError::Framing)),
+        byte(4, Some(0x00), Some(LineError::Break)),
+        byte(7, None, None),
+        byte(9, Some(0x88), None),
+    ];
+    let mut trace = Trace::empty(2);
+    trace.channels = vec![
+        Channel::of_octets(None, Some(1), line.clone()),
+        Channel::of_octets(Some(1), Some(0), line),
+        Channel::of_octets(Some(0), None, Vec::new()),
+    ];
+    let traces = [trace.clone(), trace];
+    for signals in [Signals::All, Signals::Lines] {
+        let mut file = Vec::new();
+        crate::report::vcd::write(&traces, Rate::Baud38400, signals, &mut file).expect("a Vec");
+        let found = imported(&file, &settings(&[]));
+        let ring = "master->1: 88 89p 88f 00b 88\n1->0: 88 89p 88f 00b 88\n0->master:\n";
+        let other = "2:master->1: 88 89p 88f 00b 88\n2:1->0: 88 89p 88f 00b 88\n2:0->master:\n";
+        assert_eq!(shown(&found.capture), format!("{ring}{other}"));
+        // Times are drawn in steps of 100 ns.
+        let at = found.capture.traces[0].channels[0].octets()[0].at;
+        let expected = Instant::START + Rate::Baud38400.byte_time();
+        assert!(at.since(expected).max(expected.since(at)) <= Span::from_nanos(100));
+    }
+    let capture = Capture {
+        rate: Rate::Baud38400,
+        traces: traces.to_vec(),
+    };
+    let mut file = Vec::new();
+    crate::report::csv::write(&traces, &mut file).expect("a Vec");
+    // A link without a byte leaves no row.
+    let mut expected = capture;
+    for trace in &mut expected.traces {
+        trace.channels.pop();
+    }
+    let found = read(&file, Some(Rate::Baud38400)).expect("a capture");
+    for (found, expected) in found.traces.iter().zip(&expected.traces) {
+        for (found, expected) in found.channels.iter().zip(&expected.channels) {
+            let cut = |own: &LineByte| {
+                (
+                    own.at.since_start().as_nanos(),
+                    own.sent,
+                    own.received,
+                    own.error,
+                )
+            };
+            let both =
+                [found, expected].map(|own| own.octets().iter().map(cut).collect::<Vec<_>>());
+            assert_eq!(both[0], both[1]);
+        }
+    }
+    assert_eq!(found.traces.len(), 2);
+}
+
+/// The text of the analyser, in Logic 1 and Logic 2.
+#[test]
+fn octets_of_an_analyser() {
+    let file = "Time [s],Value,Parity Error,Framing Error\r\n-0.001,0x88,,\r\n-0.000713542,0xFE,Error,\r\n0.0,0x00,,Error\r\n";
+    let found = imported(file, &settings(&["98->97"]));
+    assert_eq!(shown(&found.capture), "98->97: 88 FEp 00f\n");
+    let octets = found.capture.traces[0].channels[0].octets();
+    // The table has the time of the start bit.
+    assert_eq!(octets[0].at, Instant::START + Span::from_nanos(286_458));
+    assert_eq!(octets[2].at.since(octets[0].at), Span::from_millis(1));
+    for (file, expected) in [
+        (
+            "Time [s],Value,Parity Error,Framing Error\n0,a,,\n",
+            "export with radix Hex",
+        ),
+        (
+            "Time [s],Value,Parity Error,Framing Error\n0,16,,\n",
+            "export with radix Hex",
+        ),
+        (
+            "Time [s],Value,Parity Error,Framing Error\n0,\"\n\",,\n",
+            "export with radix Hex",
+        ),
+        (
+            "Time [s],Value,Parity Error,Framing Error\n0,0x1,maybe,\n",
+            "nothing or `Error`",
+        ),
+        (
+            "Time [s],Value,Parity Error,Framing Error\n1,0x1,,\n0,0x1,,\n",
+            "line 3: this octet is before",
+        ),
+        (
+            "Time [s],Packet ID,Address,Data,Framing Error\n0,1,0x1,0x2,\n",
+            "multiprocessor mode",
+        ),
+    ] {
+        let words = refused(file, &settings(&["98->97"]));
+        assert!(words.contains(expected), "{file}: {words}");
+    }
+}
+
+/// The table of Logic 2: columns by name, several analysers, rows of other types, seconds or dates.
+#[test]
+fn a_table_of_octets() {
+    let file = "name,type,start_time,duration,\"data\",\"error\"\n\
+                \"98->97\",\"data\",0.001,0.000260417,0x88,\n\
+                I2C,start,0.0011,0,,\n\
+                \"97->96\",\"data\",0.0012,0.000260417,0xFE,\"parity\"\n";
+    let found = imported(file, &settings(&[]));
+    assert_eq!(shown(&found.capture), "98->97: 88\n97->96: FEp\n");
+    assert!(found.notes[0].contains("1 rows not read"));
+    let dated = "data,start_time,type,duration\n0x12,2022-01-05T12:00:00.000+01:00,data,0\n0x13,2022-01-05T12:00:00.002+01:00,data,0\n";
+    let found = imported(dated, &settings(&["1->0"]));
+    assert_eq!(shown(&found.capture), "1->0: 12 13\n");
+    let octets = found.capture.traces[0].channels[0].octets();
+    assert_eq!(octets[1].at.since(octets[0].at), Span::from_millis(2));
+    let ascii = "name,type,start_time,duration,\"data\"\nA,data,0.001,0.0002,\"\n\"\n";
+    assert!(refused(ascii, &settings(&["1->0=A"])).contains("line 2: `data` is \"\\n\""));
+    assert!(
+        refused(file, &settings(&["1->0=B"]))
+            .contains("no channel is named `B`; the file has `98->97`")
+    );
+}
+
+fn saleae(version: u32, parts: &[(u32, f64, f64, &[f64])]) -> Vec<u8> {
+    let mut file = b"<SALEAE>".to_vec();
+    file.extend(version.to_le_bytes());
+    file.extend(0_u32.to_le_bytes());
+    if version == 1 {
+        file.extend((parts.len() as u64).to_le_bytes());
+    }
+    for (state, begin, end, times) in parts {
+        file.extend(state.to_le_bytes());
+        if version == 1 {
+            file.extend(25e6_f64.to_le_bytes());
+        }
+        file.extend(begin.to_le_bytes());
+        file.extend(end.to_le_bytes());
+        file.extend((times.len() as u64).to_le_bytes());
+        file.extend(times.iter().flat_map(|own| own.to_le_bytes()));
+    }
+    file
+}
+
+#[test]
+fn binary_levels() {
+    let changes = drawn(&many(), Parity::Odd, 1);
+    let times: Vec<f64> = changes[1..]
+        .iter()
+        .map(|own| own.0 as f64 / 19_200.0)
+        .collect();
+    for version in [0, 1] {
+        let file = saleae(version, &[(1, 0.0, 1.0, &times)]);
+        let found = imported(&file, &settings(&["0->master"]));
+        assert_eq!(
+            shown(&found.capture),
+            format!("0->master:{}\n", hex(&many()))
+        );
+        assert_eq!(found.capture.rate, Rate::Baud19200);
+        for length in 0..file.len() {
+            assert!(read_with(&file[..length], &settings(&["0->master"])).is_err());
+        }
+    }
+    // Between two parts nothing was recorded: the octet that the first one ends in is not read.
+    let parts = [
+        (1, 0.0, 0.004, [0.001].as_slice()),
+        (1, 0.02, 0.1, &[0.03, 0.031]),
+    ];
+    let found = imported(saleae(1, &parts), &with_uart(&["0->master"], "1000 8N1"));
+    assert_eq!(shown(&found.capture), "0->master: FF\n");
+    let wrong = saleae(0, &[(1, 0.0, 1.0, &[0.5, 0.4])]);
+    assert!(refused(wrong, &settings(&["0->master"])).contains("before the one in front of it"));
+    let wrong = saleae(0, &[(1, 0.0, f64::NAN, &[])]);
+    assert!(
+        refused(wrong, &settings(&["0->master"])).contains("NaN seconds are no time of a capture")
+    );
+}
+
+/// The csv of libsigrok 0.5.2.
+#[test]
+fn samples_of_sigrok() {
+    let mut text = "; CSV generated by libsigrok 0.5.2\n; from unknown on Mon Nov 23 16:04:20 2026\n; Channels (2/2): A, 1->0\n\
+                    META samplerate: 96000\nlogic,logic\n"
+        .to_owned();
+    let changes = drawn(&[0x88, 0x01], Parity::Odd, 5);
+    for sample in 0..600 {
+        let now = changes.iter().rev().find(|own| own.0 * 10 <= sample);
+        let level = now.is_none_or(|own| own.1);
+        let _infallible = writeln!(text, "0,{}", u8::from(level));
+    }
+    let found = imported(&text, &settings(&[]));
+    assert_eq!(shown(&found.capture), "1->0: 88 01\n");
+    assert_eq!(found.capture.rate, Rate::Baud9600);
+    let without = text.replace("META samplerate: 96000\n", "");
+    assert!(refused(&without, &settings(&[])).contains("--samples"));
+    let given = Settings {
+        samples: Some(96_000),
+        ..settings(&[])
+    };
+    assert_eq!(imported(&without, &given).capture, found.capture);
+    let commented = text.replace("META samplerate: 96000", "; Samplerate: 96 kHz");
+    assert_eq!(imported(&commented, &settings(&[])).capture, found.capture);
+    let (head, _) = text.split_once("0,1\n").expect("rows");
+    let left_out: String = (0..200).map(|own| format!("0,{}\n", own % 2)).collect();
+    assert!(refused(format!("{head}{left_out}"), &settings(&[])).contains("dedup"));
+}
+
+/// PROFIBUS at one place of the line: the telegrams name their senders.
+#[test]
+fn a_line_that_stations_share() {
+    let ask = [0x10, 8, 2, 0x49, 0x53, 0x16];
+    let reply = [0x10, 2, 8, 0x00, 0x0A, 0x16];
+    let mut changes = drawn(&ask, Parity::Even, 0);
+    for (bits, level) in drawn(&reply, Parity::Even, 0).into_iter().skip(1) {
+        changes.push((bits + 6 * 11 + 20, level));
+    }
+    let file = digital(&changes, 500_000.0);
+    let found = imported(&file, &settings(&["bus=Line"]));
+    let expected = "None: 10 08 02 49 53 16\nSome(8): 10 02 08 00 0A 16\n";
+    assert_eq!(shown(&found.capture), expected);
+    let words = refused(&file, &settings(&["98->96=Line"][..0]));
+    assert!(words.contains("--link \"98->97=Line\""), "{words}");
+    assert!("98->96=Line".parse::<NamedLink>().is_err());
+}
+
+/// Files of types that are not read are named.
+#[test]
+fn what_a_file_looks_like() {
+    for (file, expected) in [
+        (b"PK\x03\x04abc".as_slice(), "a zip archive"),
+        (b"\x1F\x8B\x08", "gunzip"),
+        (b"LOGG\x90", "BLF"),
+        (b";$FILEVERSION=1.1\n", "PEAK"),
+        (b"\xFF\xFET\0i\0", "UTF-16"),
+        (
+            b"hello world\nsecond",
+            "text that begins with \"hello world\"",
+        ),
+        (b"\x00\x01\x02", "the bytes 00 01 02"),
+        (b"", "it is empty"),
+    ] {
+        let words = refused(file, &settings(&[]));
+        assert!(words.contains(expected), "{words}");
+        assert!(words.contains("ASC (Vector)"), "{words}");
+    }
+    // The mark in front of UTF-8.
+    let file = "\u{FEFF}Time [s],Value,Parity Error,Framing Error\n0,0x12,,\n";
+    assert_eq!(
+        shown(&imported(file, &settings(&["1->0"])).capture),
+        "1->0: 12\n"
+    );
+}
+
+/// A log as CANoe writes it, with hexadecimal and decimal numbers, absolute and relative times, a German heading.
+#[test]
+fn asc() {
+    let log = "date Mit Nov 23 10:00:00.000 2026\nbase hex  timestamps absolute\nno internal events logged\n// version 8.0.0\n\
+               Begin Triggerblock Mon Nov 23 10:00:00.000 am 2026\n   0.000000 Start of measurement\n\
+               0.001000 1  201             Tx   d 3 3D 40 00  Length = 228000 BitCount = 118 ID = 513\n\
+               0.001500 1  ErrorFrame\n\
+               0.002000 1  1FFFFFFFx       Rx   r 8\n\
+               0.003000 1  181             Rx   d 4 40 81 01 00\nEnd TriggerBlock\n";
+    let found = imported(log, &settings(&[]));
+    let expected = "_: 201#3D4000 1FFFFFFF#R8 181#40810100\n";
+    let frames = |capture: &Capture| shown(capture).split_once(": ").map(|own| own.1.to_owned());
+    assert_eq!(frames(&found.capture), frames_of(expected));
+    assert!(found.notes[0].contains("1 error frame"));
+    let at = |capture: &Capture| -> Vec<u64> {
+        let frames = capture.traces[0].channels[0].frames();
+        frames
+            .iter()
+            .map(|own| own.at.since_start().as_nanos() / 1_000)
+            .collect()
+    };
+    assert_eq!(at(&found.capture), [1_000, 2_000, 3_000]);
+    // BUSMASTER writes all on one line; times since the event before, and one of them is an error frame's.
+    let log = "base dec  no internal events logged timestamps relative\n0.0010 1 513 Rx d 3 61 64 0\n0.0005 1 ErrorFrame\n0.0005 1 385x Rx d 0\n";
+    let found = imported(log, &settings(&[]));
+    assert_eq!(
+        frames(&found.capture),
+        frames_of("_: 201#3D4000 00000181#\n")
+    );
+    assert_eq!(at(&found.capture), [1_000, 2_000]);
+    // Times before 0, two channels, CAN FD, a wrong radix.
+    let two = "base hex timestamps absolute\n-0.001 1 201 Rx d 0\n0.001 2 202 Rx d 0\n";
+    assert!(refused(two, &settings(&[])).contains("--link bus=1"));
+    let found = imported(two, &settings(&["bus=2"]));
+    assert_eq!(frames(&found.capture), frames_of("_: 202#\n"));
+    assert_eq!(at(&found.capture), [2_000]);
+    for (line, expected) in [
+        ("0.1 CANFD 1 Rx 201 0 0 8 8", "CAN FD"),
+        ("0.1 1 FFF Rx d 0", "too large"),
+        ("0.1 1 201 Rx d 3 3D 40", "3 data bytes are expected"),
+        ("0.1 1 20Z Rx d 0", "no hexadecimal identifier"),
+    ] {
+        let words = refused(
+            format!("base hex timestamps absolute\n{line}\n"),
+            &settings(&[]),
+        );
+        assert!(
+            words.contains(expected) && words.contains("line 2"),
+            "{words}"
+        );
+    }
+}
+
+fn frames_of(text: &str) -> Option<String> {
+    text.split_once(": ").map(|own| own.1.to_owned())
+}
+
+/// The log of candump: padded interfaces, directions, times from 0, raw length codes, several interfaces.
+#[test]
+fn candump() {
+    let log = "(0000000000.000000)  vcan0 201#3D.40.00 R\n(0000000000.000123456) vcan0 00000181#R8_F T\n\
+               (0000000000.000200) vcan0 20000004#0004000000000000\n(0.0003) vcan0 201#1122334455667788_9\n";
+    let found = imported(log, &settings(&[]));
+    assert!(shown(&found.capture).ends_with(": 201#3D4000 00000181#R8 201#1122334455667788\n"));
+    assert!(
+        found.notes[0].contains("1 error frame not read"),
+        "{:?}",
+        found.notes
+    );
+    let two = "(0.1) can0 201#\n(0.2) can1 202#\n";
+    assert!(
+        refused(two, &settings(&[]))
+            .contains("2 interfaces; choose one of can0, can1, as in `--link bus=can0`")
+    );
+    let found = imported(two, &settings(&["bus=can1"]));
+    assert!(shown(&found.capture).ends_with(": 202#\n"));
+    assert_eq!(found.notes, ["1 frame of other interfaces not read"]);
+}
+
+/// pcap in both orders of bytes, with times in microseconds and nanoseconds.
+#[test]
+fn pcap() {
+    let file = |big: bool, magic: u32, link: u32, data: &[u8]| {
+        let number = |own: u32| {
+            if big {
+                own.to_be_bytes()
+            } else {
+                own.to_le_bytes()
+            }
+        };
+        let mut file = number(magic).to_vec();
+        file.extend(if big { [0, 2, 0, 4] } else { [2, 0, 4, 0] });
+        file.extend([0; 8]);
+        file.extend(number(65_535));
+        file.extend(number(link));
+        for own in [1, 5, data.len() as u32, data.len() as u32] {
+            file.extend(number(own));
+        }
+        file.extend(data);
+        file
+    };
+    let frame = [0, 0, 2, 1, 3, 0, 0, 0, 0x3D, 0x40, 0];
+    let octet = [0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0x88];
+    for big in [false, true] {
+        for (magic, nanos) in [(0xA1B2_C3D4, 1_000_005_000), (0xA1B2_3C4D, 1_000_000_005)] {
+            let found = imported(file(big, magic, 227, &frame), &settings(&[]));
+            assert!(shown(&found.capture).ends_with(": 201#3D4000\n"));
+            let at = found.capture.traces[0].channels[0].frames()[0].at;
+            assert_eq!(at.since_start().as_nanos(), nanos);
+            let found = imported(file(big, magic, 250, &octet), &settings(&["1->0"]));
+            assert_eq!(shown(&found.capture), "1->0: 88\n");
+        }
+    }
+    let whole = file(false, 0xA1B2_C3D4, 250, &octet);
+    assert!(refused(&whole, &settings(&[])).contains("--link \"98->97\""));
+    assert!(refused(file(false, 0xA1B2_C3D4, 1, &octet), &settings(&[])).contains("link type 1"));
+    for length in 25..whole.len() {
+        assert!(read_with(&whole[..length], &settings(&["1->0"])).is_err());
+    }
+}
+
+/// Any bytes behind the first ones of each format, and damaged files of each: a capture or a reason, never a panic.
+#[test]
+fn hostile_files() {
+    let changes = drawn(&many()[..20], Parity::Odd, 1);
+    let times: Vec<f64> = changes[1..]
+        .iter()
+        .map(|own| own.0 as f64 / 38_400.0)
+        .collect();
+    let vcd = "$timescale 1 us $end $var wire 1 ! 1->0 $end $enddefinitions $end #0 1! #5 0! #400 1! #500 b0 ! #900 1! ";
+    let files: Vec<Vec<u8>> = vec![
+        digital(&changes, 38_400.0).into_bytes(),
+        saleae(0, &[(1, 0.0, 1.0, &times)]),
+        saleae(1, &[(1, 0.0, 1.0, &times), (0, 1.5, 2.0, &[])]),
+        vcd.into(),
+        "; CSV generated by libsigrok 0.5.2\n; Channels (1/1): 1->0\nMETA samplerate: 1000\nlogic\n1\n0\n1\n1\n".into(),
+        "name,type,start_time,duration,\"data\",error\n1->0,data,0.001,0.0002,0x88,parity\n".into(),
+        "Time [s],Value,Parity Error,Framing Error\n-1.5e-3,0x88,,Error\n".into(),
+        "base hex timestamps relative\n0.001 1 201 Rx d 3 3D 40 00\n-0.1 1 1x Tx r 8\n".into(),
+        "(0.1) can0 201#R8_F R\n".into(),
+        "ring,t_ns,link,n,sent,received,status\n1,5,1->0,1,12,13,parity\n".into(),
+        "t_ns,from,id,remote,dlc,data,ended\n5,master,201,0,1,12,lost\n".into(),
+        "t_ns,from,to,bytes,error\n500000,master,8,1012,parity 2\n600000,8,master,E5,\n".into(),
+    ];
+    let mut dice = fastrand::Rng::with_seed(24);
+    let settings = settings(&[]);
+    for round in 0..4_000 {
+        let mut file = files[round % files.len()].clone();
+        for _ in 0..=dice.usize(..4) {
+            let place = dice.usize(..file.len());
+            match dice.u8(..5) {
+                0 => file[place] ^= 1 << dice.u8(..8),
+                1 => file[place] = dice.u8(..),
+                2 => file.truncate(place.max(1)),
+                3 => file.insert(place, *b"9\n,#$;0- ".get(dice.usize(..9)).unwrap_or(&0)),
+                _ => {
+                    let part = file[place..].to_vec();
+                    file.extend(part.iter().take(40));
+                }
+            }
+        }
+        match read_with(&file, &settings) {
+            Ok(found) => assert!(found.capture.bytes() <= file.len()),
+            Err(CaptureError::At { offset, .. }) => assert!(offset <= file.len() + 8),
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! Value change dumps (IEEE 1364) of any writer: the wires of one bit are levels of lines.
+//!
+//! Tokens are separated by white space, and lines mean nothing. Values may stand at `#0` without `$dumpvars`, times may have places, two
+//! names may share an identifier, and a file may end in the middle of a token where a program was stopped.
+
+use super::super::CaptureError;
+use super::levels::{Level, Levels};
+use super::links::{ChannelRead, Signal};
+use super::numbers::{Time, units};
+use std::collections::HashMap;
+
+/// The time scales: their names, and their length in femtoseconds.
+const UNITS: [(&str, i128); 6] = [
+    ("s", 1_000_000_000_000_000),
+    ("ms", 1_000_000_000_000),
+    ("us", 1_000_000_000),
+    ("ns", 1_000_000),
+    ("ps", 1_000),
+    ("fs", 1),
+];
+
+/// Whether a file is a value change dump: its first token is a keyword of a header.
+pub(super) fn recognised(bytes: &[u8]) -> bool {
+    const FIRST: [&[u8]; 8] = [
+        b"$date",
+        b"$version",
+        b"$timescale",
+        b"$comment",
+        b"$scope",
+        b"$var",
+        b"$enddefinitions",
+        b"$attrbegin",
+    ];
+    let first = tokens(&bytes[said(bytes)..]).next();
+    first.is_some_and(|(_, own)| FIRST.contains(&own))
+}
+
+/// The length of the line that sigrok-cli 0.7 prints in front of what it converts: `META samplerate: 10000000`.
+fn said(bytes: &[u8]) -> usize {
+    let line = bytes.iter().position(|own| *own == b'\n');
+    line.filter(|_| bytes.starts_with(b"META ")).unwrap_or(0)
+}
+
+/// The tokens with their places.
+fn tokens(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let rest = &bytes[at..];
+        let start = at + rest.iter().position(|own| !own.is_ascii_whitespace())?;
+        let rest = &bytes[start..];
+        let length = rest.iter().position(u8::is_ascii_whitespace);
+        at = start + length.unwrap_or(rest.len());
+        Some((start, &bytes[start..at]))
+    })
+}
+
+fn wrong(offset: usize, what: impl Into<String>) -> CaptureError {
+    CaptureError::At {
+        offset,
+        what: what.into(),
+    }
+}
+
+fn shown(token: &[u8]) -> String {
+    String::from_utf8_lossy(token).chars().take(40).collect()
+}
+
+/// A wire that is being read.
+#[derive(Default)]
+struct Wire {
+    names: Vec<String>,
+    levels: Levels,
+}
+
+#[derive(Default)]
+struct Reader<'b> {
+    wires: Vec<Wire>,
+    by_identifier: HashMap<&'b [u8], usize>,
+    scopes: Vec<&'b [u8]>,
+    /// Femtoseconds of a tick.
+    tick: Option<i128>,
+    now: Time,
+    /// Whether a value has changed since the last time.
+    changed: bool,
+    /// Bits of a vector, of which the identifier follows.
+    bits: Option<&'b [u8]>,
+    /// A value of another kind, of which the identifier follows.
+    passed_over: bool,
+}
+
+/// The wires of a file, and what is to be told about it.
+///
+/// # Errors
+/// A token that cannot be, with its place.
+pub(super) fn read(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
+    let mut notes = Vec::new();
+    // A token at the very end may be half of one.
+    let whole = match bytes.last() {
+        Some(last) if !last.is_ascii_whitespace() => {
+            let end = bytes.iter().rposition(u8::is_ascii_whitespace).unwrap_or(0);
+            let cut = &bytes[end..];
+            if cut.trim_ascii() != b"$end" {
+                notes.push(format!(
+                    "the file ends in the middle of `{}`, which was not read",
+                    shown(cut.trim_ascii())
+                ));
+                &bytes[..end]
+            } else {
+                bytes
+            }
+        }
+        _ => bytes,
+    };
+    let mut reader = Reader::default();
+    let skipped = said(whole);
+    let mut tokens = tokens(whole).skip_while(|(at, _)| *at < skipped);
+    if !reader.header(&mut tokens)? {
+        return Err(wrong(
+            whole.len(),
+            "the file ends in its header: `$enddefinitions` is expected",
+        ));
+    }
+    while let Some((at, token)) = tokens.next() {
+        if token == b"$comment" {
+            tokens.by_ref().find(|(_, own)| *own == b"$end");
+        } else {
+            reader.token(at, token)?;
+        }
+    }
+    let (now, ended) = (reader.now, !reader.changed);
+    let wires = reader.wires.into_iter();
+    let channels = wires.map(|mut own| {
+        own.levels.end = ended.then_some(now);
+        ChannelRead {
+            names: own.names,
+            signal: Signal::Levels(own.levels),
+        }
+    });
+    Ok((channels.collect(), notes))
+}
+
+impl<'b> Reader<'b> {
+    /// Reads declarations; `false` where the file ends in them.
+    fn header(
+        &mut self,
+        tokens: &mut dyn Iterator<Item = (usize, &'b [u8])>,
+    ) -> Result<bool, CaptureError> {
+        let mut words: Vec<&'b [u8]> = Vec::new();
+        while let Some((at, keyword)) = tokens.next() {
+            if !keyword.starts_with(b"$") {
+                let shown = shown(keyword);
+                return Err(wrong(at, format!("`{shown}`: a declaration is expected")));
+            }
+            words.clear();
+            loop {
+                match tokens.next() {
+                    None => return Ok(false),
+                    Some((_, b"$end")) => break,
+                    // Of a long comment only the beginning is kept.
+                    Some((_, word)) if words.len() < 16 => words.push(word),
+                    Some(_) => {}
+                }
+            }
+            match (keyword, words.as_slice()) {
+                (b"$enddefinitions", _) => return Ok(true),
+                (b"$timescale", words) => self.tick = Some(tick(&words.concat(), at)?),
+                (b"$scope", [_, name, ..]) => self.scopes.push(name),
+                (b"$upscope", _) => drop(self.scopes.pop()),
+                (b"$var", [_, width, identifier, name, ..]) => {
+                    if *width == b"1" {
+                        self.declare(identifier, name);
+                    }
+                }
+                (b"$var", _) => {
+                    return Err(wrong(
+                        at,
+                        "a `$var` has a kind, a width, an identifier and a name",
+                    ));
+                }
+                _ => {}
+            }
+        }
+        Ok(false)
+    }
+
+    fn declare(&mut self, identifier: &'b [u8], name: &'b [u8]) {
+        let place = *self
+            .by_identifier
+            .entry(identifier)
+            .or_insert(self.wires.len());
+        if place == self.wires.len() {
+            self.wires.push(Wire::default());
+        }
+        let name = String::from_utf8_lossy(name).into_owned();
+        if let Some(scope) = self.scopes.last() {
+            let scope = String::from_utf8_lossy(scope);
+            let long = format!("{scope}.{name}");
+            self.wires[place].names.extend([name, long]);
+        } else {
+            self.wires[place].names.push(name);
+        }
+    }
+
+    /// A token behind the header.
+    fn token(&mut self, at: usize, token: &'b [u8]) -> Result<(), CaptureError> {
+        if std::mem::take(&mut self.passed_over) {
+            return Ok(());
+        }
+        if let Some(bits) = self.bits.take() {
+            return self.value(at, token, bits.last().copied().unwrap_or(b'x'));
+        }
+        match token.split_first() {
+            Some((b'#', digits)) => self.time(at, digits),
+            // $dumpvars, $dumpall, $dumpon, $dumpoff and their $end.
+            Some((b'$', _)) => Ok(()),
+            Some((b'b' | b'B', bits)) => {
+                self.bits = Some(bits);
+                Ok(())
+            }
+            Some((b'r' | b'R' | b's' | b'S', _)) => {
+                self.passed_over = true;
+                Ok(())
+            }
+            Some((level, identifier)) => self.value(at, identifier, *level),
+            None => Ok(()),
+        }
+    }
+
+    fn time(&mut self, at: usize, digits: &[u8]) -> Result<(), CaptureError> {
+        let now = std::str::from_utf8(digits)
+            .ok()
+            .and_then(|text| self.at(text));
+        let Some(now) = now else {
+            let shown = shown(digits);
+            return Err(wrong(at, format!("`#{shown}` is no time")));
+        };
+        if now < self.now {
+            return Err(wrong(at, "this time is before the one in front of it"));
+        }
+        self.changed = false;
+        self.now = now;
+        Ok(())
+    }
+
+    /// A time in ticks, with places where a writer has them.
+    fn at(&self, text: &str) -> Option<Time> {
+        let tick = self.tick.unwrap_or(1_000_000);
+        let (whole, places) = text.split_once('.').unwrap_or((text, ""));
+        let places = &places[..places.len().min(9)];
+        let digits = |own: &str| own.bytes().all(|own| own.is_ascii_digit());
+        if whole.is_empty() || whole.len() > 20 || !digits(whole) || !digits(places) {
+            return None;
+        }
+        let ticks: i128 = whole.parse().ok()?;
+        let part: i128 = match places {
+            "" => 0,
+            places => places.parse::<i128>().ok()? * tick / 10_i128.pow(places.len() as u32),
+        };
+        let femtoseconds = ticks.checked_mul(tick)?.checked_add(part)?;
+        match femtoseconds % 1_000 {
+            0 => units(femtoseconds / 1_000),
+            _ => Time::try_from((femtoseconds.checked_mul(3)? + 500_000) / 1_000_000).ok(),
+        }
+    }
+
+    fn value(&mut self, at: usize, identifier: &[u8], level: u8) -> Result<(), CaptureError> {
+        let Some(level) = Level::of(level) else {
+            let shown = char::from(level).escape_default();
+            return Err(wrong(at, format!("`{shown}` is no level: 0, 1, x or z")));
+        };
+        self.changed = true;
+        if let Some(place) = self.by_identifier.get(identifier) {
+            // Times have been compared already.
+            self.wires[*place].levels.push(self.now, level);
+        }
+        Ok(())
+    }
+}
+
+/// A time scale, `100ns`, in femtoseconds.
+fn tick(text: &[u8], at: usize) -> Result<i128, CaptureError> {
+    let text = std::str::from_utf8(text).unwrap_or_default();
+    let digits = text.find(|own: char| !own.is_ascii_digit());
+    let (number, unit) = text.split_at(digits.unwrap_or(text.len()));
+    let unit = UNITS.iter().find(|(name, _)| *name == unit);
+    match (number, unit) {
+        ("1" | "10" | "100", Some((_, length))) => Ok(number.parse::<i128>().unwrap_or(1) * length),
+        _ => Err(wrong(
+            at,
+            format!(
+                "a time scale of `{}` is not possible: 1, 10 or 100 of s, ms, us, ns, ps or fs",
+                shown(text.as_bytes())
+            ),
+        )),
+    }
+}
