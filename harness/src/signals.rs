@@ -31,6 +31,17 @@ pub(crate) fn interrupt_flag() -> Arc<AtomicBool> {
     flag
 }
 
+/// Two flags: one that every ending signal sets from now on but SIGHUP, and one that SIGHUP sets.
+pub(crate) fn stop_and_rotate_flags() -> (Arc<AtomicBool>, Arc<AtomicBool>) {
+    let flags = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+    for signal in ENDING {
+        let flag = if signal == SIGHUP { &flags.1 } else { &flags.0 };
+        // Where a signal cannot be caught, its default action stays.
+        let _as_before = signal_hook::flag::register(signal, Arc::clone(flag));
+    }
+    flags
+}
+
 /// Lets a write beyond the limit of file sizes (`ulimit -f`) fail like one to a full disk, instead of ending the program.
 pub(crate) fn fail_beyond_file_size_limit() {
     let _as_before = signal_hook::flag::register(SIGXFSZ, Arc::default());

@@ -9,18 +9,23 @@
 
 pub(crate) mod diff;
 pub(crate) mod faults;
+pub(crate) mod files;
 pub mod frame_diff;
 mod frames;
 pub mod fuzz;
 mod import;
+pub(crate) mod live;
 mod pcap;
 mod pcapng;
+mod recorder;
 mod telegrams;
 
 pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
 pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario};
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
-pub use import::{Imported, NamedLink, Settings, Target, Uart};
+pub use import::{Imported, NamedLink, ReadSettings, Target, Uart};
+
+pub(crate) use recorder::LiveRecorder;
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};
@@ -85,7 +90,7 @@ pub enum CaptureError {
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_file(path: &Path, settings: &Settings) -> Result<Imported, CaptureError> {
+pub fn read_file(path: &Path, settings: &ReadSettings) -> Result<Imported, CaptureError> {
     let failed =
         |error: std::io::Error| CaptureError::File(path.display().to_string(), error.to_string());
     let mut file = regular::open_input(path)
@@ -101,9 +106,9 @@ pub fn read_file(path: &Path, settings: &Settings) -> Result<Imported, CaptureEr
 /// # Errors
 /// [`CaptureError`], but not that of the file itself.
 pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
-    let settings = Settings {
+    let settings = ReadSettings {
         rate,
-        ..Settings::default()
+        ..ReadSettings::default()
     };
     read_with(bytes, &settings).map(|own| own.capture)
 }
@@ -112,7 +117,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
 ///
 /// # Errors
 /// [`CaptureError`], but not that of the file itself.
-pub fn read_with(bytes: &[u8], settings: &Settings) -> Result<Imported, CaptureError> {
+pub fn read_with(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
     if bytes.len() as u64 > MAX_FILE {
         return Err(CaptureError::TooLong);
     }

@@ -1,7 +1,9 @@
 //! The command line.
 
 use super::campaign::ClassName;
+use super::capture::CaptureArguments;
 use super::exit::Exit;
+use super::extcap::ExtcapArguments;
 use super::fuzz::FuzzCommand;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
@@ -72,6 +74,13 @@ pub enum Command {
     ///
     /// The capture is pcapng, or the JSON of `trace`.
     Import(ImportArguments),
+    /// Listen to a ring at taps without sending anything, keep what is heard, and judge it.
+    ///
+    /// The program opens ports read-only and turns echo and flow control off. The kernel raises DTR and RTS at every open: connect the
+    /// receiving line of a tap alone.
+    Capture(CaptureArguments),
+    /// Answer Wireshark, which captures live from taps and simulated rings (extcap).
+    Extcap(ExtcapArguments),
     /// Compare two captures or scenarios byte by byte.
     ///
     /// The exit code is 1 if they differ.
@@ -350,7 +359,7 @@ pub struct DiffArguments {
 }
 
 /// What a file with a capture does not say itself.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct ReadingArguments {
     /// Bit rate of the line, if the capture does not state it.
     #[arg(long, value_name = "RATE", value_parser = rate)]
@@ -542,7 +551,7 @@ fn threads(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| "1 to 256 expected".to_owned())
 }
 
-fn rate(text: &str) -> Result<Rate, String> {
+pub(crate) fn rate(text: &str) -> Result<Rate, String> {
     let bits = text.parse().ok();
     bits.and_then(Rate::from_bits_per_second)
         .ok_or_else(|| "38400, 19200 or 9600 is expected".to_owned())

@@ -44,6 +44,8 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "dissector",
             "dbc",
             "gsd",
+            "capture",
+            "extcap",
             "schema",
         ],
     ),
@@ -92,7 +94,12 @@ fn template(command: &Command) -> StyledStr {
 /// # Errors
 /// They are wrong, or ask for help or the version; a command that does not exist comes with a suggestion.
 pub(crate) fn parse() -> Result<Arguments, clap::Error> {
-    let given: Vec<OsString> = std::env::args_os().collect();
+    let mut given: Vec<OsString> = std::env::args_os().collect();
+    // Wireshark starts the program by the name of its link, without a command.
+    let name = given.first().and_then(|own| Path::new(own).file_name());
+    if name.is_some_and(|own| own == super::extcap::PROGRAM) {
+        given.insert(1, "extcap".into());
+    }
     let command = command().color(super::output::colour_of_usage());
     let matches = command.clone().try_get_matches_from(&given);
     matches

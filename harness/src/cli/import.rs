@@ -8,8 +8,8 @@ use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, ComparedRun, Judged, Options, Settings, diff as compare, is_capture, judge, read_file,
-    scenario,
+    Capture, ComparedRun, Judged, Options, ReadSettings, diff as compare, is_capture, judge,
+    read_file, scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -166,7 +166,7 @@ fn of_shared_line(
 
 /// Reads a capture, and says what was found and not read in it.
 fn read(path: &Path, reading: &ReadingArguments, output: &mut Output) -> Option<Capture> {
-    let settings = Settings {
+    let settings = ReadSettings {
         rate: reading.line,
         uart: match reading.uart {
             Some(UartChoice::Given(uart)) => Some(uart),

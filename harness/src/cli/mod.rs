@@ -2,10 +2,12 @@
 
 pub(crate) mod args;
 mod campaign;
+mod capture;
 mod check;
 mod complete;
 pub(crate) mod deviations;
 pub(crate) mod exit;
+mod extcap;
 pub(crate) mod failure;
 pub(crate) mod file;
 pub(crate) mod frames;
@@ -73,6 +75,8 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Check(arguments) => check::check(&arguments, output),
         Command::Trace(arguments) => trace::trace(&arguments, output),
         Command::Import(arguments) => import::import(&arguments, output),
+        Command::Capture(arguments) => capture::capture(&arguments, output),
+        Command::Extcap(arguments) => extcap::extcap(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector { bus } => import::dissector(bus, output),
         Command::Dbc { drives } => import::dbc(drives, output),

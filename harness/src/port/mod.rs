@@ -17,10 +17,12 @@ mod last_words;
 mod open;
 mod rfc2217;
 mod serial;
+mod tap;
 mod wire;
 
 pub use last_words::{LastWords, Unsaid};
 pub use open::{Endpoint, OpenError, PortSettings, open, open_adapter};
+pub use tap::{Tap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
 
 use rustix::thread::set_current_timer_slack;

@@ -88,7 +88,8 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
     out.flush()
 }
 
-fn packet(block: &mut Block, link: usize, byte: &LineByte) {
+/// The packet of a byte of the link with this number.
+pub(crate) fn packet(block: &mut Block, link: usize, byte: &LineByte) {
     let error = |(own, event): &(LineError, u8)| (byte.error == Some(*own)).then_some(*event);
     let event = match byte.received {
         None => LOST,

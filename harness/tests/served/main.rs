@@ -1,6 +1,7 @@
 //! All that runs in real time: rings behind sockets and pseudo terminals, served by another process, and what signals do.
 
 mod bench;
+mod capture;
 #[path = "../common/debian.rs"]
 mod debian;
 mod dp;

@@ -5,7 +5,7 @@ use super::super::{Assembly, CaptureError, ends, line_byte};
 use super::levels::Levels;
 use super::numbers::Time;
 use super::uart::{OctetRead, Uart, decode, find};
-use super::{Imported, Settings};
+use super::{Imported, ReadSettings};
 use crate::buses;
 use crate::counted::counted;
 use crate::report::pcapng_telegrams::{PacketOctet, station};
@@ -120,7 +120,7 @@ fn listed(channels: &[ChannelRead]) -> String {
 /// The channels that are links, by what the user says and by their names; and what is to be told about the others.
 fn choose(
     mut channels: Vec<ChannelRead>,
-    settings: &Settings,
+    settings: &ReadSettings,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Chosen>, CaptureError> {
     let mut targets: Vec<Option<Target>> = vec![None; channels.len()];
@@ -188,7 +188,7 @@ fn choose(
 /// The format of the lines: as it was given, or as it is found.
 fn format(
     chosen: &[Chosen],
-    settings: &Settings,
+    settings: &ReadSettings,
     shared: bool,
     notes: &mut Vec<String>,
 ) -> Result<Uart, CaptureError> {
@@ -238,7 +238,7 @@ fn format(
 /// No channel is a link, they are of two kinds of buses, or their levels are no octets.
 pub(super) fn settle(
     channels: Vec<ChannelRead>,
-    settings: &Settings,
+    settings: &ReadSettings,
     mut notes: Vec<String>,
 ) -> Result<Imported, CaptureError> {
     let chosen = choose(channels, settings, &mut notes)?;

@@ -26,7 +26,7 @@ use links::ChannelRead;
 
 /// What is known of a file beside its bytes.
 #[derive(Clone, Debug, Default)]
-pub struct Settings {
+pub struct ReadSettings {
     /// The rate of a ring's line, where the file does not say it.
     pub rate: Option<Rate>,
     /// The format of lines of which the file has the levels; found where it is not given.
@@ -60,9 +60,9 @@ type Channels = (Vec<ChannelRead>, Vec<String>);
 #[derive(Clone, Copy)]
 enum Reader {
     /// The file says which links it is of.
-    Whole(fn(&[u8], &Settings) -> Result<Imported, CaptureError>),
+    Whole(fn(&[u8], &ReadSettings) -> Result<Imported, CaptureError>),
     /// The file has channels.
-    Channels(fn(&[u8], &Settings) -> Result<Channels, CaptureError>),
+    Channels(fn(&[u8], &ReadSettings) -> Result<Channels, CaptureError>),
 }
 
 /// A format of files.
@@ -75,7 +75,7 @@ struct Format {
 const fn whole(
     name: &'static str,
     recognised: fn(&[u8]) -> bool,
-    reader: fn(&[u8], &Settings) -> Result<Imported, CaptureError>,
+    reader: fn(&[u8], &ReadSettings) -> Result<Imported, CaptureError>,
 ) -> Format {
     let reader = Reader::Whole(reader);
     Format {
@@ -88,7 +88,7 @@ const fn whole(
 const fn channels(
     name: &'static str,
     recognised: fn(&[u8]) -> bool,
-    reader: fn(&[u8], &Settings) -> Result<Channels, CaptureError>,
+    reader: fn(&[u8], &ReadSettings) -> Result<Channels, CaptureError>,
 ) -> Format {
     let reader = Reader::Channels(reader);
     Format {
@@ -239,7 +239,7 @@ pub(super) fn is_known(start: &[u8]) -> bool {
 ///
 /// # Errors
 /// [`CaptureError`].
-pub(super) fn read(bytes: &[u8], settings: &Settings) -> Result<Imported, CaptureError> {
+pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
     let bytes = without_mark(bytes);
     let Some(format) = format(bytes) else {
         return Err(foreign(bytes));
@@ -278,5 +278,7 @@ fn foreign(bytes: &[u8]) -> CaptureError {
     }
 }
 
+#[cfg(test)]
+mod hostile_tests;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@ use super::super::frames::{FrameRead, Sender, assemble};
 use super::super::telegrams::{self, LATEST};
 use super::super::{Assembly, Capture, CaptureError, ends, line_byte};
 use super::table::{Table, columns, first_line};
-use super::{Imported, Settings};
+use super::{Imported, ReadSettings};
 use crate::buses;
 use crate::report::pcapng_frames::{LOST, MASTER};
 use crate::report::pcapng_telegrams::PacketOctet;
@@ -157,7 +157,7 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Capture, CaptureError> {
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn telegrams(bytes: &[u8], settings: &Settings) -> Result<Imported, CaptureError> {
+pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, _, data, error] = places(&table, TELEGRAMS)?;
     let formats = buses::line_formats(true);

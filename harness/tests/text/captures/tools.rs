@@ -34,14 +34,23 @@ fn what_sigrok_writes_is_read() {
     let ours = file("sigrok.vcd");
     std::fs::write(&ours, &lines).expect("room");
     for form in ["vcd", "csv"] {
-        let arguments = ["-i", ours.to_str().expect("a name"), "-I", "vcd", "-O", form];
+        let arguments = [
+            "-i",
+            ours.to_str().expect("a name"),
+            "-I",
+            "vcd",
+            "-O",
+            form,
+        ];
         let Some(text) = output("sigrok-cli", &arguments) else {
             return;
         };
         let again = read(text.as_bytes(), None).unwrap_or_else(|error| panic!("{form}: {error}"));
         let received = |capture: &Capture| -> Vec<Vec<Option<u8>>> {
             let links = capture.traces.iter().flat_map(|own| &own.channels);
-            links.map(|own| own.octets().iter().map(|own| own.received).collect()).collect()
+            links
+                .map(|own| own.octets().iter().map(|own| own.received).collect())
+                .collect()
         };
         assert_eq!(received(&again), received(&capture), "{form}");
         assert_eq!(again.rate, capture.rate);

@@ -1,0 +1,355 @@
+//! `drivebench extcap`: a source of packets for Wireshark and tshark (extcap), and its installation.
+//!
+//! Wireshark starts the programs of a folder without a subcommand, so a link named `drivebench-extcap` stands there. It asks for interfaces at
+//! every start: they are listed from rig files alone, without a port or a lock. A capture writes pcapng into the pipe until Wireshark
+//! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
+
+use super::capture::{listen_into, taps_of};
+use super::exit::Exit;
+use super::output::Output;
+use super::run::play_entry;
+use crate::capture::LiveRecorder;
+use crate::library::{Entry, sources};
+use crate::report::pcapng::{LINK_TYPE, name};
+use crate::report::walk::in_time;
+use crate::rig::find::{self, find};
+use crate::scenario::run::AtMismatch;
+use crate::signals;
+use clap::{Args, Subcommand};
+use harness_proto::time::Span;
+use harness_sim::record::{Channel, LineByte, Trace};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// The name of the link to this program in Wireshark's folder.
+pub(crate) const PROGRAM: &str = "drivebench-extcap";
+/// The interface of a simulated ring, and what stands in front of a rig's name.
+const SIMULATED: &str = "drivebench-sim";
+const RIG: &str = "drivebench-rig-";
+/// What a simulated ring plays by default, and the pause behind it.
+const SCENARIO: &str = "9.8-check-sequence";
+const PAUSE: Duration = Duration::from_secs(1);
+/// How often what has happened is written.
+const TICK: Duration = Duration::from_millis(5);
+
+/// For `extcap`: the arguments that Wireshark gives.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct ExtcapArguments {
+    #[command(subcommand)]
+    command: Option<ExtcapCommand>,
+    /// List the interfaces.
+    #[arg(long)]
+    extcap_interfaces: bool,
+    /// The version of Wireshark.
+    #[arg(long, value_name = "VERSION")]
+    extcap_version: Option<String>,
+    /// The interface that the other arguments are about.
+    #[arg(long, value_name = "NAME")]
+    extcap_interface: Option<String>,
+    /// List the link types of the interface.
+    #[arg(long)]
+    extcap_dlts: bool,
+    /// List the options of the interface.
+    #[arg(long)]
+    extcap_config: bool,
+    /// Capture into the pipe.
+    #[arg(long)]
+    capture: bool,
+    /// A capture filter, which is not applied.
+    #[arg(long, value_name = "FILTER")]
+    extcap_capture_filter: Option<String>,
+    /// The pipe.
+    #[arg(long, value_name = "PATH")]
+    fifo: Option<PathBuf>,
+    /// The simulated ring: sim:N for N drives.
+    #[arg(long, default_value = "sim:3")]
+    rig: String,
+    /// What it plays, again and again: a scenario's name or file.
+    #[arg(long, default_value = SCENARIO)]
+    scenario: PathBuf,
+}
+
+#[derive(Debug, Subcommand)]
+enum ExtcapCommand {
+    /// Put a link to this program into Wireshark's folder.
+    Install {
+        /// The folder; by default the personal one that `tshark -G folders` names.
+        #[arg(long)]
+        folder: Option<PathBuf>,
+    },
+}
+
+/// Answers Wireshark.
+pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Result<Exit> {
+    if let Some(ExtcapCommand::Install { folder }) = &arguments.command {
+        return install(folder.as_deref(), output);
+    }
+    let interface = arguments.extcap_interface.as_deref();
+    let known = |own: &str| own == SIMULATED || own.starts_with(RIG);
+    match interface {
+        _ if arguments.extcap_interfaces => output.result(&interfaces())?,
+        Some(own) if !known(own) => {
+            output.complain(&format!(
+                "there is no interface `{own}`; `drivebench extcap --extcap-interfaces` lists them"
+            ));
+            return Ok(Exit::Usage);
+        }
+        Some(_) if arguments.extcap_dlts => output.result(&format!(
+            "dlt {{number={LINK_TYPE}}}{{name=RTAC_SERIAL}}{{display=Serial lines}}\n"
+        ))?,
+        Some(own) if arguments.extcap_config => output.result(config(own))?,
+        Some(own) if arguments.capture => return capture(own, arguments, output),
+        _ => {
+            output.complain(
+                "Wireshark starts this command; `drivebench extcap install` installs it, and `--extcap-interfaces` lists interfaces",
+            );
+            return Ok(Exit::Usage);
+        }
+    }
+    Ok(Exit::Passed)
+}
+
+/// A text as the value of a field.
+fn field(text: &str) -> String {
+    text.chars()
+        .filter(|own| !"{}\n\r".contains(*own))
+        .collect()
+}
+
+/// The interfaces: a simulated ring, and each rig with taps. A rig's file with mistakes is left out; `drivebench rig list` shows them.
+fn interfaces() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let mut text = format!(
+        "extcap {{version={version}}}{{display=drivebench}}\ninterface {{value={SIMULATED}}}{{display=drivebench: simulated ring}}\n"
+    );
+    for (name, place) in find::all(&find::folder()) {
+        let rig = place.source().ok().and_then(|own| find::read(&own).ok());
+        if rig.is_some_and(|own| !own.file.tap.is_empty()) {
+            let name = field(&name);
+            // Writing to a String cannot fail.
+            let _infallible = writeln!(
+                text,
+                "interface {{value={RIG}{name}}}{{display=drivebench: taps of {name}}}"
+            );
+        }
+    }
+    text
+}
+
+/// The options of an interface.
+fn config(interface: &str) -> &'static str {
+    match interface {
+        SIMULATED => {
+            "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n\
+             arg {number=1}{call=--scenario}{display=Scenario}{type=string}{default=9.8-check-sequence}{tooltip=drivebench list names them}\n"
+        }
+        _ => "",
+    }
+}
+
+/// Writes what an interface carries into the pipe.
+fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) -> io::Result<Exit> {
+    let Some(fifo) = &arguments.fifo else {
+        output.complain("--capture needs --fifo");
+        return Ok(Exit::Usage);
+    };
+    // The reader waits until the pipe is opened and closed again, and shows the message only then.
+    let pipe = match File::create(fifo) {
+        Ok(pipe) => pipe,
+        Err(error) => {
+            output.complain(&format!("failed to open {}: {error}", fifo.display()));
+            return Ok(Exit::RigError);
+        }
+    };
+    let done = match interface.strip_prefix(RIG) {
+        Some(name) => find(name, &find::folder())
+            .map_err(|error| error.to_string())
+            .and_then(|rig| taps_of(&rig))
+            .and_then(|(taps, line, in_band)| listen_into(fifo, taps, line, in_band)),
+        None => simulated(arguments).and_then(|(traces, rate)| play_into(&pipe, &traces, rate)),
+    };
+    match done {
+        Ok(()) => Ok(Exit::Passed),
+        Err(what) => {
+            output.complain(&what);
+            Ok(Exit::RigError)
+        }
+    }
+}
+
+/// What a simulated ring carries.
+fn simulated(
+    arguments: &ExtcapArguments,
+) -> Result<(Vec<Trace>, harness_proto::line::Rate), String> {
+    let rig = &arguments.rig;
+    let drives = rig
+        .strip_prefix("sim:")
+        .and_then(|own| own.parse::<u8>().ok());
+    let drives = drives.ok_or_else(|| {
+        format!("`{rig}` is no simulated ring: sim:N is expected; rigs with taps are interfaces of their own")
+    })?;
+    let name = arguments.scenario.display();
+    let found = sources(&[arguments.scenario.clone()]).map_err(|error| error.to_string())?;
+    let [source] =
+        <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
+    let entry = Entry::fitting(source, Some(drives)).map_err(|problems| problems.to_string())?;
+    let Some(plan) = &entry.plan else {
+        return Err(format!("{name}: scenarios of rings only are played live"));
+    };
+    let rate = plan.rate;
+    Ok((play_entry(&entry, AtMismatch::GoOn).traces, rate))
+}
+
+/// Writes traces into a pipe at the pace of their times, again and again, until the reader closes it or a signal comes.
+fn play_into(pipe: &File, traces: &[Trace], rate: harness_proto::line::Rate) -> Result<(), String> {
+    let stop = signals::interrupt_flag();
+    let numbered = traces.iter().enumerate();
+    let names =
+        numbered.flat_map(|(ring, own)| own.channels.iter().map(move |link| name(ring, link)));
+    let names: Vec<String> = names.collect();
+    let all: Vec<Channel> = traces
+        .iter()
+        .flat_map(|own| own.channels.iter().cloned())
+        .collect();
+    let failed = |error: &io::Error| format!("failed to write to the pipe: {error}");
+    let mut recorder = match LiveRecorder::start(pipe, &names, rate) {
+        Ok(own) => own,
+        Err(error) => return closed(&error).ok_or_else(|| failed(&error)),
+    };
+    while !stop.load(Ordering::Relaxed) {
+        if let Err(error) = once(&mut recorder, &all, &stop) {
+            return closed(&error).ok_or_else(|| failed(&error));
+        }
+        wait(PAUSE, &stop);
+    }
+    Ok(())
+}
+
+/// Done, where the reader has closed the pipe.
+fn closed(error: &io::Error) -> Option<()> {
+    (error.kind() == io::ErrorKind::BrokenPipe).then_some(())
+}
+
+fn wait(time: Duration, stop: &AtomicBool) {
+    let until = Instant::now() + time;
+    while Instant::now() < until && !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(TICK.min(until.saturating_duration_since(Instant::now())));
+    }
+}
+
+/// Writes a trace once, at its pace.
+fn once(
+    recorder: &mut LiveRecorder<&File>,
+    links: &[Channel],
+    stop: &AtomicBool,
+) -> io::Result<()> {
+    let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    let wall = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or(0);
+    let began = Instant::now();
+    for (place, index) in in_time(links) {
+        let byte = links[place].octets()[index];
+        let due = Duration::from_nanos(byte.at.since_start().as_nanos());
+        if due > began.elapsed() {
+            recorder.flush()?;
+            wait(due.saturating_sub(began.elapsed()), stop);
+        }
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let at = byte.at + Span::from_nanos(wall);
+        recorder.byte(place, &LineByte { at, ..byte })?;
+    }
+    recorder.flush()
+}
+
+/// Puts a link to this program where Wireshark finds it.
+fn install(folder: Option<&Path>, output: &mut Output) -> io::Result<Exit> {
+    let found = match folder {
+        Some(folder) => Ok(folder.to_owned()),
+        None => folders(),
+    };
+    let done = found.and_then(|folder| link(&folder));
+    match done {
+        Ok(path) => {
+            output.result(&format!("{}\n", path.display()))?;
+            output.say("Wireshark lists its interfaces at the next start; tshark -D shows them\n");
+            Ok(Exit::Passed)
+        }
+        Err(what) => {
+            output.complain(&what);
+            Ok(Exit::RigError)
+        }
+    }
+}
+
+/// The personal folder for extcap programs, from `tshark -G folders`.
+fn folders() -> Result<PathBuf, String> {
+    let remedy = "give the folder that Help, About, Folders of Wireshark shows, as in `--folder ~/.local/lib/wireshark/extcap`";
+    let listed = Command::new("tshark").args(["-G", "folders"]).output();
+    let listed = listed.map_err(|error| format!("failed to start tshark: {error}; {remedy}"))?;
+    let text = String::from_utf8_lossy(&listed.stdout);
+    folder_of(&text).ok_or_else(|| format!("tshark names no folder for extcap programs; {remedy}"))
+}
+
+/// The personal folder in the answer of tshark: named as such from 4.2 on, and in the folder of the configuration before.
+fn folder_of(text: &str) -> Option<PathBuf> {
+    let value = |key: &str| {
+        let line = text.lines().find_map(|line| line.strip_prefix(key));
+        line.map(|own| PathBuf::from(own.trim()))
+    };
+    let own = value("Personal Extcap path:");
+    own.or_else(|| value("Personal configuration:").map(|own| own.join("extcap")))
+}
+
+fn link(folder: &Path) -> Result<PathBuf, String> {
+    let failed = |error: io::Error| format!("failed to install in {}: {error}", folder.display());
+    let program = std::env::current_exe().map_err(failed)?;
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    let path = folder.join(PROGRAM);
+    match path.symlink_metadata() {
+        Ok(own) if own.is_symlink() => std::fs::remove_file(&path).map_err(failed)?,
+        Ok(_) => {
+            return Err(format!(
+                "{} is there already and is no link; remove it first",
+                path.display()
+            ));
+        }
+        Err(_) => {}
+    }
+    std::os::unix::fs::symlink(program, &path).map_err(failed)?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The answers of tshark 4.0 and 4.4.
+    #[test]
+    fn folders_of_versions() {
+        let old = "Temp:                \t/tmp\nPersonal configuration:\t/root/.config/wireshark\nExtcap path:         \t/usr/lib/wireshark/extcap\n";
+        let expected = Path::new("/root/.config/wireshark/extcap");
+        assert_eq!(folder_of(old).as_deref(), Some(expected));
+        let new = format!("{old}Personal Extcap path:\t/root/.local/lib/wireshark/extcap\n");
+        let expected = Path::new("/root/.local/lib/wireshark/extcap");
+        assert_eq!(folder_of(&new).as_deref(), Some(expected));
+        assert_eq!(folder_of("Temp: /tmp"), None);
+    }
+
+    #[test]
+    fn a_link_is_replaced_and_a_file_is_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let inner = folder.path().join("a/extcap");
+        let path = link(&inner).expect("a link");
+        assert_eq!(link(&inner), Ok(path.clone()));
+        std::fs::remove_file(&path).expect("removed");
+        std::fs::write(&path, "mine").expect("written");
+        assert!(link(&inner).expect_err("a file").contains("is no link"));
+    }
+}
