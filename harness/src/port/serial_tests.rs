@@ -1,6 +1,7 @@
 //! Wrong parity in its order, and what a pseudo terminal can show of it: it keeps PARODD, though it has no parity.
 
 use super::*;
+use harness_proto::line::Rate;
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::os::unix::ffi::OsStrExt;
