@@ -2,7 +2,7 @@
 
 use super::import::Logged;
 use super::telegrams::LATEST;
-use super::{Capture, CaptureError, Imported, NamedLink, Target};
+use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
 use crate::buses::sender_of;
 use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
@@ -202,7 +202,7 @@ fn one_bus(
     let mut names: Vec<&str> = frames.iter().map(|own| own.0).collect();
     names.sort_unstable();
     names.dedup();
-    let chosen = links.iter().find(|own| own.target == Target::Bus);
+    let chosen = links.iter().find(|own| own.target == ChannelTarget::Bus);
     let chosen = chosen.and_then(|own| own.channel.as_deref());
     let name = match (chosen, names.as_slice()) {
         (None, [] | [_]) => return Ok(frames.into_iter().map(|own| own.1).collect()),

@@ -23,7 +23,7 @@ mod telegrams;
 pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
 pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario};
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
-pub use import::{Imported, NamedLink, ReadSettings, Target, Uart};
+pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
 pub(crate) use recorder::LiveRecorder;
 

@@ -11,7 +11,7 @@ use super::shrink::ShrinkArguments;
 use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
 use crate::buses::rings::rig::named::ring_size;
-use crate::capture::{NamedLink, Uart};
+use crate::capture::{NamedLink, UartFormat};
 use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
@@ -383,7 +383,7 @@ pub enum UartChoice {
     /// It is found.
     Auto,
     /// It is this.
-    Given(Uart),
+    Given(UartFormat),
 }
 
 fn uart(text: &str) -> Result<UartChoice, String> {

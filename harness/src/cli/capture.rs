@@ -8,7 +8,7 @@ use super::rig_failure::find_any_rig;
 use crate::capture::files::{Files, Rotation};
 use crate::capture::live::LiveLines;
 use crate::counted::counted;
-use crate::port::{OpenError, Tap, TapState};
+use crate::port::{OpenError, SilentTap, TapState};
 use crate::rig::Rig;
 use crate::rig::file::{Marks, Transport};
 use crate::signals;
@@ -158,7 +158,7 @@ impl FromStr for TapAt {
 /// A tap in use; `None` while its adapter is away.
 struct Listening {
     at: TapAt,
-    tap: Option<Tap>,
+    tap: Option<SilentTap>,
     /// What the kernel had sent at the port before.
     sent_before: Option<u64>,
     last: u64,
@@ -378,7 +378,7 @@ impl<'a> Session<'a> {
         self.files.flush(now)?;
         let mut spoke = false;
         for own in &self.taps {
-            let sent_now = own.tap.as_ref().and_then(Tap::transmitted);
+            let sent_now = own.tap.as_ref().and_then(SilentTap::transmitted);
             let sent = match own.sent_before.zip(sent_now) {
                 None => "not counted by the driver".to_owned(),
                 Some((before, now)) => {
@@ -432,8 +432,8 @@ impl<'a> Session<'a> {
     }
 }
 
-fn open(at: &TapAt, arguments: &CaptureArguments) -> Result<Tap, OpenError> {
-    Tap::open(&at.port, arguments.line, arguments.in_band)
+fn open(at: &TapAt, arguments: &CaptureArguments) -> Result<SilentTap, OpenError> {
+    SilentTap::open(&at.port, arguments.line, arguments.in_band)
 }
 
 fn line_byte(nanos: u64, own: Received) -> LineByte {

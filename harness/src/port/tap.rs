@@ -22,13 +22,13 @@ const CHUNK: usize = 4_096;
 
 /// An open tap.
 #[derive(Debug)]
-pub struct Tap {
+pub struct SilentTap {
     fd: OwnedFd,
     path: PathBuf,
     unmark: Option<Unmark>,
 }
 
-impl Drop for Tap {
+impl Drop for SilentTap {
     /// Lets others open the port. It stays silent: with its echo turned on again it would send what arrives until it is closed.
     fn drop(&mut self) {
         // A port that is gone is nobody's.
@@ -45,7 +45,7 @@ pub enum TapState {
     Gone,
 }
 
-impl Tap {
+impl SilentTap {
     /// Opens a port to listen at it. `marks` says that a pseudo terminal carries line errors as in-band marks.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ impl Tap {
     }
 }
 
-impl AsFd for Tap {
+impl AsFd for SilentTap {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
     }
@@ -239,7 +239,7 @@ mod tests {
             found.local_modes.contains(LocalModes::ECHO)
                 && found.input_modes.contains(InputModes::IXON)
         );
-        let mut tap = Tap::open(&path, Rate::Baud38400, false).expect("a tap");
+        let mut tap = SilentTap::open(&path, Rate::Baud38400, false).expect("a tap");
         assert!(
             rustix::io::write(&tap, b"x").is_err(),
             "it is open for reading only"
@@ -253,7 +253,7 @@ mod tests {
         assert_eq!(heard, sent);
         assert!(!arrives(&master, 200), "an echo");
         assert_eq!(tap.transmitted(), None);
-        let second = Tap::open(&path, Rate::Baud38400, false);
+        let second = SilentTap::open(&path, Rate::Baud38400, false);
         assert!(matches!(second, Err(OpenError::InUse(_))));
         drop(tap);
         let now = rustix::termios::tcgetattr(&master).expect("a mode");
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn marks_and_the_end() {
         let (master, path) = terminal();
-        let mut tap = Tap::open(&path, Rate::Baud38400, true).expect("a tap");
+        let mut tap = SilentTap::open(&path, Rate::Baud38400, true).expect("a tap");
         rustix::io::write(&master, &[0x12, 0xFF, 0, 0x13, 0xFF, 0xFF, 0xFF, 0, 0]).expect("sent");
         let mut heard = Vec::new();
         assert!(arrives(&tap, 5_000));
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn each_flag_that_speaks_is_refused() {
         let (_master, path) = terminal();
-        let tap = Tap::open(&path, Rate::Baud38400, false).expect("a tap");
+        let tap = SilentTap::open(&path, Rate::Baud38400, false).expect("a tap");
         let mode = rustix::termios::tcgetattr(&tap).expect("a mode");
         assert_eq!(speaks(&mode), None);
         let mut echo = mode.clone();

@@ -126,7 +126,7 @@ fn taps_listen_and_send_nothing() {
     let (code, said) = listener.end();
     assert_eq!(code, Some(5), "{said}");
     assert!(
-        said.contains("not judged: it is in several files"),
+        said.contains("not judged: no tap is on the master"),
         "{said}"
     );
     assert!(

@@ -4,7 +4,7 @@ use super::super::telegrams::{DAY, LATEST, assemble};
 use super::super::{Assembly, CaptureError, ends, line_byte};
 use super::levels::Levels;
 use super::numbers::Time;
-use super::uart::{OctetRead, Uart, decode, find};
+use super::uart::{OctetRead, UartFormat, decode, find};
 use super::{Imported, ReadSettings};
 use crate::buses;
 use crate::counted::counted;
@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 /// What a channel is the record of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Target {
+pub enum ChannelTarget {
     /// A link of a ring: the ring, counted from 0, and the ends of the link; `None` is the master.
     Link(usize, Option<u8>, Option<u8>),
     /// What one station sends on a line that all share; `None` is the master.
@@ -24,7 +24,7 @@ pub enum Target {
     Bus,
 }
 
-impl Target {
+impl ChannelTarget {
     /// By the name of a link or a station: `98->97`, `2:0->master`, `master`, `slave 8`.
     fn named(name: &str) -> Option<Self> {
         if name == "bus" {
@@ -50,7 +50,7 @@ pub struct NamedLink {
     /// The link as it was given.
     pub link: String,
     /// The same, read.
-    pub target: Target,
+    pub target: ChannelTarget,
     /// The name of the channel; `None` for the only one.
     pub channel: Option<String>,
 }
@@ -63,7 +63,7 @@ impl FromStr for NamedLink {
             Some((link, channel)) => (link, Some(channel.to_owned())),
             None => (text, None),
         };
-        let target = Target::named(link).ok_or_else(|| {
+        let target = ChannelTarget::named(link).ok_or_else(|| {
             format!(
                 "`{link}` is neither a link nor a station; `98->97=CHANNEL`, `master->99=CHANNEL` or `0->master=CHANNEL` is expected for a ring; \
                  `bus=CHANNEL`, `master=CHANNEL` or `slave 8=CHANNEL` for a line that stations share"
@@ -96,7 +96,7 @@ pub(super) struct ChannelRead {
 
 /// A channel of which is known what it is the record of.
 struct Chosen {
-    target: Target,
+    target: ChannelTarget,
     channel: ChannelRead,
 }
 
@@ -123,7 +123,7 @@ fn choose(
     settings: &ReadSettings,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Chosen>, CaptureError> {
-    let mut targets: Vec<Option<Target>> = vec![None; channels.len()];
+    let mut targets: Vec<Option<ChannelTarget>> = vec![None; channels.len()];
     for own in &settings.links {
         let place = match &own.channel {
             Some(name) => channels
@@ -149,7 +149,10 @@ fn choose(
     }
     if settings.links.is_empty() {
         for (channel, target) in channels.iter().zip(&mut targets) {
-            *target = channel.names.iter().find_map(|own| Target::of_channel(own));
+            *target = channel
+                .names
+                .iter()
+                .find_map(|own| ChannelTarget::of_channel(own));
         }
     }
     if targets.iter().all(Option::is_none) {
@@ -191,7 +194,7 @@ fn format(
     settings: &ReadSettings,
     shared: bool,
     notes: &mut Vec<String>,
-) -> Result<Uart, CaptureError> {
+) -> Result<UartFormat, CaptureError> {
     if let Some(uart) = settings.uart {
         return Ok(uart);
     }
@@ -226,7 +229,7 @@ fn format(
     let near = |own: &&&Format| own.octet_time().units() / 10 * 11 >= closest.cast_unsigned();
     let found = fitting.iter().find(near).or(usual).or(fitting.first());
     let format = found.map_or(formats[0], |own| **own);
-    Ok(Uart {
+    Ok(UartFormat {
         format,
         inverted: false,
     })
@@ -242,12 +245,12 @@ pub(super) fn settle(
     mut notes: Vec<String>,
 ) -> Result<Imported, CaptureError> {
     let chosen = choose(channels, settings, &mut notes)?;
-    let of_ring = |own: &Chosen| matches!(own.target, Target::Link(..));
+    let of_ring = |own: &Chosen| matches!(own.target, ChannelTarget::Link(..));
     let (links, all) = (
         chosen.iter().filter(|own| of_ring(own)).count(),
         chosen.len(),
     );
-    let bus = chosen.iter().any(|own| own.target == Target::Bus);
+    let bus = chosen.iter().any(|own| own.target == ChannelTarget::Bus);
     if (links != 0 && links != all) || (bus && all > 1) {
         return Err(wrong(
             "links of a ring, stations of a shared line, or one `bus` are expected, and not several of these: import them one after the other"
@@ -257,7 +260,7 @@ pub(super) fn settle(
     let shared = links == 0;
     let uart = format(&chosen, settings, shared, &mut notes)?;
     let octet = uart.format.octet_time();
-    let lines: Vec<(Target, Vec<OctetRead>)> = chosen
+    let lines: Vec<(ChannelTarget, Vec<OctetRead>)> = chosen
         .into_iter()
         .map(|own| {
             let octets = match own.channel.signal {
@@ -296,11 +299,11 @@ pub(super) fn settle(
                 .map(read)
                 .collect::<Result<_, CaptureError>>()?;
             let senders = match target {
-                Target::Station(own) => {
+                ChannelTarget::Station(own) => {
                     stations.push(own);
                     vec![own; octets.len()]
                 }
-                Target::Bus | Target::Link(..) => buses::senders(&octets, octet),
+                ChannelTarget::Bus | ChannelTarget::Link(..) => buses::senders(&octets, octet),
             };
             all.extend(senders.into_iter().zip(octets));
         }
@@ -309,7 +312,7 @@ pub(super) fn settle(
     }
     let mut assembly = Assembly::default();
     for (target, octets) in lines {
-        let Target::Link(ring, from, to) = target else {
+        let ChannelTarget::Link(ring, from, to) = target else {
             continue;
         };
         let link = assembly.link(ring, from, to);

@@ -2,7 +2,7 @@
 //!
 //! Each format says by the first bytes whether a file is of it, and reads it: into a capture, where the file says which links it
 //! is of, or into channels, of which the user says which links they are ([`NamedLink`]). Levels of a line are decoded by a receiver of
-//! octets ([`Uart`]), whose format is given or found.
+//! octets ([`UartFormat`]), whose format is given or found.
 
 mod asc;
 mod levels;
@@ -16,8 +16,8 @@ mod uart;
 mod vcd;
 
 pub(super) use asc::Logged;
-pub use links::{NamedLink, Target};
-pub use uart::Uart;
+pub use links::{ChannelTarget, NamedLink};
+pub use uart::UartFormat;
 
 use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
 use crate::buses;
@@ -30,7 +30,7 @@ pub struct ReadSettings {
     /// The rate of a ring's line, where the file does not say it.
     pub rate: Option<Rate>,
     /// The format of lines of which the file has the levels; found where it is not given.
-    pub uart: Option<Uart>,
+    pub uart: Option<UartFormat>,
     /// Samples a second, where the file has neither them nor times.
     pub samples: Option<u64>,
     /// Which channel is which link.

@@ -11,14 +11,14 @@ const SECOND: i64 = 3_000_000_000;
 
 /// How the levels of a line are decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Uart {
+pub struct UartFormat {
     /// Rate, parity and stop bits.
     pub format: Format,
     /// The quiet line is low, as on the RS-232 side of a driver.
     pub inverted: bool,
 }
 
-impl FromStr for Uart {
+impl FromStr for UartFormat {
     type Err = String;
 
     /// Reads `38400 8O1` and `38400 8O1 inverted`.
@@ -60,7 +60,7 @@ impl FromStr for Uart {
     }
 }
 
-impl fmt::Display for Uart {
+impl fmt::Display for UartFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parity = match self.format.parity {
             Parity::None => 'N',
@@ -83,7 +83,7 @@ pub(super) struct OctetRead {
 }
 
 /// The octets of a line, and the most that are wanted.
-pub(super) fn decode(levels: &Levels, uart: Uart, most: usize) -> Vec<OctetRead> {
+pub(super) fn decode(levels: &Levels, uart: UartFormat, most: usize) -> Vec<OctetRead> {
     let mut receiver = Receiver {
         changes: levels.changes(),
         place: 0,
@@ -177,13 +177,13 @@ const LOOKED_AT: usize = 20_000;
 /// How well a format explains lines.
 #[derive(Clone, Copy, Debug)]
 struct Score {
-    uart: Uart,
+    uart: UartFormat,
     octets: usize,
     damaged: usize,
 }
 
 impl Score {
-    fn of(lines: &[&Levels], uart: Uart) -> Self {
+    fn of(lines: &[&Levels], uart: UartFormat) -> Self {
         let octets = lines.iter().map(|line| decode(line, uart, LOOKED_AT));
         let (mut all, mut damaged) = (0, 0);
         for line in octets {
@@ -255,7 +255,7 @@ fn quiet_low(lines: &[&Levels], format: Format) -> Option<bool> {
 
 /// The best of some formats and polarities.
 fn best(lines: &[&Levels], formats: &[Format], inverted: bool) -> Option<Score> {
-    let uart = |format: &Format| Uart {
+    let uart = |format: &Format| UartFormat {
         format: *format,
         inverted,
     };
@@ -268,7 +268,7 @@ fn best(lines: &[&Levels], formats: &[Format], inverted: bool) -> Option<Score> 
 ///
 /// # Errors
 /// No format explains the lines, in a sentence with the remedy.
-pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(Uart, String), String> {
+pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(UartFormat, String), String> {
     const REMEDY: &str =
         "give the format, as in `--uart \"38400 8O1\"`, and check which channel is the line";
     let mut formats: Vec<Format> = formats.to_vec();
