@@ -195,7 +195,8 @@ fn simulated(
         format!("`{rig}` is no simulated ring: sim:N is expected; rigs with taps are interfaces of their own")
     })?;
     let name = arguments.scenario.display();
-    let found = sources(&[arguments.scenario.clone()]).map_err(|error| error.to_string())?;
+    let found =
+        sources(std::slice::from_ref(&arguments.scenario)).map_err(|error| error.to_string())?;
     let [source] =
         <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
     let entry = Entry::fitting(source, Some(drives)).map_err(|problems| problems.to_string())?;

@@ -166,11 +166,8 @@ impl<'b> Reader<'b> {
                 (b"$timescale", words) => self.tick = Some(tick(&words.concat(), at)?),
                 (b"$scope", [_, name, ..]) => self.scopes.push(name),
                 (b"$upscope", _) => drop(self.scopes.pop()),
-                (b"$var", [_, width, identifier, name, ..]) => {
-                    if *width == b"1" {
-                        self.declare(identifier, name);
-                    }
-                }
+                (b"$var", [_, b"1", identifier, name, ..]) => self.declare(identifier, name),
+                (b"$var", [_, _, _, _, ..]) => {}
                 (b"$var", _) => {
                     return Err(wrong(
                         at,
