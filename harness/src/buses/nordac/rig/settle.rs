@@ -1,7 +1,7 @@
 //! What the manual leaves open, settled as far as a conversation without any permission shows it.
 //!
-//! The same conversation is held with the slave and with models of it, one for every value of every open point. A value under which the model
-//! replies otherwise than the slave did is excluded. Nothing that is sent enables the motor or writes a parameter.
+//! The same conversation is held with the slave and with models of it, one for every value of every open point. A value under which the model's
+//! replies differ from those of the slave is excluded. Nothing that is sent enables the motor or writes a parameter.
 
 use super::known::{Known, candidates};
 use super::talk::{Talk, TalkError};
