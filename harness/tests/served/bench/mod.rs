@@ -257,13 +257,26 @@ fn what_is_no_ring_says_so() {
     };
     let desk = Desk::new(2, "serial", path.to_str().expect("a name"));
     ended(&desk.run(&["run"]), 3, "pseudo terminal");
-    // More drives than stated, and fewer.
+}
+
+/// More drives than the rig's file states, and fewer.
+#[test]
+fn a_ring_of_another_size_says_so() {
     for stated in [1, 3] {
+        let served = Served::start("plain", &[2], "pty", true, &[]);
+        let Endpoint::Pty(path) = &served.endpoints[0] else {
+            panic!("a pty");
+        };
         let desk = Desk::new(stated, "pty", path.to_str().expect("a name"));
+        let output = desk.run(&["run"]);
         let words = format!("the ring has 2 drives, the rig's file says {stated}");
-        ended(&desk.run(&["run"]), 3, &words);
-        ended(&desk.run(&["run"]), 3, "with 2 drives set `drives = 2`");
+        ended(&output, 3, &words);
+        ended(&output, 3, "with 2 drives set `drives = 2`");
     }
+}
+
+#[test]
+fn a_silent_or_noisy_port_says_so() {
     // An open ring: nothing comes back.
     let open = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = open.local_addr().expect("an address").to_string();
