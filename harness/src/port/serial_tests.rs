@@ -145,8 +145,7 @@ fn what_is_no_serial_port() {
         (null, "is not a serial port"),
         (missing, "there is no port"),
     ] {
-        let error = open(&path, harness_proto::line::Rate::default().into(), false)
-            .expect_err("no serial port");
+        let error = open(&path, Rate::default().into(), false).expect_err("no serial port");
         let text = error.to_string();
         assert!(text.contains(part), "{text}");
         assert!(text.contains(&path.display().to_string()), "{text}");
