@@ -94,7 +94,7 @@ pub(crate) fn taps_of(rig: &Rig) -> Result<(Vec<TapAt>, Rate, bool), String> {
     }
     let Some(first) = file.tap.first() else {
         return Err(
-            "the rig has no [[tap]]; give the taps, as in `--tap 98->97=/dev/ttyUSB1`".to_owned(),
+            "the rig has no [[tap]]; give the taps, as in `--tap '98->97=/dev/ttyUSB1'`".to_owned(),
         );
     };
     let marks = first.endpoint.marks == Marks::InBand;

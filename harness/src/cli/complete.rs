@@ -248,7 +248,7 @@ mod tests {
     /// Every kind of name that an argument takes is offered, or is known to be free text.
     #[test]
     fn every_value_is_of_a_known_kind() {
-        const FREE: [&str; 21] = [
+        const FREE: [&str; 26] = [
             "TEXT",
             "TIME",
             "NUMBER",
@@ -266,6 +266,11 @@ mod tests {
             "ADDRESS",
             "-|ADDRESS",
             "LINK=PLACE",
+            "LINK=CHANNEL",
+            "LINK=PORT",
+            "BYTES",
+            "VERSION",
+            "FORMAT",
             "K/N",
             "FILTER",
             "WORDS",

@@ -20,7 +20,7 @@ pub struct Options {
     pub allow_motion: bool,
     /// Whether to open a ring that fails its health check, to find out what is wrong with it.
     pub ill_as_well: bool,
-    /// Whether the lines of a ring that has timed out are [kept](Line::keep) until the caller's own master sends.
+    /// Whether the lines of a ring that has timed out are [kept](crate::link::Line::keep) until the caller's own master sends.
     pub keeps_lines: bool,
     /// Set to end the program.
     pub interrupt: Arc<AtomicBool>,

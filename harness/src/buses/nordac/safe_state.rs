@@ -366,6 +366,19 @@ mod tests {
         }
     }
 
+    /// The reply to a request of before comes behind the first request of the safe state. It is no reply to that.
+    #[test]
+    fn a_late_reply_is_not_taken_for_another() {
+        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::unlimited());
+        run(&mut line, &slaves);
+        let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+        let words = image(stw::START).encode(PpoType::One);
+        let exchange = Pdu::new(8, MASTER, control, &words).expect("fits");
+        line.send_octets(0, &Telegram::Pdu(exchange).encode());
+        let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+        assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
+    }
+
     #[test]
     fn a_silent_slave_is_not_confirmed_and_the_others_are_stopped() {
         let both = vec![slave(8, PpoType::One), slave(9, PpoType::One)];

@@ -135,11 +135,6 @@ fn drives_are_moved() {
         2,
         &["for drives of another bus"],
     );
-    refused(
-        "qualify --rig sim:unitek unitek-ex-8-status",
-        2,
-        &["serves rings only"],
-    );
     let played = shown("run unitek-ex-3-speed unitek-inputs --rig sim:unitek");
     assert!(played.contains("2 passed, 0 failed"), "{played}");
 }

@@ -22,17 +22,19 @@ pub enum CyclicCommand {
     /// Exchange process words with a slave and show its replies (NORDAC 3.2).
     #[command(after_help = EXCHANGE_HELP)]
     Exchange(ExchangeArguments),
-    /// Switch motors on, by 047E and 047F; they turn for the given time, and are switched off on their ramps (NORDAC 3.3).
+    /// Switch motors on by 047E and 047F, for a given time (NORDAC 3.3).
+    ///
+    /// At its end they are switched off on their ramps.
     On(OnArguments),
     /// Switch motors off on their ramps: OFF1, 047E (NORDAC 3.2.1).
     ///
     /// Needs no permission.
     Off(SelectArguments),
-    /// Stop motors within their quick stop time (1615) and disable their start: OFF3, 047B (NORDAC 3.2.1).
+    /// Stop motors on the quick-stop ramp: OFF3, 047B (NORDAC 3.2.1).
     ///
-    /// Needs no permission.
+    /// They stop within their quick stop time (1615), and their start is disabled. Needs no permission.
     QuickStop(SelectArguments),
-    /// Acknowledge the faults of slaves, with their outputs kept off (NORDAC 3.2.1, bit 7).
+    /// Acknowledge faults, with the outputs kept off (NORDAC 3.2.1, bit 7).
     Acknowledge(AcknowledgeArguments),
 }
 

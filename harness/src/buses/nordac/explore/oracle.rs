@@ -1,7 +1,7 @@
 //! Whether slaves do what the manual and the bus standard say, with any value of what they leave open.
 //!
 //! The replies of a case are compared with those of the model: octets, line errors and times. Where they differ, the model is played again
-//! with other values of the open points ([`crate::explore::search`]). Only what no such model explains is a difference.
+//! with other values of the open points (`explore::search`). Only what no such model explains is a difference.
 
 use super::act::TelegramTalk;
 use super::hex;

@@ -156,6 +156,7 @@ impl<'l> Talk<'l> {
 
     fn ask_with(&mut self, slave: u8, pdu: Pdu) -> Result<Option<SlaveReply>, TalkError> {
         let octets = Telegram::Pdu(pdu).encode();
+        let mut other = None;
         for _ in 0..TRIES {
             let end = self.send(&octets)?;
             let Some(telegram) = self.reply(end)? else {
@@ -164,11 +165,15 @@ impl<'l> Talk<'l> {
             if telegram == Telegram::Pdu(pdu) {
                 return Err(TalkError::Echo);
             }
-            if let Some(reply) = self.requests(slave).take(&telegram) {
-                return Ok(Some(reply));
+            match self.requests(slave).take(&telegram) {
+                Some(SlaveReply::Other(control)) => other = Some(SlaveReply::Other(control)),
+                None => {}
+                fits => return Ok(fits),
             }
+            // A busy computer hands over the reply to a request of before: what is under way passes first.
+            self.pass(self.patience)?;
         }
-        Ok(None)
+        Ok(other)
     }
 
     fn requests(&mut self, slave: u8) -> &mut Requests {

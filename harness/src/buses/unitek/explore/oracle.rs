@@ -1,7 +1,7 @@
 //! Whether drives do what the manual says, with any value of what it leaves open.
 //!
 //! The frames of a case are compared with those of the model. Where they differ, the model is played again with other values of the
-//! points that the manual leaves open (UNITEK 7; [`crate::explore::search`]). Only what no such model explains is a difference. Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and
+//! points that the manual leaves open (UNITEK 7; `explore::search`). Only what no such model explains is a difference. Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and
 //! `homing-time`.
 
 use super::act::{FrameAct, FrameActKind, FrameTalk};

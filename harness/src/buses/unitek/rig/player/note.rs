@@ -234,7 +234,7 @@ impl Note {
     }
 }
 
-/// Where the clock of a drive may stand: each of so many places.
+/// Where the clock of a drive may stand: every `each`th place.
 fn phases(each: usize) -> impl Iterator<Item = Span> {
     let phases = std::iter::once(0).chain(PHASES.step_by(each));
     phases.map(|own| Span::from_micros(own * 1_000 / 32))
