@@ -20,6 +20,7 @@ mod man;
 mod manual;
 pub(crate) mod output;
 mod page;
+pub(crate) mod port_bench;
 mod promote;
 mod qualify;
 mod report;

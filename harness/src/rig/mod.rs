@@ -18,7 +18,7 @@ pub(crate) mod open;
 mod permitted;
 mod played;
 pub mod port_file;
-pub(crate) mod port_session;
+pub mod port_session;
 pub(crate) mod profile;
 pub mod scan;
 pub(crate) mod segment;

@@ -1,16 +1,61 @@
 //! A rig with a port in use, whatever its bus: locked, opened, guarded, and taken to its safe state on every way out.
 
 use super::lock::PortLock;
-use super::taken::Taken;
+use super::port_file::Port;
+use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Options, Rig, SessionError, file, standing};
 use crate::guard::{Guarded, Safe, SafeStep, Standstill};
 use crate::link::{Line, Trouble};
-use crate::medium::Pieces;
+use crate::medium::{Heard, Pieces};
+use crate::scenario::source::Source;
+use harness_proto::time::Span;
+use std::os::fd::AsFd;
 use std::time::Instant;
 
+/// How long a port is listened to before anything is sent.
+const LISTEN: Span = Span::from_millis(150);
+
 /// What a session asks of the bus of its drives.
-pub(crate) trait PortDrives {
+pub trait PortDrives: Clone + std::fmt::Debug {
+    /// What a drive is called, and what the stations share.
+    const WORDS: [&'static str; 2];
+
+    /// What stands for one of them.
+    type Drive: Copy + PartialEq;
+
+    /// Opens the drives of a rig that is taken, behind a gate: simulated ones, or an adapter with its lock. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`SessionError`]; nothing is left locked or open.
+    fn open(
+        rig: &Rig,
+        port: &Port,
+        options: &Options,
+    ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError>;
+
+    /// Finds out whether the drives of an open rig can be used; even `ill_as_well` where a drive does not answer.
+    ///
+    /// # Errors
+    /// Why they cannot be used.
+    fn ready(session: &mut PortSession<Self>, ill_as_well: bool) -> Result<(), SessionError>;
+
+    /// The drives, in the order of the rig's file.
+    fn listed(&self) -> Vec<Self::Drive>;
+
+    /// The number of a drive.
+    fn number(drive: &Self::Drive) -> u8;
+
+    /// Drives in a sentence: `drive 1`, `drives 1, 2`.
+    fn named(drives: &[Self::Drive]) -> String {
+        let names: Vec<_> = drives
+            .iter()
+            .map(|own| Self::number(own).to_string())
+            .collect();
+        let s = if names.len() == 1 { "" } else { "s" };
+        format!("{}{s} {}", Self::WORDS[0], names.join(", "))
+    }
+
     /// Takes every drive to its safe state and reads it back.
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe;
 
@@ -20,7 +65,7 @@ pub(crate) trait PortDrives {
 
 /// A rig in use.
 #[derive(Debug)]
-pub(crate) struct PortSession<D: PortDrives> {
+pub struct PortSession<D: PortDrives> {
     rig: Rig,
     link: Guarded<Ends>,
     drives: D,
@@ -35,25 +80,22 @@ pub(crate) struct PortSession<D: PortDrives> {
 }
 
 impl<D: PortDrives> PortSession<D> {
-    /// Uses a rig that is taken, over its guarded link. `ready` finds out whether its drives can be used.
+    /// Takes a rig: lock, hook, port. Listens first. Then finds out whether its drives can be used, unless the file says `listen_only`.
     ///
     /// # Errors
-    /// [`SessionError`], those of `ready` among them; nothing is left locked or open.
-    pub(crate) fn open(
-        rig: &Rig,
-        options: &Options,
-        taken: Taken,
-        (link, locks): (Guarded<Ends>, Vec<PortLock>),
-        drives: D,
-        ready: impl FnOnce(&mut Self) -> Result<(), SessionError>,
-    ) -> Result<Self, SessionError> {
-        let listen_only = rig.port().is_some_and(|port| port.listen_only);
+    /// [`SessionError`]; nothing is left locked or open.
+    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        let port = rig
+            .port()
+            .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
+        let taken = take(rig, options)?;
+        let (drives, link, locks) = D::open(rig, port, options)?;
         let mut session = Self {
             rig: rig.clone(),
             link,
             drives,
             started: Instant::now(),
-            listen_only,
+            listen_only: port.listen_only,
             // Nothing has been sent: there is nothing to make safe.
             ended: true,
             watchdog: None,
@@ -63,7 +105,7 @@ impl<D: PortDrives> PortSession<D> {
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
         }
-        match ready(&mut session) {
+        match D::ready(&mut session, options.ill_as_well) {
             Err(_) if session.link.trouble() == Some(&Trouble::Interrupted) => {
                 let end = Some(Box::new(session.end(false)));
                 let rig = rig.id().to_owned();
@@ -72,59 +114,93 @@ impl<D: PortDrives> PortSession<D> {
             other => other?,
         }
         session.taken.around.used();
-        session.ended = listen_only || rig.is_simulated();
+        session.ended = session.listen_only || rig.is_simulated();
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
 
+    /// Listens before anything is sent: a bench must not disturb another master. Simulated drives are alone.
+    ///
+    /// # Errors
+    /// The link is in trouble.
+    pub fn listen(&mut self, mut hear: impl FnMut(Heard)) -> Result<(), SessionError> {
+        if self.rig.is_simulated() {
+            return Ok(());
+        }
+        let end = self.link.now() + LISTEN;
+        while self.link.now() < end && self.link.trouble().is_none() {
+            self.link.wait(end);
+            while let Some((_, heard)) = self.link.receive(0) {
+                hear(heard);
+            }
+        }
+        self.sound()
+    }
+
     /// The rig.
-    pub(crate) const fn rig(&self) -> &Rig {
+    #[must_use]
+    pub const fn rig(&self) -> &Rig {
         &self.rig
     }
 
+    /// Whether nothing is ever sent.
+    #[must_use]
+    pub const fn listens_only(&self) -> bool {
+        self.listen_only
+    }
+
     /// What is known of its drives.
-    pub(crate) const fn drives(&self) -> &D {
+    #[must_use]
+    pub const fn drives(&self) -> &D {
         &self.drives
     }
 
     /// The same, to be changed.
-    pub(crate) const fn drives_mut(&mut self) -> &mut D {
+    pub const fn drives_mut(&mut self) -> &mut D {
         &mut self.drives
     }
 
+    /// Its guarded link, and what is known of its drives.
+    pub const fn parts(&mut self) -> (&mut Guarded<Ends>, &D) {
+        (&mut self.link, &self.drives)
+    }
+
     /// Its guarded link.
-    pub(crate) const fn link(&mut self) -> &mut Guarded<Ends> {
+    pub const fn link(&mut self) -> &mut Guarded<Ends> {
         &mut self.link
     }
 
     /// Its guarded link, to look at.
-    pub(crate) const fn guarded(&self) -> &Guarded<Ends> {
+    #[must_use]
+    pub const fn guarded(&self) -> &Guarded<Ends> {
         &self.link
     }
 
     /// Whether it has been used for longer than its file allows.
-    pub(crate) fn overdue(&self) -> bool {
+    #[must_use]
+    pub fn overdue(&self) -> bool {
         let longest = self.rig.file.limits.max_run.as_ref();
         longest.is_some_and(|longest| self.started.elapsed() > longest.0)
     }
 
-    /// An error where the link is in trouble.
-    pub(crate) fn sound(&self) -> Result<(), SessionError> {
+    /// Whether the link is sound.
+    ///
+    /// # Errors
+    /// It is in trouble.
+    pub fn sound(&self) -> Result<(), SessionError> {
         self.link
             .trouble()
             .map_or(Ok(()), |trouble| Err(self.failed(&trouble.to_string())))
     }
 
     /// An error about its drives.
-    pub(crate) fn failed(&self, why: &str) -> SessionError {
-        SessionError::Drives {
-            rig: self.rig.id().to_owned(),
-            why: why.to_owned(),
-        }
+    #[must_use]
+    pub fn failed(&self, why: &str) -> SessionError {
+        failed(&self.rig, why)
     }
 
     /// Takes every drive to its safe state, whatever the file wants at the end, and reads it back.
-    pub(crate) fn make_safe(&mut self) -> Safe {
+    pub fn make_safe(&mut self) -> Safe {
         self.link.reset_after_denial();
         let wanted = Standstill {
             order: vec![SafeStep::Stop, SafeStep::Block],
@@ -149,13 +225,13 @@ impl<D: PortDrives> PortSession<D> {
 
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
     #[must_use]
-    pub(crate) fn close(mut self, error: bool) -> End {
+    pub fn close(mut self, error: bool) -> End {
         self.end(error)
     }
 
     /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn.
     #[must_use]
-    pub(crate) fn release(mut self) -> End {
+    pub fn release(mut self) -> End {
         self.ended = true;
         self.end(false)
     }
@@ -193,5 +269,37 @@ impl<D: PortDrives> Drop for PortSession<D> {
         if !self.ended {
             let _told_by_nobody = self.end(true);
         }
+    }
+}
+
+/// The `setup` lines of a rig with simulated drives.
+pub(crate) fn setup_lines(rig: &Rig) -> Source {
+    let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
+    Source {
+        name: rig.origin.clone(),
+        text: lines.collect::<Vec<_>>().join("\n").into(),
+    }
+}
+
+/// How long a reply may take, by a rig's file.
+pub(crate) fn patience(port: &Port) -> Span {
+    let nanos = u64::try_from(port.patience.0.as_nanos()).unwrap_or(u64::MAX);
+    Span::from_nanos(nanos)
+}
+
+/// Locks the port of an open adapter.
+///
+/// # Errors
+/// It is in use.
+pub(crate) fn lock(rig: &Rig, place: &str, port: impl AsFd) -> Result<PortLock, SessionError> {
+    let lock = PortLock::acquire(port);
+    lock.map_err(|error| failed(rig, &format!("{place}: {error}")))
+}
+
+/// An error about the drives of a rig.
+pub(crate) fn failed(rig: &Rig, why: &str) -> SessionError {
+    SessionError::Drives {
+        rig: rig.id().to_owned(),
+        why: why.to_owned(),
     }
 }

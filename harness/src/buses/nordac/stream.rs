@@ -11,6 +11,7 @@ use crate::link::{
 };
 use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::{LastWords, Wire};
+use crate::rig::segment::ON_PORT;
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::profibus::fdl::{BROADCAST, LAST_ADDRESS};
@@ -27,10 +28,6 @@ pub(crate) const TOLERANCE: Span = SLACK;
 
 /// Octets of the longest reply of an inverter: a Data_Exchange with PPO2.
 const LONGEST_REPLY: u64 = 29;
-
-/// What a real line can do beside carrying octets.
-pub(super) const CAPABILITIES: [Capability; 3] =
-    [Capability::Memory, Capability::Motion, Capability::Eeprom];
 
 /// How long the line is left alone before each telegram that a watchdog sends: the reply to the one before has passed.
 const LAST_WORDS_GAP: time::Duration = time::Duration::from_millis(60);
@@ -247,7 +244,7 @@ impl PortLink for SegmentLink {
 
 impl Link for SegmentLink {
     fn capabilities(&self) -> &[Capability] {
-        &CAPABILITIES
+        &ON_PORT
     }
 
     fn begin(&mut self) {

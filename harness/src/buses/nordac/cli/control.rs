@@ -2,15 +2,17 @@
 //! `stop`, `block` and `delete-error`.
 
 use super::args::{AcknowledgeArguments, ExchangeArguments, OnArguments};
-use super::bench::{driver, named, on as with, select, single};
+use super::bench::driver;
 use crate::buses::commands::{SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
-use crate::buses::nordac::rig::Session;
+use crate::buses::nordac::rig::{Inverters, Session};
 use crate::buses::nordac::value::{Setpoint, Step, percentage, status, steps};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on as with, select, single};
 use crate::rig::Rig;
+use crate::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
 
@@ -126,7 +128,7 @@ pub(super) fn on(rig: &Rig, arguments: &OnArguments, output: &mut Output) -> Res
     };
     let select = &arguments.select;
     with(rig, &select.rig, as_what, output, |session, output| {
-        let slaves = super::bench::select(&select.drives, session)?;
+        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         refuse_motion(arguments.leave, "on", &slaves)?;
         let mut driver = driver(session);
         let mut orders = Vec::new();
@@ -138,7 +140,10 @@ pub(super) fn on(rig: &Rig, arguments: &OnArguments, output: &mut Output) -> Res
             refuse_denied(&driver, *slave, [stw::START, setpoint, 0, 0])?;
             orders.push((*slave, setpoint));
         }
-        output.say(&format!("on: {}: motors may turn\n", named(&slaves)));
+        output.say(&format!(
+            "on: {}: motors may turn\n",
+            Inverters::named(&slaves)
+        ));
         for (slave, setpoint) in &orders {
             let reached = driver.on(*slave, *setpoint)?;
             output.result(&format!("slave {slave}: {}\n", sent(&reached)))?;
@@ -190,7 +195,7 @@ pub(super) fn acknowledge(
     };
     let select = &arguments.select;
     with(rig, &select.rig, as_what, output, |session, output| {
-        let slaves = super::bench::select(&select.drives, session)?;
+        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         let mut driver = driver(session);
         for slave in &slaves {
             driver.start(*slave, None)?;
@@ -252,7 +257,7 @@ fn refuse_motion(allowed: bool, command: &str, slaves: &[u8]) -> Result<(), Fail
         true => Ok(()),
         false => Err(Failure::refused(format!(
             "{command}: {}: motors may turn; nothing was done, add --move to allow it",
-            named(slaves)
+            Inverters::named(slaves)
         ))),
     }
 }

@@ -1,6 +1,6 @@
 //! `drivebench info` and `top` on NORDAC inverters: identity, state, fault, frequency, and what guards the motor.
 
-use super::bench::{driver, on, select};
+use super::bench::driver;
 use super::read::{Found, find};
 use crate::buses::commands::{Axes, InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error};
@@ -8,6 +8,7 @@ use crate::buses::nordac::value::{Cell, ReplyWord, parameter};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};

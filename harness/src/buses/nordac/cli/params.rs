@@ -5,7 +5,7 @@
 //! "1202.1" = 100    # Accel. time  5.00 s
 //! ```
 
-use super::bench::{driver, on, single};
+use super::bench::driver;
 use super::read::{Found, find};
 use super::write::refuse_denied;
 use crate::buses::commands::{LoadArguments, ParamsArguments, Use};
@@ -15,6 +15,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, single};
 use crate::rig::Rig;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;

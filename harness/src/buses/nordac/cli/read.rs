@@ -1,12 +1,13 @@
 //! `drivebench read` on NORDAC inverters: process words and parameters, with their units.
 
-use super::bench::{driver, on, select};
+use super::bench::driver;
 use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error};
 use crate::buses::nordac::value::{Cell, cells, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::nordac::PkwError;
 use serde_json::json;

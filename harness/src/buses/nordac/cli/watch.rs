@@ -1,6 +1,6 @@
 //! `drivebench watch` on NORDAC inverters: process words and parameters, again and again.
 
-use super::bench::{driver, on, select};
+use super::bench::driver;
 use super::read::{Found, find};
 use crate::buses::commands::{MOST_LINES, Use, WatchArguments, WatchForm};
 use crate::buses::nordac::rig::Session;
@@ -8,6 +8,7 @@ use crate::buses::nordac::value::{Cell, cells};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::time::Span;
 

@@ -1,12 +1,13 @@
 //! `drivebench write` on NORDAC inverters: parameters are written, and the value that the inverter answers is shown.
 
-use super::bench::{driver, on, select};
+use super::bench::driver;
 use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::nordac::driver::{Driver, Error, Written};
 use crate::buses::nordac::value::{Assignment, assignments, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, Task};
 

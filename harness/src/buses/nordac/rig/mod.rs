@@ -10,15 +10,15 @@ mod settle;
 pub(crate) mod talk;
 
 pub use permitted::limits;
-use run::{InverterJudge, InvertersInUse};
-pub use session::Session;
+use player::Player;
+pub use session::{Inverters, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
 use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
 use crate::rig::port_file::{Node, Port};
-use crate::rig::{Rig, SessionError};
+use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::{Part, read};
 use crate::scenario::plan::plan as settle;
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -63,8 +63,10 @@ pub(crate) const PORT: PortRow = PortRow {
         let expected = "no such permission expected on this bus".to_owned();
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
-    run: |rig, options| Ok(Box::new(InvertersInUse::open(rig, options)?)),
-    judge: Some(|rig, allow_motion, _| Box::new(InverterJudge::new(rig, allow_motion))),
+    run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
+    judge: Some(|rig, allow_motion, qualifies| {
+        Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
+    }),
     command: super::cli::drive,
     check: super::cli::check,
     fuzz: super::cli::fuzz::run,
@@ -178,13 +180,5 @@ pub(crate) fn values(property: &Description) -> Vec<String> {
                 BTreeSet::from([least, default, default.saturating_add(1).min(most), most]);
             numbers.iter().map(u8::to_string).collect()
         }
-    }
-}
-
-/// An error about the drives of a rig.
-fn failed(rig: &Rig, why: &str) -> SessionError {
-    SessionError::Drives {
-        rig: rig.id().to_owned(),
-        why: why.to_owned(),
     }
 }

@@ -7,18 +7,18 @@
 
 use super::RigSlave;
 use super::known::Known;
-use super::observed::{Observed, Slow};
+use super::observed::Observed;
 use super::settle;
 use super::talk::{Talk, TalkError};
 use crate::buses::LimitSetting;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::simulate::{self, Bench};
-use crate::buses::nordac::stream::CAPABILITIES;
 use crate::link::{
     Capability, DriveFault, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use crate::medium::Medium;
+use crate::rig::segment::observed::{Slow, Way};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::Problems;
@@ -48,11 +48,8 @@ const FORGET: [u8; 2] = [1, 10];
 /// How long that takes, at most.
 const FORGOTTEN: Span = Span::from_millis(150);
 
-/// How late telegrams may leave through an adapter and a busy computer, in us, beside what was measured.
-const LATE: [u64; 3] = [1_000, 3_000, 15_000];
-
 /// A scenario of this bus.
-pub(super) struct Own {
+pub(crate) struct Own {
     scenario: Scenario<Nordac>,
     pub(super) plan: Plan<Nordac>,
 }
@@ -75,17 +72,6 @@ struct Other {
     slow: Option<Slow>,
 }
 
-/// The way to the slaves and back, as it was in an attempt.
-#[derive(Clone, Copy)]
-struct Way {
-    /// By how much a wait has ended late, at most.
-    late: Span,
-    /// The longest time that a reply took.
-    longest: Span,
-    /// How exact times are; zero where time is virtual.
-    tolerance: Span,
-}
-
 /// A scenario played on the model.
 struct Rehearsal {
     outcome: Outcome,
@@ -94,7 +80,7 @@ struct Rehearsal {
 
 /// Plays attempts, on a rig or on a record, and judges them.
 #[derive(Debug)]
-pub(super) struct Player {
+pub(crate) struct Player {
     slaves: Vec<RigSlave>,
     rate: BusRate,
     patience: Span,
@@ -112,20 +98,20 @@ pub(super) struct Player {
 }
 
 impl Player {
-    pub(super) fn new(
+    pub(super) fn of(
         slaves: Vec<RigSlave>,
         rate: BusRate,
         patience: Span,
         limits: Limits,
-        simulated: bool,
+        (capabilities, restarts): (Vec<Capability>, bool),
     ) -> Self {
         Self {
             slaves,
             rate,
             patience,
             limits,
-            capabilities: capabilities(&limits, simulated),
-            restarts: simulated,
+            capabilities,
+            restarts,
             known: None,
             written: BTreeSet::new(),
             before: None,
@@ -193,9 +179,9 @@ impl Player {
         let outcome = self.attempt_over(own, &mut link);
         let before = match &self.before {
             Some(before) => before.clone(),
-            None => link.received(),
+            None => link.noted.received(),
         };
-        self.written = link.written().collect();
+        self.written = link.noted.written;
         (outcome, before)
     }
 
@@ -216,7 +202,7 @@ impl Player {
             return Outcome::skipped(skip);
         }
         let ready = self.prepare(own, link);
-        self.before = Some(link.received());
+        self.before = Some(link.noted.received());
         if let Err(error) = ready {
             return self.unanswered(&error);
         }
@@ -225,7 +211,7 @@ impl Player {
         let outcome = play(&own.plan, link, AtMismatch::Stop);
         let way = Way {
             late: link.take_late(),
-            longest: link.longest(),
+            longest: link.noted.longest,
             tolerance: link.time_tolerance(),
         };
         self.judged(own, outcome, way)
@@ -477,24 +463,16 @@ impl Player {
             let played = self.rehearse(own, &self.limits, other);
             played.denied.is_some() || played.outcome.verdict != Verdict::Passed
         };
-        if way.tolerance > Span::ZERO {
-            let measured = [way.longest, way.longest * 2];
-            let late = LATE.map(Span::from_micros).into_iter().chain(measured);
-            for (by, which) in late.flat_map(|by| [0, 1, 2].map(|which| (by, which))) {
-                let slow = Slow {
-                    by,
-                    which,
-                    tolerance: way.tolerance,
-                };
-                let other = Other {
-                    slow: Some(slow),
-                    ..Other::default()
-                };
-                if fails(other) {
-                    return Some(format!(
-                        "an adapter through which telegrams leave {by} late"
-                    ));
-                }
+        for slow in way.slow() {
+            let other = Other {
+                slow: Some(slow),
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(format!(
+                    "an adapter through which telegrams leave {} late",
+                    slow.by
+                ));
             }
         }
         let known = self.known().iter().enumerate();
@@ -520,19 +498,4 @@ const fn permit(limits: &mut Limits, setting: LimitSetting) {
         LimitSetting::MaxSpeed => limits.highest = None,
         _ => {}
     }
-}
-
-/// What a rig's capabilities are within limits, beside what no record shows.
-pub(super) fn capabilities(limits: &Limits, simulated: bool) -> Vec<Capability> {
-    let all = match simulated {
-        true => Bench::CAPABILITIES.as_slice(),
-        false => CAPABILITIES.as_slice(),
-    };
-    let has = |own: &&Capability| match own {
-        Capability::Motion => limits.motion,
-        Capability::Eeprom => limits.eeprom,
-        Capability::Tap | Capability::Simulator | Capability::Power => false,
-        _ => true,
-    };
-    all.iter().filter(has).copied().collect()
 }

@@ -1,37 +1,66 @@
-//! A rig of NORDAC inverters in use: locked, opened, found to answer, guarded, and taken to its safe state on every way out.
+//! NORDAC inverters of a rig in use: opened behind their gate, found to answer, and taken to their safe state.
 
 use super::talk::Talk;
-use super::{RigSlave, failed, limits, rate, setup, slaves};
+use super::{RigSlave, limits, rate, setup, slaves};
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
 use crate::guard::{Guarded, Safe, Standstill};
-use crate::link::Line;
 use crate::medium::Pieces;
 use crate::port::{Endpoint, PortSettings};
 use crate::rig::file::Marks;
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
-use crate::rig::port_session::{PortDrives, PortSession};
-use crate::rig::taken::take;
-use crate::rig::{End, Ends, Options, Rig, SessionError};
-use crate::scenario::source::Source;
+use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_lines};
+use crate::rig::{Ends, Options, Rig, SessionError};
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::profibus::dp::Diagnosis;
 use harness_proto::time::Span;
 
-/// How long a line is listened to before anything is sent.
-const LISTEN: Span = Span::from_millis(150);
-
 /// The inverters of a rig.
 #[derive(Clone, Debug)]
-struct Inverters {
+pub struct Inverters {
     slaves: Vec<RigSlave>,
     patience: Span,
 }
 
+/// A rig in use.
+pub type Session = PortSession<Inverters>;
+
 impl PortDrives for Inverters {
+    const WORDS: [&'static str; 2] = ["slave", "PROFIBUS segment"];
+    /// Its address.
+    type Drive = u8;
+
+    fn open(
+        rig: &Rig,
+        port: &Port,
+        options: &Options,
+    ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
+        let slaves = slaves(port);
+        let (ends, locks) = ends(rig, port, options)?;
+        let known: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
+        let limits = limits(rig, options.allow_motion);
+        let link = guarded(ends, limits, &known, port.listen_only);
+        let patience = patience_of(rig, port);
+        Ok((Self { slaves, patience }, link, locks))
+    }
+
+    /// Asks every slave for its diagnosis and its configuration, which changes nothing.
+    fn ready(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
+        listen(session)?;
+        ask(session, ill_as_well)
+    }
+
+    fn listed(&self) -> Vec<u8> {
+        self.slaves.iter().map(|own| own.address).collect()
+    }
+
+    fn number(address: &u8) -> u8 {
+        *address
+    }
+
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {
         safe_state(line, &self.slaves, self.patience, standing)
     }
@@ -41,124 +70,40 @@ impl PortDrives for Inverters {
     }
 }
 
-/// A rig in use.
-#[derive(Debug)]
-pub struct Session(PortSession<Inverters>);
-
 impl Session {
-    /// Takes a rig: lock, hook, port. Listens first. Then asks every slave for its diagnosis and its configuration, which changes nothing,
-    /// unless the file says `listen_only`.
-    ///
-    /// # Errors
-    /// [`SessionError`]; nothing is left locked or open.
-    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
-        let port = rig
-            .port()
-            .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
-        let taken = take(rig, options)?;
-        let slaves = slaves(port);
-        let (ends, locks) = ends(rig, options)?;
-        let known: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
-        let limits = limits(rig, options.allow_motion);
-        let link = guarded(ends, limits, &known, port.listen_only);
-        let drives = Inverters {
-            slaves,
-            patience: patience_of(rig, port),
-        };
-        let ill_as_well = options.ill_as_well;
-        let ready = |session: &mut PortSession<Inverters>| {
-            listen(session)?;
-            ask(session, ill_as_well)
-        };
-        let opened = PortSession::open(rig, options, taken, (link, locks), drives, ready);
-        opened.map(Self)
-    }
-
-    /// The rig.
-    #[must_use]
-    pub const fn rig(&self) -> &Rig {
-        self.0.rig()
-    }
-
     /// Its slaves. Their PPO types are those that they were found with.
     #[must_use]
     pub fn slaves(&self) -> &[RigSlave] {
-        &self.0.drives().slaves
+        &self.drives().slaves
     }
 
     /// How long a reply may take beside its own time on the line.
     #[must_use]
     pub const fn patience(&self) -> Span {
-        self.0.drives().patience
-    }
-
-    /// Its guarded link.
-    pub const fn link(&mut self) -> &mut Guarded<Ends> {
-        self.0.link()
-    }
-
-    /// Its guarded link, to look at.
-    #[must_use]
-    pub const fn guarded(&self) -> &Guarded<Ends> {
-        self.0.guarded()
+        self.drives().patience
     }
 
     /// What the rig's file and the command line allow together.
     #[must_use]
     pub fn limits(&self) -> Limits {
-        let gate = self.0.guarded().slaves();
+        let gate = self.guarded().slaves();
         gate.map(|own| *own.limits()).unwrap_or_default()
-    }
-
-    /// Whether it has been used for longer than its file allows.
-    #[must_use]
-    pub fn overdue(&self) -> bool {
-        self.0.overdue()
-    }
-
-    /// Takes every slave to its safe state, whatever the file wants at the end, and reads it back.
-    pub fn make_safe(&mut self) -> Safe {
-        self.0.make_safe()
     }
 
     /// A master for single requests.
     pub fn talk(&mut self) -> Talk<'_> {
         let patience = self.patience();
-        Talk::new(Box::new(self.0.link()), patience)
-    }
-
-    /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
-    #[must_use]
-    pub fn close(self, error: bool) -> End {
-        self.0.close(error)
-    }
-
-    /// Gives the rig back with its slaves as they are: after what has only looked.
-    #[must_use]
-    pub fn release(self) -> End {
-        self.0.release()
+        Talk::new(Box::new(self.link()), patience)
     }
 }
 
-/// Listens before anything is sent: a bench must not disturb another master.
-fn listen(session: &mut PortSession<Inverters>) -> Result<(), SessionError> {
-    if session.rig().is_simulated() {
-        return Ok(());
-    }
-    let listens_only = session.rig().port().is_some_and(|port| port.listen_only);
-    let link = session.link();
-    let end = link.now() + LISTEN;
+/// Listens for another master.
+fn listen(session: &mut Session) -> Result<(), SessionError> {
     let mut heard = 0_u32;
-    while link.now() < end && link.trouble().is_none() {
-        link.wait(end);
-        while link.receive(0).is_some() {
-            heard += 1;
-        }
-    }
-    session.sound()?;
+    session.listen(|_| heard += 1)?;
     match heard {
         0 => Ok(()),
-        _ if listens_only => Ok(()),
+        _ if session.listens_only() => Ok(()),
         _ => Err(session.failed(&format!(
             "{heard} octets came before anything was sent: another master uses the line, or its rate is another one; end it first, or set \
              `listen_only = true`"
@@ -167,10 +112,9 @@ fn listen(session: &mut PortSession<Inverters>) -> Result<(), SessionError> {
 }
 
 /// Asks every slave for its diagnosis and its configuration.
-fn ask(session: &mut PortSession<Inverters>, ill_as_well: bool) -> Result<(), SessionError> {
-    let listens_only = session.rig().port().is_some_and(|port| port.listen_only);
+fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
     let unknown = session.drives().slaves.iter().any(|own| own.ppo.is_none());
-    if listens_only || !session.rig().file.health.before && !unknown {
+    if session.listens_only() || !session.rig().file.health.before && !unknown {
         return Ok(());
     }
     let Inverters { slaves, patience } = session.drives().clone();
@@ -232,17 +176,9 @@ fn differs(slave: &RigSlave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(
 }
 
 /// The end of the line: simulated, or an adapter that is opened and locked. Nothing is sent.
-fn ends(rig: &Rig, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
-    let port = rig
-        .port()
-        .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
+fn ends(rig: &Rig, port: &Port, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
     if rig.is_simulated() {
-        let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
-        let source = Source {
-            name: rig.origin.clone(),
-            text: lines.collect::<Vec<_>>().join("\n").into(),
-        };
-        let setup = setup(port, &source);
+        let setup = setup(port, &setup_lines(rig));
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
         return Ok((Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new()));
     }
@@ -262,10 +198,7 @@ fn ends(rig: &Rig, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionEr
     });
     options.unless_interrupted(rig)?;
     let wire = wire.map_err(|error| failed(rig, &error.to_string()))?;
-    let lock = locks.then(|| {
-        let lock = PortLock::acquire(wire.fd());
-        lock.map_err(|error| failed(rig, &format!("{place}: {error}")))
-    });
+    let lock = locks.then(|| lock(rig, &place, wire.fd()));
     let locks = lock.transpose()?.into_iter().collect();
     let addresses = slaves(port).iter().map(|own| own.address).collect();
     let how = (patience(port), port.echo);
@@ -285,10 +218,4 @@ pub(super) fn patience_of(rig: &Rig, port: &Port) -> Span {
         true => patience(port),
         false => patience(port) + TOLERANCE,
     }
-}
-
-/// How long a reply may take beside its own time on the line.
-fn patience(port: &Port) -> Span {
-    let nanos = u64::try_from(port.patience.0.as_nanos()).unwrap_or(u64::MAX);
-    Span::from_nanos(nanos)
 }

@@ -1,11 +1,11 @@
 //! `drivebench rig check` of UNITEK drives: the bench is opened, and every drive is asked.
 
-use super::bench::select;
 use crate::buses::commands::Axes;
 use crate::buses::unitek::rig::Session;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::select;
 use crate::cli::rig_failure::{exit_of, tell_end};
 use crate::rig::{Options, Rig};
 use harness_proto::unitek::words::{ERRORS, set_bits};

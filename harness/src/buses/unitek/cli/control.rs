@@ -1,14 +1,15 @@
 //! `drivebench go`, `stop`, `block` and `delete-error` on UNITEK drives.
 
-use super::bench::{named, on, select};
 use super::write::{Order, refuse_denied};
 use crate::buses::commands::{DeleteErrorArguments, MoveArguments, SelectArguments, Use};
 use crate::buses::unitek::driver::{Driver, Error, Stopped};
-use crate::buses::unitek::rig::{Axis, Session};
+use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
+use crate::rig::port_session::PortDrives as _;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;
@@ -33,8 +34,8 @@ pub(super) fn go(
     };
     let select = &arguments.select;
     on(rig, &select.rig, as_what, output, |session, output| {
-        let drives = super::bench::select(&select.drives, session)?;
-        let warning = format!("go: {}: motors may turn", named(&drives));
+        let drives = crate::cli::port_bench::select(&select.drives, session)?;
+        let warning = format!("go: {}: motors may turn", UnitekDrives::named(&drives));
         if !arguments.leave {
             return Err(Failure::refused(format!(
                 "{warning}; nothing was done, add --move to allow it"
@@ -117,7 +118,7 @@ pub(super) fn delete_error(
     };
     let select = &arguments.select;
     on(rig, &select.rig, as_what, output, |session, output| {
-        let drives = super::bench::select(&select.drives, session)?;
+        let drives = crate::cli::port_bench::select(&select.drives, session)?;
         let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
         let orders: Vec<_> = drives.iter().map(order).collect();
         refuse_denied(&mut session.driver(), &orders)?;

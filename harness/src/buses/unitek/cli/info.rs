@@ -1,12 +1,12 @@
 //! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
 
-use super::bench::{on, select};
 use super::read::{Found, find};
 use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::unitek::value::hex;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};

@@ -6,7 +6,6 @@
 //! 0xC8 = "0E10"     # SPEED_RPMMAX  3600 rpm
 //! ```
 
-use super::bench::{on, single};
 use super::read::{Found, find};
 use super::write::{Order, refuse_denied};
 use crate::buses::commands::{Axes, LoadArguments, ParamsArguments, Use};
@@ -16,6 +15,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, single};
 use crate::rig::Rig;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;

@@ -1,13 +1,13 @@
 //! `drivebench position` on UNITEK drives: homing, and a move to a destination (ex 12).
 
-use super::bench::{on, single};
 use super::write::refuse_denied;
 use crate::buses::commands::{PositionArguments, Use};
 use crate::buses::unitek::driver::Driver;
-use crate::buses::unitek::rig::Axis;
+use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, single};
 use crate::rig::Rig;
 use crate::scenario::quantity::Quantity;
 use harness_proto::time::Span;
@@ -41,7 +41,7 @@ pub(super) fn position(
         holds: arguments.hold.hold,
     };
     on(rig, &arguments.rig, as_what, output, |session, output| {
-        let axis = single(&arguments.drive, session)?;
+        let axis = single::<UnitekDrives>(&arguments.drive, session)?;
         if !arguments.leave {
             return Err(Failure::refused(format!(
                 "position: drive {}: its motor will turn; nothing was done, add --move to allow it",

@@ -1,12 +1,13 @@
 //! `drivebench read` on UNITEK drives: registers with their units and bits.
 
-use super::bench::{on, scaling, select};
+use super::bench::scaling;
 use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::unitek::rig::{Axis, Session};
 use crate::buses::unitek::value::{bits, hex, registers, words};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::unitek::frame::Reply;
 use harness_proto::unitek::units::{Scaling, usual};

@@ -1,6 +1,5 @@
 //! `drivebench watch` on UNITEK drives: the values of registers, again and again.
 
-use super::bench::{on, select};
 use super::read::{Found, find};
 use crate::buses::commands::{MOST_LINES, Use, WatchArguments, WatchForm};
 use crate::buses::unitek::rig::{Axis, Session};
@@ -8,6 +7,7 @@ use crate::buses::unitek::value::{hex, registers};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;

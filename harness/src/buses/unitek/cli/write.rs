@@ -1,6 +1,6 @@
 //! `drivebench write` on UNITEK drives: registers are set, read back and shown.
 
-use super::bench::{on, scaling, select};
+use super::bench::scaling;
 use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::rig::Axis;
@@ -8,6 +8,7 @@ use crate::buses::unitek::value::{assignment, hex, words};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::port_bench::{on, select};
 use crate::rig::Rig;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;

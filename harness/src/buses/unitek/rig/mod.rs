@@ -11,14 +11,15 @@ mod session;
 
 pub use permitted::limits;
 use permitted::special_register;
-pub(crate) use run::{DrivesInUse, Judge};
-pub use session::Session;
+use player::Player;
+pub use session::{Session, UnitekDrives};
 
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
 use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
+use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
@@ -47,8 +48,10 @@ pub(crate) const PORT: PortRow = PortRow {
     },
     setup_mistakes: |port, source| setup(port, source).err(),
     special_register,
-    run: |rig, options| Ok(Box::new(DrivesInUse::open(rig, options)?)),
-    judge: Some(|rig, allow_motion, qualifies| Box::new(Judge::new(rig, allow_motion, qualifies))),
+    run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
+    judge: Some(|rig, allow_motion, qualifies| {
+        Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
+    }),
     command: super::cli::drive,
     check: super::cli::check,
     fuzz: super::cli::fuzz::run,

@@ -66,7 +66,7 @@ pub(super) fn settle(
     let word = if counts { "live" } else { "frozen" };
     probe.known.settle("can-counters", word);
     // A reply on an idle bus takes less.
-    let delay = probe.link.shortest();
+    let delay = probe.link.noted.shortest;
     probe.known.reply_delay = delay.filter(|own| *own > Span::from_micros(500));
     Ok(())
 }

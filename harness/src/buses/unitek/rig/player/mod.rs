@@ -12,7 +12,7 @@ pub(in crate::buses::unitek) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
 
 use super::known::Known;
-use super::observed::{Observed, Slow};
+use super::observed::Observed;
 use super::{Axis, probe};
 use crate::buses::LimitSetting;
 use crate::buses::unitek::driver::{Driver, Error};
@@ -23,6 +23,7 @@ use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
+use crate::rig::segment::observed::{Slow, Way};
 use crate::scenario::expression::Scope;
 use crate::scenario::run::outcome::Unready;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
@@ -65,20 +66,6 @@ struct Other<'o> {
     slow: Option<Slow>,
 }
 
-/// How late frames may leave through an adapter and a busy computer, in us, beside what was measured.
-const LATE: [u64; 3] = [1_000, 3_000, 15_000];
-
-/// The way to the drives and back, as it was in an attempt.
-#[derive(Clone, Copy)]
-struct Way {
-    /// By how much a wait has ended late, at most.
-    late: Span,
-    /// The longest time from a request until its reply was read.
-    longest: Span,
-    /// How exact times are; zero where time is virtual.
-    tolerance: Span,
-}
-
 /// A scenario played on the model.
 struct Rehearsal {
     outcome: Outcome,
@@ -98,7 +85,7 @@ enum Gone {
 
 /// Plays attempts, on a rig or on a record, and judges them.
 #[derive(Clone, Debug)]
-pub(super) struct Player {
+pub(crate) struct Player {
     axes: Vec<Axis>,
     rate: BitRate,
     patience: Span,
@@ -115,6 +102,8 @@ pub(super) struct Player {
     written: BTreeSet<(u16, u8)>,
     /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
     moved: BTreeSet<u16>,
+    /// Whether something that was played may have stored parameters.
+    stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
     /// Whether the drives are qualified.
@@ -124,7 +113,7 @@ pub(super) struct Player {
 }
 
 impl Player {
-    pub(super) fn new(
+    pub(super) fn of(
         axes: Vec<Axis>,
         rate: BitRate,
         patience: Span,
@@ -142,6 +131,7 @@ impl Player {
             partly: Vec::new(),
             written: BTreeSet::new(),
             moved: BTreeSet::new(),
+            stored: false,
             before: None,
             qualifies: false,
             notes: Vec::new(),
@@ -171,6 +161,16 @@ impl Player {
     /// The registers that may differ from what is known.
     pub(super) const fn written(&self) -> &BTreeSet<(u16, u8)> {
         &self.written
+    }
+
+    /// Whether something that was played may have stored parameters.
+    pub(super) const fn has_stored(&self) -> bool {
+        self.stored
+    }
+
+    /// Notes that parameters may have been stored.
+    pub(super) const fn note_stored(&mut self) {
+        self.stored = true;
     }
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
@@ -226,7 +226,7 @@ impl Player {
         let begun = self.qualifies.then(|| self.without_notes());
         let mut link = Observed::new(link);
         if begun.is_some() {
-            link = link.keeping();
+            link.noted.keep();
         }
         let gone = self.go(own, &mut link, true);
         if let Some(begun) = begun {
@@ -234,7 +234,7 @@ impl Player {
         }
         let way = Way {
             late: link.take_late(),
-            longest: link.longest(),
+            longest: link.noted.longest,
             tolerance: link.time_tolerance(),
         };
         let outcome = match gone {
@@ -249,7 +249,7 @@ impl Player {
         }
         let before = match &self.before {
             Some(before) => before.clone(),
-            None => link.received(),
+            None => link.noted.received(),
         };
         (outcome, before)
     }
@@ -265,8 +265,8 @@ impl Player {
             Err(skip) => return Gone::Skipped(skip),
         };
         let at_rest = self.prepare(own, self.limits.motion, link);
-        self.before = Some(link.received());
-        self.written.extend(link.written());
+        self.before = Some(link.noted.received());
+        self.written.extend(&link.noted.written);
         let at_rest = match at_rest {
             Ok(at_rest) => at_rest,
             Err(error) => return Gone::Unanswered(error),
@@ -274,10 +274,9 @@ impl Player {
         link.begin();
         link.take_late();
         let outcome = play(&own.plan, link, AtMismatch::Stop);
-        self.written.extend(link.written());
-        let settings = link
-            .written()
-            .filter(|(_, register)| BUS_SETTINGS.contains(register));
+        self.written.extend(&link.noted.written);
+        let written = link.noted.written.iter();
+        let settings = written.filter(|(_, register)| BUS_SETTINGS.contains(register));
         self.moved.extend(settings.map(|(rx, _)| rx));
         Gone::Played(Box::new(outcome), [at_rest, model])
     }
@@ -569,21 +568,16 @@ impl Player {
                 return Some(format!("its clock of 1 ms ahead by {phase}"));
             }
         }
-        let measured = [way.longest, way.longest * 2];
-        let late = LATE.map(Span::from_micros).into_iter().chain(measured);
-        let late = late.flat_map(|by| [0, 1, 2].map(|which| (by, which)));
-        for (by, which) in late.filter(|_| way.tolerance > Span::ZERO) {
-            let slow = Slow {
-                by,
-                which,
-                tolerance: way.tolerance,
-            };
+        for slow in way.slow() {
             let other = Other {
                 slow: Some(slow),
                 ..Other::default()
             };
             if fails(other) {
-                return Some(format!("an adapter through which frames leave {by} late"));
+                return Some(format!(
+                    "an adapter through which frames leave {} late",
+                    slow.by
+                ));
             }
         }
         for (place, known) in self.known().iter().enumerate() {

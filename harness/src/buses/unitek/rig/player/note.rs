@@ -73,7 +73,7 @@ struct Shown {
 
 impl Shown {
     fn of(gone: &Gone, link: &Observed<'_>, exact: bool) -> Self {
-        let [before, frames] = link.kept();
+        let [before, frames] = link.noted.kept();
         let before = before.iter().map(|frame| meaning(frame, false));
         let mut within: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (head, contents) in frames.iter().map(|frame| meaning(frame, exact)) {
@@ -222,7 +222,8 @@ impl Note {
         }
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut forgotten);
-        let mut link = Observed::new(&mut recording).keeping();
+        let mut link = Observed::new(&mut recording);
+        link.noted.keep();
         let gone = match self.was_tried() {
             true => player.go(&self.own, &mut link, false),
             false => match player.learn(&mut link) {
@@ -325,7 +326,7 @@ impl Player {
             exact,
             verdict: Verdict::Skipped,
             accuses: false,
-            frames: link.kept().iter().map(|own| own.len()).sum(),
+            frames: link.noted.kept().iter().map(|own| own.len()).sum(),
         };
         self.notes.push(note);
     }

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// A scenario of this bus.
 #[derive(Debug)]
-pub(in super::super) struct Own {
+pub(crate) struct Own {
     /// The name of its source.
     pub(super) name: String,
     pub(super) scenario: Scenario<Unitek>,

@@ -1,12 +1,19 @@
 //! Scenarios on a rig whose stations share one segment: what running, recording and verifying ask of its bus.
 
-use super::{End, Keeper, Played, SessionError};
+pub(crate) mod observed;
+pub(crate) mod run;
+
+use super::{End, Keeper, Played, Rig, SessionError};
 use crate::link::{Capability, LinkEvent, Trouble};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
+
+/// What the link of a rig with an adapter can do, within the limits of the rig.
+pub(crate) const ON_PORT: [Capability; 3] =
+    [Capability::Memory, Capability::Motion, Capability::Eeprom];
 
 /// What the first line of a record says of such a rig.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,6 +26,36 @@ pub(crate) struct OnSegment {
     pub(crate) tolerance: Span,
     /// What its link can do.
     pub(crate) capabilities: Vec<Capability>,
+}
+
+impl OnSegment {
+    /// What it says of a rig: its `rate` in bits a second, how exact its times are behind a port, what a simulated link can do, and whether
+    /// motors may turn and EEPROMs be written.
+    pub(crate) fn of(
+        rig: &Rig,
+        (rate, tolerance): (u32, Span),
+        simulated: &[Capability],
+        (motion, eeprom): (bool, bool),
+    ) -> Self {
+        let (all, tolerance) = match rig.is_simulated() {
+            true => (simulated, Span::ZERO),
+            false => (ON_PORT.as_slice(), tolerance),
+        };
+        let has = |own: &&Capability| match own {
+            Capability::Motion => motion,
+            Capability::Eeprom => eeprom,
+            // No record shows them.
+            Capability::Tap | Capability::Simulator | Capability::Power => false,
+            _ => true,
+        };
+        let drives = rig.port().map_or(0, |port| port.drives.len());
+        Self {
+            rate,
+            drives: u8::try_from(drives).unwrap_or(u8::MAX),
+            tolerance,
+            capabilities: all.iter().filter(has).copied().collect(),
+        }
+    }
 }
 
 /// What a qualification comes to.

@@ -1,0 +1,304 @@
+//! Scenarios on a rig with a port, and their attempts judged again from a record, whatever the bus.
+
+use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
+use crate::buses::Bus;
+use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
+use crate::rig::port_session::{PortDrives, PortSession, failed};
+use crate::rig::{Again, Attempt, End, Keeper, Options, Played, Rig, SessionError, attempts_of};
+use crate::scenario::parse;
+use crate::scenario::problem::Problems;
+use crate::scenario::run::{Outcome, Skip};
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use std::sync::Arc;
+
+/// What playing scenarios on a rig asks of the bus of its drives: a player of attempts, on a rig or on a record.
+pub(crate) trait PortPlayer: Sized {
+    /// The bus of its scenarios.
+    const BUS: Bus;
+
+    /// Whether simulated drives are switched on anew for each attempt: no scenario sees what another one has left.
+    const ANEW: bool;
+
+    /// The drives of a rig.
+    type Drives: PortDrives;
+
+    /// A scenario, read for a rig.
+    type Own;
+
+    /// For a run in which motors may turn, as far as the rig's file permits it, or for one in which they may not; of a qualification or not.
+    fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self;
+
+    /// What a record says of a rig on which motors may turn or not.
+    fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
+
+    /// Reads a scenario.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    fn read(source: &Source) -> Result<Self::Own, Box<Problems>>;
+
+    /// Why a scenario is not begun, whatever the drives are; `None` if it is.
+    fn not_begun(&self, own: &Self::Own) -> Option<Skip>;
+
+    /// What was recorded of the rig, as a link.
+    fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay;
+
+    /// Waits until an attempt may begin.
+    fn wait(&mut self, _own: &Self::Own, _link: &mut dyn Link) {}
+
+    /// One attempt over a link, with what was received before the scenario, in words.
+    fn attempt(&mut self, own: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
+
+    /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
+    fn set_back(&mut self, own: &Self::Own, session: &mut PortSession<Self::Drives>)
+    -> Vec<String>;
+
+    /// The scenarios that a qualification plays behind the selected ones.
+    fn conversations(_rig: &Rig) -> Vec<Source> {
+        Vec::new()
+    }
+
+    /// What the attempts so far come to; see [`SegmentRun::qualified`].
+    fn qualified(&self, _rig: &Rig, _began: &str, _whole: bool) -> Option<Qualified> {
+        None
+    }
+}
+
+/// A rig in use.
+pub(crate) struct PortRun<P: PortPlayer> {
+    session: PortSession<P::Drives>,
+    options: Options,
+    player: P,
+    again: Again,
+    notes: Vec<String>,
+    /// Why nothing more is played.
+    over: Option<String>,
+}
+
+impl<P: PortPlayer> PortRun<P> {
+    /// Takes a rig.
+    ///
+    /// # Errors
+    /// [`SessionError`]; nothing is left locked or open.
+    pub(crate) fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        if rig.port().is_some_and(|port| port.listen_only) {
+            let why = "scenarios send, and its file says `listen_only = true`; set it to false";
+            return Err(failed(rig, why));
+        }
+        Ok(Self {
+            session: PortSession::open(rig, options)?,
+            player: P::new(rig, options.allow_motion, options.ill_as_well),
+            options: options.clone(),
+            again: Again::new(!rig.is_simulated()),
+            notes: Vec::new(),
+            over: None,
+        })
+    }
+
+    fn attempt(&mut self, own: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
+        let anew = P::ANEW && self.session.rig().is_simulated();
+        if anew {
+            match PortSession::open(self.session.rig(), &self.options) {
+                Ok(fresh) => {
+                    let _simulated = std::mem::replace(&mut self.session, fresh).release();
+                }
+                Err(error) => self.over = Some(error.to_string()),
+            }
+        }
+        self.player.wait(own, self.session.link());
+        let link = self.session.link();
+        link.reset_after_denial();
+        let mut recording = Recording::new(link, sink);
+        let (outcome, before) = self.player.attempt(own, &mut recording);
+        let traces = vec![recording.trace(0)];
+        if outcome.verdict != Verdict::Skipped && !anew {
+            let safe = self.session.make_safe();
+            match safe.confirmed {
+                true => {
+                    let notes = self.player.set_back(own, &mut self.session);
+                    self.notes.extend(notes);
+                }
+                false => self.over = Some(format!("after the scenario: {safe}")),
+            }
+        }
+        Attempt {
+            opening: Some(before),
+            ..Attempt::on_own_rings(outcome, traces)
+        }
+    }
+}
+
+impl<P: PortPlayer> SegmentRun for PortRun<P> {
+    fn segment(&self) -> OnSegment {
+        P::segment(self.session.rig(), self.options.allow_motion)
+    }
+
+    fn play(
+        &mut self,
+        source: &Source,
+        mut keeper: Option<&mut dyn Keeper>,
+    ) -> Result<Played, SessionError> {
+        let own = match read::<P>(source) {
+            Ok(own) => Arc::new(own),
+            Err(skip) => return Ok(Played::skipped(skip)),
+        };
+        if let Some(skip) = self.player.not_begun(&own) {
+            return Ok(Played::skipped(skip));
+        }
+        let real = !self.session.rig().is_simulated();
+        let most = attempts_of(self.session.rig(), real, false);
+        let mut attempts = Vec::new();
+        loop {
+            let number = attempts.len() + 1;
+            let mut forgotten: Vec<LinkEvent> = Vec::new();
+            let attempt = match &mut keeper {
+                Some(keeper) => {
+                    keeper.begins(number);
+                    let attempt = self.attempt(&own, &mut **keeper);
+                    keeper.ends(number, &attempt);
+                    attempt
+                }
+                None => self.attempt(&own, &mut forgotten),
+            };
+            attempts.push(attempt);
+            let more = self.again.after(&attempts, most);
+            if !more || self.over.is_some() || self.session.link().trouble().is_some() {
+                return Ok(Played::of(attempts));
+            }
+        }
+    }
+
+    fn conversations(&self) -> Vec<Source> {
+        P::conversations(self.session.rig())
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        self.player.qualified(self.session.rig(), began, whole)
+    }
+
+    fn notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    fn over(&self) -> Option<String> {
+        let late = self.session.overdue();
+        let overdue = late.then(|| "the run reached `max_run` of the rig's file".to_owned());
+        self.over.clone().or(overdue)
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.session.guarded().trouble().cloned()
+    }
+
+    fn close(self: Box<Self>, error: bool) -> End {
+        self.session.close(error)
+    }
+}
+
+/// Judges a record: of simulated drives by playing it again, of others from what was received.
+pub(crate) struct PortJudge<P: PortPlayer> {
+    rig: Rig,
+    allow_motion: bool,
+    qualifies: bool,
+    player: P,
+    /// The simulated rig, from the first attempt on.
+    run: Option<PortRun<P>>,
+}
+
+impl<P: PortPlayer> PortJudge<P> {
+    /// See [`PortPlayer::new`].
+    pub(crate) fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
+        Self {
+            allow_motion,
+            qualifies,
+            run: None,
+            player: P::new(rig, allow_motion, qualifies),
+            rig: rig.clone(),
+        }
+    }
+
+    /// Plays an attempt on the simulated rig again, behind those before it.
+    fn again(&mut self, own: &Arc<P::Own>) -> Result<RepeatedVerdict, String> {
+        let mut run = match self.run.take() {
+            Some(run) => run,
+            None => {
+                let options = Options {
+                    allow_motion: self.allow_motion,
+                    ill_as_well: self.qualifies,
+                    ..Options::default()
+                };
+                // Nothing outside the folder is touched.
+                let mut rig = self.rig.clone();
+                rig.file.hooks = Default::default();
+                rig.file.power.clear();
+                rig.file.quarantine = None;
+                PortRun::open(&rig, &options).map_err(|error| error.to_string())?
+            }
+        };
+        let mut events: Vec<LinkEvent> = Vec::new();
+        let attempt = run.attempt(own, &mut events);
+        let trouble = run.trouble().is_some();
+        self.run = Some(run);
+        Ok(RepeatedVerdict {
+            outcome: attempt.outcome,
+            before: attempt.opening,
+            left: None,
+            played: Some((events, attempt.traces)),
+            trouble,
+        })
+    }
+}
+
+impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
+    fn segments(&self) -> [OnSegment; 2] {
+        [true, false].map(|motion| P::segment(&self.rig, motion))
+    }
+
+    fn not_begun(&self, source: &Source) -> Option<Outcome> {
+        let skip = match read::<P>(source) {
+            Err(skip) => Some(skip),
+            Ok(own) => self.player.not_begun(&own),
+        };
+        skip.map(Outcome::skipped)
+    }
+
+    fn conversations(&self) -> Vec<Source> {
+        P::conversations(&self.rig)
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        match &mut self.run {
+            Some(run) => run.qualified(began, whole),
+            None => self.player.qualified(&self.rig, began, whole),
+        }
+    }
+
+    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {
+        let own = P::read(source).map_err(|problems| problems.to_string())?;
+        let own = Arc::new(own);
+        if self.rig.is_simulated() {
+            return self.again(&own);
+        }
+        let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
+        let mut replay = self.player.replay(events, tolerance);
+        let (outcome, before) = self.player.attempt(&own, &mut replay);
+        Ok(RepeatedVerdict {
+            outcome,
+            before: Some(before),
+            left: replay.left(),
+            played: None,
+            trouble: replay.trouble().is_some(),
+        })
+    }
+}
+
+/// A scenario of this bus, or why it is not played here.
+fn read<P: PortPlayer>(source: &Source) -> Result<P::Own, Skip> {
+    match parse::bus(source) {
+        // It was read when it was selected.
+        bus if bus == P::BUS => P::read(source).map_err(|_| Skip::not_on_rig(P::BUS)),
+        other => Err(Skip::not_on_rig(other)),
+    }
+}
