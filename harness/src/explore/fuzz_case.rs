@@ -9,9 +9,15 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 /// Something that a conversation can have.
-pub trait Spiced: Copy + Ord + Debug {
+pub trait Spiced: Copy + Ord + Debug + 'static {
+    /// All with their names.
+    const ALL: &'static [(&'static str, Self)];
+
     /// Its name.
-    fn name(self) -> &'static str;
+    fn name(self) -> &'static str {
+        let named = Self::ALL.iter().find(|(_, own)| *own == self);
+        named.map_or("", |(name, _)| name)
+    }
 }
 
 /// A mismatch of a drive with the expected behaviour.

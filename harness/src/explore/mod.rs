@@ -12,6 +12,7 @@ mod error;
 pub(crate) mod files;
 mod finding;
 mod fuzz_case;
+pub mod line;
 mod pool;
 mod record;
 pub(crate) mod search;

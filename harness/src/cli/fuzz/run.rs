@@ -12,7 +12,7 @@ use crate::counted::counted;
 use crate::evidence::{can_sign, seal};
 use crate::explore::{
     Bounds, CaseScope, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, KeptRun, OnRig,
-    OnSim, Planted, RingSetup, RunEnd, Target, page, read, rig_of,
+    OnSim, Planted, RingSetup, RunEnd, Spiced as _, Target, page, read, rig_of,
 };
 use crate::guard::Limits;
 use crate::rig::{Rig, state};

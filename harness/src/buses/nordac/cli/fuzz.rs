@@ -1,14 +1,14 @@
 //! `drivebench fuzz run` and `shrink` on NORDAC inverters.
 
-use crate::buses::nordac::explore::{
-    OnLine, PlantedSlave, TelegramScope, TelegramSetup, TelegramSpice, TelegramTalk,
-};
+use crate::buses::nordac::explore::{TelegramSpice, TelegramTalk};
+use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::rig::slaves;
 use crate::cli::exit::Exit;
 use crate::cli::fuzz::{FuzzRunArguments, bounds_of_simulated, explore, tell};
 use crate::cli::output::Output;
 use crate::cli::shrink::write_smaller;
 use crate::counted::counted;
+use crate::explore::line::{LineScope, LineSetup, OnLine, PlantedDrive};
 use crate::explore::smaller::smaller;
 use crate::explore::{Finding, FuzzSettings, KeptRun, Spiced as _, read_as};
 use crate::rig::Rig;
@@ -31,31 +31,31 @@ pub(crate) fn run(
         },
         None => None,
     };
-    let planted = arguments.deviates.iter().map(|own| PlantedSlave {
-        slave: own.drive,
+    let planted = arguments.deviates.iter().map(|own| PlantedDrive {
+        drive: own.drive,
         name: own.name.clone(),
     });
     let name = before.as_ref().map(|kept| kept.about.rig.clone());
     let setup = match before {
         Some(kept) => kept.about.setup,
-        None => TelegramSetup::of_rig(rig, planted.collect()),
+        None => LineSetup::of_rig::<Nordac>(rig, planted.collect()),
     };
     let own = rig.port().map(slaves).unwrap_or_default();
-    let scope = TelegramScope {
-        slaves: own
+    let scope = LineScope::<Nordac> {
+        drives: own
             .iter()
             .map(|own| (own.address, own.ppo.unwrap_or_default()))
             .collect(),
         spices: TelegramSpice::NAMES.iter().map(|(_, own)| *own).collect(),
     };
-    let simulated = match setup.under_test() {
+    let simulated = match setup.under_test::<Nordac>() {
         Ok(simulated) => simulated,
         Err(error) => return Ok(tell(&error, output)),
     };
     let about = FuzzSettings {
         schema: FuzzSettings::<TelegramTalk>::SCHEMA,
         rig: name.unwrap_or_else(|| arguments.rig.clone()),
-        drives: u8::try_from(scope.slaves.len()).unwrap_or(u8::MAX),
+        drives: u8::try_from(scope.drives.len()).unwrap_or(u8::MAX),
         second: None,
         ports: false,
         seed: arguments.seed,
@@ -68,7 +68,7 @@ pub(crate) fn run(
             .map(|own| own.name().to_owned())
             .collect(),
     };
-    let mut target = OnLine::new(simulated);
+    let mut target = OnLine::<Nordac>::new(simulated);
     let bounds = bounds_of_simulated(arguments);
     let exit = explore(arguments, (about, scope), &mut target, &bounds, output)?;
     if target.undecided() > 0 {
@@ -106,7 +106,7 @@ fn refused(rig: &Rig, arguments: &FuzzRunArguments) -> Option<&'static str> {
 pub(crate) fn shrink(path: &Path, most: u32, output: &mut Output) -> std::io::Result<Exit> {
     let read = Finding::<TelegramTalk>::read_as(path);
     let small = read.and_then(|(finding, file)| {
-        let mut target = OnLine::new(finding.setup.under_test()?);
+        let mut target = OnLine::<Nordac>::new(finding.setup.under_test::<Nordac>()?);
         Ok((smaller(&finding, &mut target, most)?, finding, file))
     });
     let (small, finding, file) = match small {
@@ -115,8 +115,8 @@ pub(crate) fn shrink(path: &Path, most: u32, output: &mut Output) -> std::io::Re
     };
     let became = format!(
         "{} became {}",
-        counted(finding.case.telegrams(), "telegram"),
-        small.finding.case.telegrams()
+        counted(finding.case.sent(), "telegram"),
+        small.finding.case.sent()
     );
     let runs = small.finding.shrunk_in.unwrap_or(0);
     write_smaller(

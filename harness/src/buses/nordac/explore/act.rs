@@ -4,71 +4,23 @@
 //! out without making a repetition of the next one.
 
 use super::hex;
-use harness_proto::profibus::fdl::{FrameControl, Pdu};
+use crate::buses::nordac::language::Nordac;
+use crate::explore::line::{LineAct, LineTalk};
+use harness_proto::profibus::fdl::{FrameControl, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use harness_proto::profibus::fdl::Sequence;
-
-/// Maximum number of acts of a case.
-pub(super) const MOST_ACTS: usize = 64;
-
-/// Maximum number of telegrams of a case.
-const MOST_TELEGRAMS: u64 = 400;
-
-/// The longest time behind an act, in microseconds.
-pub(super) const LONGEST_WAIT: u64 = 5_000_000;
-
-/// The longest case, in microseconds.
-const LONGEST_CASE: u64 = 60_000_000;
-
 /// The longest gap in a telegram, in microseconds.
 const LONGEST_GAP: u16 = 10_000;
 
-/// A conversation with the slaves of a line, from their power-up on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TelegramTalk {
-    /// The acts, in order.
-    pub acts: Vec<TelegramAct>,
-}
+/// A conversation of telegrams.
+pub type TelegramTalk = LineTalk<Nordac>;
 
-/// An act, how often it happens, and the time behind it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TelegramAct {
-    /// What.
-    pub what: TelegramActKind,
-    /// How many times it happens, each with the time behind it.
-    #[serde(default = "once", skip_serializing_if = "is_once")]
-    pub times: u8,
-    /// Microseconds from the end of the reply, or from when it would have begun, to the next act.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub wait_us: u64,
-}
-
-const fn once() -> u8 {
-    1
-}
-
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the form that serde asks for"
-)]
-const fn is_once(times: &u8) -> bool {
-    *times == 1
-}
-
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the form that serde asks for"
-)]
-const fn is_zero(wait: &u64) -> bool {
-    *wait == 0
-}
+/// An act of one.
+pub type TelegramAct = LineAct<TelegramActKind>;
 
 /// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -173,10 +125,11 @@ pub enum Harm {
 
 /// A telegram that goes out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Outgoing {
-    pub(super) octets: Vec<u8>,
+pub struct OutgoingTelegram {
+    /// Its octets.
+    pub octets: Vec<u8>,
     /// What happens to one of them on the line, and its place.
-    pub(super) bad: Option<(usize, LinkFault)>,
+    pub bad: Option<(usize, LinkFault)>,
 }
 
 /// The counts of every master towards every station.
@@ -209,7 +162,7 @@ impl Counts {
     }
 
     /// What goes out for an act; `None` where it sends nothing.
-    pub(super) fn outgoing(&mut self, what: &TelegramActKind) -> Option<Outgoing> {
+    pub(super) fn outgoing(&mut self, what: &TelegramActKind) -> Option<OutgoingTelegram> {
         let (octets, harm) = match what {
             TelegramActKind::Ask(request) => (self.octets(request), request.harm),
             TelegramActKind::Octets { octets, harm } => (octets.clone(), *harm),
@@ -217,36 +170,26 @@ impl Counts {
         };
         Some(match harm {
             Some(harm) => harm.done_to(octets),
-            None => Outgoing { octets, bad: None },
+            None => OutgoingTelegram { octets, bad: None },
         })
     }
 }
 
 impl Harm {
-    fn done_to(self, mut octets: Vec<u8>) -> Outgoing {
+    fn done_to(self, mut octets: Vec<u8>) -> OutgoingTelegram {
         let last = octets.len().max(1);
         let at = |place: u8| usize::from(place) % last;
         let flips = |place, flips| Some((at(place), LinkFault::Flip(flips)));
         let bad = match self {
             Self::Parity(place) => {
                 let parity = true;
-                flips(
-                    place,
-                    Flips {
-                        parity,
-                        ..Flips::default()
-                    },
-                )
+                let none = Flips::default();
+                flips(place, Flips { parity, ..none })
             }
             Self::Stop(place) => {
                 let stop = true;
-                flips(
-                    place,
-                    Flips {
-                        stop,
-                        ..Flips::default()
-                    },
-                )
+                let none = Flips::default();
+                flips(place, Flips { stop, ..none })
             }
             Self::Gap(place, micros) => {
                 let time = Span::from_micros(micros.into());
@@ -268,94 +211,36 @@ impl Harm {
                 None
             }
         };
-        Outgoing { octets, bad }
+        OutgoingTelegram { octets, bad }
     }
 }
 
-impl TelegramAct {
-    /// An act that happens once, with this time behind it.
-    #[must_use]
-    pub const fn new(what: TelegramActKind, wait_us: u64) -> Self {
-        Self {
-            what,
-            times: 1,
-            wait_us,
+impl TelegramActKind {
+    /// Whether it is within its bounds.
+    pub(super) fn fits(&self) -> bool {
+        let long =
+            |harm: &Option<Harm>| matches!(harm, Some(Harm::Gap(_, gap)) if *gap > LONGEST_GAP);
+        match self {
+            Self::Ask(own) => own.data.len() <= 240 && !long(&own.harm),
+            Self::Octets { octets, harm } => (1..=300).contains(&octets.len()) && !long(harm),
+            Self::Fault { number, .. } => (1..=25).contains(number),
+            Self::Link { .. } | Self::Restart { .. } => true,
         }
     }
 
-    /// The time behind it.
-    #[must_use]
-    pub const fn wait(&self) -> Span {
-        Span::from_micros(self.wait_us)
-    }
-
-    fn is_bounded(&self) -> bool {
-        let fits = match &self.what {
-            TelegramActKind::Ask(own) => {
-                let gap = matches!(own.harm, Some(Harm::Gap(_, micros)) if micros > LONGEST_GAP);
-                own.data.len() <= 240 && !gap
-            }
-            TelegramActKind::Octets { octets, harm } => {
-                let gap = matches!(harm, Some(Harm::Gap(_, micros)) if *micros > LONGEST_GAP);
-                (1..=300).contains(&octets.len()) && !gap
-            }
-            TelegramActKind::Fault { number, .. } => (1..=25).contains(number),
-            TelegramActKind::Link { .. } | TelegramActKind::Restart { .. } => true,
-        };
-        fits && self.times >= 1 && self.wait_us <= LONGEST_WAIT
-    }
-}
-
-impl TelegramTalk {
-    /// How many telegrams are sent.
-    #[must_use]
-    pub fn telegrams(&self) -> u64 {
-        let sent = self.acts.iter().filter(|act| {
-            matches!(
-                act.what,
-                TelegramActKind::Ask(_) | TelegramActKind::Octets { .. }
-            )
-        });
-        sent.map(|act| u64::from(act.times)).sum()
-    }
-
-    /// Whether it is within the bounds of a case.
-    #[must_use]
-    pub fn is_bounded(&self) -> bool {
-        let time = |act: &TelegramAct| act.wait_us.saturating_mul(act.times.into());
-        let total = self.acts.iter().map(time).fold(0, u64::saturating_add);
-        self.acts.len() <= MOST_ACTS
-            && total <= LONGEST_CASE
-            && self.telegrams() <= MOST_TELEGRAMS
-            && self.acts.iter().all(TelegramAct::is_bounded)
-    }
-
-    /// Leaves out the end, so that it is within the bounds of a case; `room` acts are left free.
-    pub(super) fn cut(&mut self, room: usize) {
-        self.acts.truncate(MOST_ACTS.saturating_sub(room));
-        while !self.is_bounded() && self.acts.pop().is_some() {}
-    }
-
-    /// What makes a case small: telegrams and other acts, then octets, then time.
-    #[must_use]
-    pub fn measure(&self) -> (usize, u64, u64) {
-        let size = |act: &TelegramAct| match &act.what {
-            TelegramActKind::Ask(own) => {
+    /// How much it holds.
+    pub(super) fn weight(&self) -> u64 {
+        match self {
+            Self::Ask(own) => {
                 let data: u64 = own.data.iter().map(|own| 2 + u64::from(*own != 0)).sum();
                 let special = u64::from(own.count != Count::Next);
                 10 + data + special + 10 * u64::from(own.harm.is_some())
             }
-            TelegramActKind::Octets { octets, harm } => {
+            Self::Octets { octets, harm } => {
                 20 + 3 * octets.len() as u64 + 10 * u64::from(harm.is_some())
             }
             _ => 1,
-        };
-        let acts = self.acts.iter().map(|act| usize::from(act.times));
-        let time = self
-            .acts
-            .iter()
-            .map(|act| act.wait_us.saturating_mul(act.times.into()));
-        (acts.sum(), self.acts.iter().map(size).sum(), time.sum())
+        }
     }
 }
 

@@ -1,26 +1,14 @@
 //! Makes and changes cases: what a master does with a slave, and telegrams that a slave must not take.
 
-use super::act::{Count, Harm, TelegramAct, TelegramActKind, TelegramTalk};
-use super::idiom::{idiom, on, start};
+use super::act::{Count, Harm, TelegramAct, TelegramActKind};
+use super::idiom::{on, start};
 use super::tasks::{change_and_read, changing, read, reading};
 use super::wire::{OWN, Wire};
-use crate::explore::{Dice, Spiced, Swarm};
+use crate::explore::{Dice, Spiced};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Pkw, PpoType};
 use harness_proto::profibus::dp::{Service, SetPrm};
 use harness_proto::profibus::fdl::{Function, check_sum};
-
-/// Acts that are left free for the state at the end of a case.
-const ROOM: usize = 4;
-
-/// What cases may have, and with which slaves.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TelegramScope {
-    /// The slaves: address, and the PPO type that each is set to.
-    pub slaves: Vec<(u8, PpoType)>,
-    /// What cases may have.
-    pub spices: Vec<TelegramSpice>,
-}
 
 /// Something that a conversation of telegrams can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -76,10 +64,7 @@ impl TelegramSpice {
 }
 
 impl Spiced for TelegramSpice {
-    fn name(self) -> &'static str {
-        let named = Self::NAMES.iter().find(|(_, own)| *own == self);
-        named.map_or("", |(name, _)| name)
-    }
+    const ALL: &'static [(&'static str, Self)] = &Self::NAMES;
 }
 
 /// Control words of which each does something else in some state.
@@ -101,106 +86,34 @@ const READING: [Service; 4] = [
     Service::RdOutp,
 ];
 
-/// Makes acts within a subset of what there is.
-#[derive(Debug)]
-pub(super) struct Maker<'s> {
-    scope: &'s TelegramScope,
-    swarm: &'s Swarm<TelegramSpice>,
+/// How a case begins: mostly with a start; and how many parts follow.
+pub(super) fn begin(station: (u8, PpoType), dice: &mut Dice) -> (Vec<TelegramAct>, usize) {
+    let wire = Wire::from(station);
+    let acts = match dice.below(10) {
+        0 => Vec::new(),
+        1..=5 => start(wire),
+        _ => [start(wire), on(wire, setpoint(dice))].concat(),
+    };
+    (acts, 2 + dice.below(10))
 }
 
-impl<'s> Maker<'s> {
-    /// Makes cases of this scope with what the swarm has.
-    pub(super) const fn new(scope: &'s TelegramScope, swarm: &'s Swarm<TelegramSpice>) -> Self {
-        Self { scope, swarm }
-    }
+/// Requests for what shows the slave's state.
+pub(super) fn close(wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
+    let control = *dice.pick(&[stw::READY, stw::START]).unwrap_or(&stw::READY);
+    let mut last = wire.exchange([control, 0x1000, 0, 0, 0, 0], Pkw::default());
+    last.times = 2;
+    vec![last, wire.reads(Service::SlaveDiag)]
+}
 
-    /// A case: mostly a start, and what the swarm has behind it.
-    pub(super) fn case(&self, dice: &mut Dice) -> TelegramTalk {
-        let wire = self.wire(dice);
-        let mut acts = match dice.below(10) {
-            0 => Vec::new(),
-            1..=5 => start(wire),
-            _ => [start(wire), on(wire, setpoint(dice))].concat(),
-        };
-        for _ in 0..2 + dice.below(10) {
-            acts.extend(self.acts(dice));
-        }
-        self.ended(TelegramTalk { acts }, dice)
+/// Acts of a spice, mostly with a time behind them.
+pub(super) fn part(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<TelegramAct> {
+    let mut acts = single(spice, wire, dice);
+    if dice.percent(60)
+        && let Some(last) = acts.last_mut()
+    {
+        last.wait_us = wait(dice);
     }
-
-    /// A case made of another one.
-    pub(super) fn mutated(
-        &self,
-        old: &TelegramTalk,
-        other: Option<&TelegramTalk>,
-        dice: &mut Dice,
-    ) -> TelegramTalk {
-        let mut acts = old.acts.clone();
-        for _ in 0..=dice.below(4) {
-            let at = dice.below(acts.len() + 1);
-            match (dice.below(5), other) {
-                (0, _) if at < acts.len() => drop(acts.remove(at)),
-                (1, Some(other)) => {
-                    let from = dice.below(other.acts.len());
-                    let some = other.acts[from..].iter().take(1 + dice.below(6)).cloned();
-                    acts.splice(at..at, some);
-                }
-                (2, _) if at < acts.len() => acts[at].wait_us = wait(dice),
-                (3, _) if at < acts.len() => change(&mut acts[at], dice),
-                _ => drop(acts.splice(at..at, self.acts(dice))),
-            }
-        }
-        self.ended(TelegramTalk { acts }, dice)
-    }
-
-    /// Within its bounds, and with requests for what shows the slave's state.
-    fn ended(&self, mut case: TelegramTalk, dice: &mut Dice) -> TelegramTalk {
-        case.cut(ROOM);
-        let wire = self.wire(dice);
-        let control = *dice.pick(&[stw::READY, stw::START]).unwrap_or(&stw::READY);
-        let mut last = wire.exchange([control, 0x1000, 0, 0, 0, 0], Pkw::default());
-        last.times = 2;
-        case.acts.push(last);
-        case.acts.push(wire.reads(Service::SlaveDiag));
-        case.cut(0);
-        case
-    }
-
-    fn wire(&self, dice: &mut Dice) -> Wire {
-        let (slave, ppo) = dice
-            .pick(&self.scope.slaves)
-            .copied()
-            .unwrap_or((8, PpoType::One));
-        Wire {
-            slave,
-            ppo,
-            master: OWN,
-        }
-    }
-
-    fn spice(&self, dice: &mut Dice) -> TelegramSpice {
-        let own: Vec<_> = TelegramSpice::NAMES.iter().map(|(_, own)| *own).collect();
-        let own = self.swarm.of(&own);
-        dice.pick(&own).copied().unwrap_or(TelegramSpice::Motion)
-    }
-
-    /// An act, or all of an idiom.
-    fn acts(&self, dice: &mut Dice) -> Vec<TelegramAct> {
-        let (spice, wire) = (self.spice(dice), self.wire(dice));
-        if dice.percent(30) {
-            let whole = idiom(spice, wire, dice);
-            if !whole.is_empty() {
-                return whole;
-            }
-        }
-        let mut acts = single(spice, wire, dice);
-        if dice.percent(60)
-            && let Some(last) = acts.last_mut()
-        {
-            last.wait_us = wait(dice);
-        }
-        acts
-    }
+    acts
 }
 
 /// Acts of a spice.
@@ -258,7 +171,7 @@ fn single(spice: TelegramSpice, wire: Wire, dice: &mut Dice) -> Vec<TelegramAct>
 }
 
 /// Mostly nothing or little; sometimes as long as a ramp.
-fn wait(dice: &mut Dice) -> u64 {
+pub(super) fn wait(dice: &mut Dice) -> u64 {
     let micros = match dice.below(20) {
         0..=9 => 0,
         10..=13 => 1 + dice.below(3_000),
@@ -483,8 +396,8 @@ fn of_length(wire: Wire, dice: &mut Dice) -> TelegramAct {
 }
 
 /// Another data octet.
-fn change(act: &mut TelegramAct, dice: &mut Dice) {
-    match &mut act.what {
+pub(super) fn change(what: &mut TelegramActKind, dice: &mut Dice) {
+    match what {
         TelegramActKind::Ask(own) if !own.data.is_empty() => {
             let at = dice.below(own.data.len());
             own.data[at] = dice.byte();

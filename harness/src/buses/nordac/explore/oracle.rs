@@ -1,16 +1,10 @@
-//! Whether slaves do what the manual and the bus standard say, with any value of what they leave open.
-//!
-//! The replies of a case are compared with those of the model: octets, line errors and times. Where they differ, the model is played again
-//! with other values of the open points (`explore::search`). Only what no such model explains is a difference.
+//! How replies of slaves differ, and what of them the manual leaves open.
 
-use super::act::TelegramTalk;
 use super::hex;
-use super::play::{Done, TelegramsSeen, play};
-use super::setup::model;
+use super::play::{Done, TelegramsSeen};
 use crate::buses::nordac::judge::{Place, Symptom};
 use crate::buses::nordac::report::Said;
 use crate::buses::nordac::simulate::Setup;
-use crate::explore::search::{Explained, Explains, explain};
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
 use harness_proto::profibus::Telegram;
 use serde::{Deserialize, Serialize};
@@ -40,116 +34,6 @@ pub struct TelegramDifference {
     pub about: String,
 }
 
-/// The properties of every slave of a line.
-type Assignment = Vec<Properties>;
-
-/// What a case comes to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Judgement {
-    /// Some values of the open points explain every telegram.
-    Explained,
-    /// No model does; the best one is this.
-    Differs(Box<TelegramDifference>),
-    /// Too many models would have to be played.
-    Undecided,
-}
-
-/// Judges cases on one line.
-#[derive(Clone, Debug)]
-pub struct Oracle {
-    under_test: Setup,
-    /// What explained the last case.
-    last: Assignment,
-}
-
-impl Oracle {
-    /// Judges the slaves of this line.
-    #[must_use]
-    pub fn new(under_test: Setup) -> Self {
-        let slaves = under_test.slaves.len();
-        Self {
-            under_test,
-            last: vec![Properties::default(); slaves],
-        }
-    }
-
-    /// The slaves under test.
-    #[must_use]
-    pub const fn under_test(&self) -> &Setup {
-        &self.under_test
-    }
-
-    /// The properties that the oracle takes for the most likely.
-    #[must_use]
-    pub fn last(&self) -> &[Properties] {
-        &self.last
-    }
-
-    /// Judges what the slaves under test have done in a case.
-    pub fn judge(&mut self, case: &TelegramTalk, seen: &TelegramsSeen) -> Judgement {
-        let played = Played {
-            under_test: &self.under_test,
-            case,
-            seen,
-        };
-        let usual = vec![Properties::default(); self.last.len()];
-        match explain(&played, [self.last.clone(), usual]) {
-            Explained::By(found) => {
-                self.last = found;
-                Judgement::Explained
-            }
-            Explained::Not(best) => {
-                let expected = played.expected(&best);
-                let under = lines(&self.under_test, &best);
-                let found = difference(&self.under_test, &expected, seen, under);
-                found.map_or(Judgement::Undecided, |own| {
-                    Judgement::Differs(Box::new(own))
-                })
-            }
-            Explained::Undecided => Judgement::Undecided,
-        }
-    }
-}
-
-/// A case that was played on the slaves under test.
-struct Played<'p> {
-    under_test: &'p Setup,
-    case: &'p TelegramTalk,
-    seen: &'p TelegramsSeen,
-}
-
-impl Played<'_> {
-    fn expected(&self, assignment: &[Properties]) -> TelegramsSeen {
-        play(&model(self.under_test, assignment), self.case)
-    }
-}
-
-impl Explains for Played<'_> {
-    type Assumed = Assignment;
-    /// Telegrams before the first difference, and how like this one is.
-    type Agreement = (usize, i64);
-
-    fn agreement(&self, assumed: &Assignment) -> Option<(usize, i64)> {
-        let expected = self.expected(assumed);
-        let index = first(&expected.said, &self.seen.said)?;
-        let pair = (expected.said.get(index), self.seen.said.get(index));
-        Some((index, -unlike(pair)))
-    }
-
-    fn neighbours(&self, assumed: &Assignment) -> Vec<Assignment> {
-        let mut all = Vec::new();
-        for (place, own) in assumed.iter().enumerate() {
-            let posicon = self.under_test.slaves[place].posicon;
-            for changed in neighbours(own, posicon) {
-                let mut next = assumed.clone();
-                next[place] = changed;
-                all.push(next);
-            }
-        }
-        all
-    }
-}
-
 /// Every property with every value.
 fn values() -> impl Iterator<Item = (&'static Description, String)> {
     PROPERTIES.iter().flat_map(|property| {
@@ -163,7 +47,8 @@ fn values() -> impl Iterator<Item = (&'static Description, String)> {
     })
 }
 
-fn neighbours(own: &Properties, posicon: bool) -> impl Iterator<Item = Properties> {
+/// All properties that differ in one open point.
+pub(super) fn neighbours(own: &Properties, posicon: bool) -> impl Iterator<Item = Properties> {
     let own = *own;
     let shown = values().filter(move |(property, _)| posicon || property.name != POSICON);
     shown.filter_map(move |(property, word)| {
@@ -173,7 +58,7 @@ fn neighbours(own: &Properties, posicon: bool) -> impl Iterator<Item = Propertie
 }
 
 /// The open points of an assignment as header lines, where they do not have their default.
-fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String> {
+pub(super) fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String> {
     let mut lines = Vec::new();
     for (slave, own) in under_test.slaves.iter().zip(assignment) {
         let usual = Properties::default();
@@ -191,18 +76,8 @@ fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String> {
     lines
 }
 
-/// The first telegram that differs: in its sender, octets, errors or time.
-fn first(expected: &[Said], seen: &[Said]) -> Option<usize> {
-    let shorter = expected.len().min(seen.len());
-    let index = expected.iter().zip(seen).position(|(a, b)| a != b);
-    index.or((expected.len() != seen.len()).then_some(shorter))
-}
-
 /// How unlike two telegrams are.
-fn unlike(pair: (Option<&Said>, Option<&Said>)) -> i64 {
-    let (Some(a), Some(b)) = pair else {
-        return 100_000;
-    };
+pub(super) fn unlike(a: &Said, b: &Said) -> i64 {
     let sender = i64::from(a.from != b.from);
     let length = a.octets.len().abs_diff(b.octets.len()) as i64;
     let error = i64::from(a.error != b.error);
@@ -214,14 +89,13 @@ fn unlike(pair: (Option<&Said>, Option<&Said>)) -> i64 {
     10_000 * sender + 1_000 * length + 1_000 * error + 2 * i64::from(bits) + time
 }
 
-/// The first difference, in words.
-fn difference(
+/// The difference at a place, in words.
+pub(super) fn difference(
     setup: &Setup,
-    expected: &TelegramsSeen,
-    seen: &TelegramsSeen,
+    index: usize,
+    (expected, seen): (&TelegramsSeen, &TelegramsSeen),
     under: Vec<String>,
 ) -> Option<TelegramDifference> {
-    let index = first(&expected.said, &seen.said)?;
     let (wanted, came) = (expected.said.get(index), seen.said.get(index));
     let what = match (wanted, came) {
         (Some(_), None) => Symptom::Missing,

@@ -1,11 +1,12 @@
 //! Plays a case on a simulated line.
 
-use super::act::{Counts, Outgoing, TelegramActKind, TelegramTalk, slot};
+use super::act::{Counts, OutgoingTelegram, TelegramActKind, TelegramTalk, slot};
 use crate::buses;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::language::plan::SentTelegram;
 use crate::buses::nordac::report::{Said, said};
 use crate::buses::nordac::simulate::{Bench, Happening, Setup, Stimulus};
+use crate::explore::line::LineSeen;
 use crate::link::{DriveFault, Line, Link, Moment, PlacedFault};
 use crate::scenario::language::Language as _;
 use harness_proto::time::{Instant, Span};
@@ -13,25 +14,18 @@ use harness_proto::time::{Instant, Span};
 /// How long a case goes on behind its last act.
 const TAIL: Span = Span::from_millis(20);
 
-/// What a case has shown.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct TelegramsSeen {
-    /// What the slaves sent, in order.
-    pub said: Vec<Said>,
-    /// Each act as often as it happened, and when.
-    pub(super) done: Vec<Done>,
-    /// How long the case took.
-    pub took: Span,
-}
+/// What a case has shown: what the slaves sent, and each act as often as it happened.
+pub type TelegramsSeen = LineSeen<Said, Done>;
 
 /// An act that has happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Done {
-    pub(super) at: Instant,
+pub struct Done {
+    /// When it began.
+    pub at: Instant,
     /// Its place in the case.
-    pub(super) act: usize,
+    pub act: usize,
     /// What was sent; `None` for what happens to a slave.
-    pub(super) sent: Option<Outgoing>,
+    pub sent: Option<OutgoingTelegram>,
 }
 
 /// Plays a case on fresh slaves.
@@ -65,7 +59,7 @@ pub fn play(setup: &Setup, case: &TelegramTalk) -> TelegramsSeen {
 }
 
 /// Sends, and waits until the reply has ended, or can no longer begin.
-fn send(bench: &mut Bench, setup: &Setup, sent: Outgoing) {
+fn send(bench: &mut Bench, setup: &Setup, sent: OutgoingTelegram) {
     let telegram = SentTelegram {
         octets: sent.octets,
         bad: sent.bad.into_iter().collect(),

@@ -1,13 +1,9 @@
-//! The scenario of a finding: it passes if every telegram is as the model predicts, and fails if one is not.
+//! The steps of a finding's scenario: it passes if every telegram is as the model predicts, and fails if one is not.
 
 use super::act::{TelegramActKind, TelegramTalk};
 use super::hex;
-use super::play::{Done, TelegramsSeen, play};
-use super::setup::TelegramSetup;
-use crate::buses::nordac::judge::Symptom;
-use crate::buses::nordac::manual::MANUAL;
+use super::play::{Done, TelegramsSeen};
 use crate::buses::nordac::report::Said;
-use crate::explore::{ExploreError, Finding};
 use harness_proto::line::LineError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
@@ -16,49 +12,8 @@ use std::fmt::Write as _;
 /// How far a reply may be off whose time is what differs.
 const EXACT: Span = Span::from_nanos(100);
 
-/// The scenario of a finding, with this title.
-///
-/// # Errors
-/// The header has mistakes.
-pub(super) fn text(finding: &Finding<TelegramTalk>, title: &str) -> Result<String, ExploreError> {
-    let difference = &finding.difference;
-    let header = [&finding.setup.header[..], &difference.under[..]].concat();
-    let setup = TelegramSetup::new(header.clone(), Vec::new()).under_test()?;
-    let seen = play(&setup, &finding.case);
-    let mut text = format!(
-        "title   {title}\nsource  nordac {}\nbus     nordac\n",
-        source(&difference.section)
-    );
-    for line in &header {
-        // Writing to a String cannot fail.
-        let _infallible = writeln!(text, "{line}");
-    }
-    let _infallible = writeln!(text, "\n# {}", difference.about);
-    for planted in &finding.setup.deviates {
-        let _infallible = writeln!(text, "# found on {}", planted.line());
-    }
-    let timed = (difference.what == Symptom::Time).then_some(difference.telegram);
-    steps(
-        &finding.case,
-        &seen,
-        (timed, setup.rate.octet_time()),
-        &mut text,
-    );
-    Ok(text)
-}
-
-/// The table of the catalogue for a section.
-fn source(section: &str) -> String {
-    let tables = MANUAL.tables().unwrap_or_default();
-    let own = tables.iter().find(|table| table.section == section);
-    let known = own.or(tables.iter().find(|table| table.section == "3.1"));
-    known.map_or("3.1".to_owned(), |table| {
-        table.id.trim_start_matches("nordac ").to_owned()
-    })
-}
-
 /// The steps; the telegram `timed`, counted from 1, must come exactly at its time.
-fn steps(
+pub(super) fn steps(
     case: &TelegramTalk,
     seen: &TelegramsSeen,
     (timed, octet): (Option<usize>, Span),

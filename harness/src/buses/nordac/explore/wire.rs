@@ -16,6 +16,16 @@ pub(super) struct Wire {
     pub(super) master: u8,
 }
 
+impl From<(u8, PpoType)> for Wire {
+    fn from((slave, ppo): (u8, PpoType)) -> Self {
+        Self {
+            slave,
+            ppo,
+            master: OWN,
+        }
+    }
+}
+
 impl Wire {
     /// Any request, with its data.
     pub(super) fn request(self, function: Function, service: Service, data: &[u8]) -> Request {

@@ -28,7 +28,7 @@ use harness_proto::line::Received;
 use harness_proto::time::{self, Instant};
 
 /// The language of scenarios with the words of this bus.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nordac;
 
 impl Language for Nordac {

@@ -109,19 +109,10 @@ impl Spice {
 
     /// The faults on links.
     pub const FAULTS: [Self; 4] = [Self::Flip, Self::Framing, Self::Slip, Self::Late];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        let named = Self::NAMES.iter().find(|(_, own)| *own == self);
-        named.map_or("", |(name, _)| name)
-    }
 }
 
 impl Spiced for Spice {
-    fn name(self) -> &'static str {
-        Spice::name(self)
-    }
+    const ALL: &'static [(&'static str, Self)] = &Self::NAMES;
 }
 
 impl Swarm {

@@ -1,8 +1,7 @@
 //! `drivebench fuzz run` and `shrink` on UNITEK drives.
 
-use crate::buses::unitek::explore::{
-    FrameScope, FrameSetup, FrameSpice, FrameTalk, OnAdapter, OnBench, PlantedDrive,
-};
+use crate::buses::unitek::explore::{FrameSpice, FrameTalk, OnAdapter};
+use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::rig::{Session, axes, limits};
 use crate::buses::unitek::simulate::Setup;
 use crate::cli::exit::Exit;
@@ -11,6 +10,7 @@ use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::shrink::write_smaller;
 use crate::counted::counted;
+use crate::explore::line::{LineScope, LineSetup, OnLine, PlantedDrive};
 use crate::explore::smaller::smaller;
 use crate::explore::{ExploreError, Finding, FuzzSettings, KeptRun, Spiced as _, read_as};
 use crate::link::{Line as _, Trouble};
@@ -42,11 +42,11 @@ pub(crate) fn run(
     let name = before.as_ref().map(|kept| kept.about.rig.clone());
     let setup = match before {
         Some(kept) => kept.about.setup,
-        None => FrameSetup::of_rig(rig, planted.collect()),
+        None => LineSetup::of_rig::<Unitek>(rig, planted.collect()),
     };
     let ports = !rig.is_simulated();
     let drives = rig.port().map(axes).unwrap_or_default();
-    let scope = FrameScope {
+    let scope = LineScope::<Unitek> {
         drives: drives.iter().map(|own| (own.node, own.rx)).collect(),
         spices: spices(rig, arguments),
     };
@@ -73,7 +73,7 @@ pub(crate) fn run(
     if ports {
         return on_adapter(rig, arguments, (about, scope), simulated, output);
     }
-    let mut target = OnBench::new(simulated);
+    let mut target = OnLine::<Unitek>::new(simulated);
     let bounds = bounds_of_simulated(arguments);
     let exit = explore(arguments, (about, scope), &mut target, &bounds, output)?;
     if target.undecided() > 0 {
@@ -86,7 +86,7 @@ pub(crate) fn run(
 }
 
 fn setup_of(about: &FuzzSettings<FrameTalk>) -> Result<Setup, ExploreError> {
-    about.setup.under_test()
+    about.setup.under_test::<Unitek>()
 }
 
 /// What cases may have: behind an adapter only what a drive takes back.
@@ -109,7 +109,7 @@ fn spices(rig: &Rig, arguments: &FuzzRunArguments) -> Vec<FrameSpice> {
 fn on_adapter(
     rig: &Rig,
     arguments: &FuzzRunArguments,
-    (about, scope): (FuzzSettings<FrameTalk>, FrameScope),
+    (about, scope): (FuzzSettings<FrameTalk>, LineScope<Unitek>),
     simulated: Setup,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -170,7 +170,7 @@ pub(crate) fn shrink(path: &Path, most: u32, output: &mut Output) -> std::io::Re
     let read = Finding::<FrameTalk>::read_as(path);
     let small = read.and_then(|(finding, file)| {
         let most = if finding.ports { 0 } else { most };
-        let mut target = OnBench::new(finding.setup.under_test()?);
+        let mut target = OnLine::<Unitek>::new(finding.setup.under_test::<Unitek>()?);
         Ok((smaller(&finding, &mut target, most)?, finding, file))
     });
     let (small, finding, file) = match small {

@@ -1,41 +1,16 @@
 //! A conversation of frames as a value: what hosts send and what happens to the drives from outside, with the times between.
 
+use crate::buses::unitek::language::Unitek;
+use crate::explore::line::{LineAct, LineTalk};
 use harness_proto::can::Frame;
-use harness_proto::time::Span;
 use harness_sim::unitek::Inputs;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// Maximum number of acts of a case.
-pub(super) const MOST_ACTS: usize = 64;
+/// A conversation of frames.
+pub type FrameTalk = LineTalk<Unitek>;
 
-/// The longest time behind an act, in microseconds.
-pub(super) const LONGEST_WAIT: u64 = 2_000_000;
-
-/// The longest case, in microseconds.
-const LONGEST_CASE: u64 = 20_000_000;
-
-/// A conversation with the drives of a segment, from their power-up on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrameTalk {
-    /// The acts, in order.
-    pub acts: Vec<FrameAct>,
-}
-
-/// An act, and the time behind it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrameAct {
-    /// What.
-    pub what: FrameActKind,
-    /// Microseconds until the next act.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub wait_us: u64,
-}
-
-fn is_zero(wait: &u64) -> bool {
-    *wait == 0
-}
+/// An act of one.
+pub type FrameAct = LineAct<FrameActKind>;
 
 /// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,20 +54,6 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Frame, D::Error> {
         .map_err(|error| de::Error::custom(format!("`{text}` is no frame: {error}")))
 }
 
-impl FrameAct {
-    /// An act with this time behind it.
-    #[must_use]
-    pub const fn new(what: FrameActKind, wait_us: u64) -> Self {
-        Self { what, wait_us }
-    }
-
-    /// The time behind it.
-    #[must_use]
-    pub const fn wait(&self) -> Span {
-        Span::from_micros(self.wait_us)
-    }
-}
-
 impl FrameActKind {
     /// The name of an input or a value, as the simulation knows it.
     #[must_use]
@@ -104,45 +65,5 @@ impl FrameActKind {
             }
             Self::Send(_) | Self::Restart { .. } => None,
         }
-    }
-}
-
-impl FrameTalk {
-    /// How many frames are sent.
-    #[must_use]
-    pub fn frames(&self) -> usize {
-        let sent = |act: &&FrameAct| matches!(act.what, FrameActKind::Send(_));
-        self.acts.iter().filter(sent).count()
-    }
-
-    /// Whether it is within the bounds of a case.
-    #[must_use]
-    pub fn is_bounded(&self) -> bool {
-        let total: u64 = self.acts.iter().map(|act| act.wait_us).sum();
-        let named = |act: &FrameAct| match act.what {
-            FrameActKind::Input { .. } | FrameActKind::Force { .. } => act.what.name().is_some(),
-            FrameActKind::Send(_) | FrameActKind::Restart { .. } => true,
-        };
-        self.acts.len() <= MOST_ACTS
-            && total <= LONGEST_CASE
-            && self
-                .acts
-                .iter()
-                .all(|act| act.wait_us <= LONGEST_WAIT && named(act))
-    }
-
-    /// What makes a case small: acts, then bytes, then time.
-    #[must_use]
-    pub fn measure(&self) -> (usize, u64, u64) {
-        let bytes = |act: &FrameAct| match &act.what {
-            FrameActKind::Send(frame) => {
-                let data = frame.data().iter().map(|byte| u64::from(*byte));
-                1_000 * frame.dlc() as u64 + data.sum::<u64>()
-            }
-            _ => 1,
-        };
-        let total = self.acts.iter().map(bytes).sum();
-        let time = self.acts.iter().map(|act| act.wait_us).sum();
-        (self.acts.len(), total, time)
     }
 }

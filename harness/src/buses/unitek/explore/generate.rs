@@ -1,22 +1,15 @@
 //! Makes and changes cases: requests, writes and inputs that mean something to a drive, and frames that it must not take.
 
-use super::act::{FrameAct, FrameActKind, FrameTalk, LONGEST_WAIT, MOST_ACTS};
-use super::idiom::idiom;
-use crate::explore::{Dice, Spiced, Swarm};
+use super::act::{FrameAct, FrameActKind};
+use crate::explore::{Dice, Spiced};
 use harness_proto::can::{Frame, Id};
 use harness_proto::unitek::frame::STOP;
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request, Width};
 use harness_sim::unitek::Inputs;
 
-/// What cases may have, and with which drives.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FrameScope {
-    /// The drives: number, and the identifier on which each receives.
-    pub drives: Vec<(u8, u16)>,
-    /// What cases may have.
-    pub spices: Vec<FrameSpice>,
-}
+/// The longest time behind an act, in microseconds.
+pub(super) const LONGEST_WAIT: u64 = 2_000_000;
 
 /// Something that a conversation of frames can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,10 +62,7 @@ impl FrameSpice {
 }
 
 impl Spiced for FrameSpice {
-    fn name(self) -> &'static str {
-        let named = Self::NAMES.iter().find(|(_, own)| *own == self);
-        named.map_or("", |(name, _)| name)
-    }
+    const ALL: &'static [(&'static str, Self)] = &Self::NAMES;
 }
 
 /// Registers that show what a drive does, of which every case reads some.
@@ -84,134 +74,57 @@ const TELLING: [u8; 18] = [
 /// Variables and ramps: they change nothing, or only how a motor turns.
 const VARIABLES: [u8; 8] = [0xD1, 0xD2, 0xD3, 0xD4, 0x35, 0xED, 0x34, 0x79];
 
-/// Makes acts within a subset of what there is.
-#[derive(Debug)]
-pub(super) struct Maker<'s> {
-    scope: &'s FrameScope,
-    swarm: &'s Swarm<FrameSpice>,
+/// An act with a spice.
+pub(super) fn part(spice: FrameSpice, (node, rx): (u8, u16), dice: &mut Dice) -> Vec<FrameAct> {
+    let what = match spice {
+        FrameSpice::Inputs => outside(node, dice),
+        FrameSpice::Power if dice.percent(25) => FrameActKind::Restart { drive: node },
+        FrameSpice::Foreign => FrameActKind::Send(foreign(rx, dice)),
+        FrameSpice::Lengths => FrameActKind::Send(of_length(rx, dice)),
+        own => match request(own, dice).encode(rx) {
+            Ok(frame) => FrameActKind::Send(frame),
+            Err(_) => FrameActKind::Restart { drive: node },
+        },
+    };
+    vec![FrameAct::new(what, wait(dice))]
 }
 
-impl<'s> Maker<'s> {
-    /// Makes cases of this scope with what the swarm has.
-    pub(super) const fn new(scope: &'s FrameScope, swarm: &'s Swarm<FrameSpice>) -> Self {
-        Self { scope, swarm }
-    }
-
-    /// A case. What it has written it reads again at its end.
-    pub(super) fn case(&self, dice: &mut Dice) -> FrameTalk {
-        let count = 2 + dice.below(18);
-        let acts = (0..count).flat_map(|_| self.acts(dice)).collect();
-        let mut case = FrameTalk { acts };
-        case.acts.truncate(MOST_ACTS - 16);
-        self.asked(case, dice)
-    }
-
-    /// A case made of another one.
-    pub(super) fn mutated(
-        &self,
-        old: &FrameTalk,
-        other: Option<&FrameTalk>,
-        dice: &mut Dice,
-    ) -> FrameTalk {
-        let mut acts = old.acts.clone();
-        for _ in 0..=dice.below(4) {
-            let at = dice.below(acts.len() + 1);
-            match (dice.below(5), other) {
-                (0, _) if at < acts.len() => drop(acts.remove(at)),
-                (1, Some(other)) => {
-                    let from = dice.below(other.acts.len());
-                    let some = other.acts[from..].iter().take(1 + dice.below(6)).cloned();
-                    acts.splice(at..at, some);
-                }
-                (2, _) if at < acts.len() => acts[at].wait_us = wait(dice),
-                (3, _) if at < acts.len() => acts[at] = changed(&acts[at], dice),
-                _ => acts.insert(at, self.act(dice)),
-            }
-        }
-        acts.truncate(MOST_ACTS - 16);
-        self.asked(FrameTalk { acts }, dice)
-    }
-
-    /// Adds requests for some of what was written, and for what shows the drive's state.
-    fn asked(&self, mut case: FrameTalk, dice: &mut Dice) -> FrameTalk {
-        let mut written: Vec<_> = case
-            .acts
-            .iter()
-            .filter_map(|act| self.written(act))
-            .collect();
-        written.dedup();
-        let drive = self.drive(dice);
-        let shown: Vec<_> = written
-            .iter()
-            .filter_map(|(rx, own)| Some((*rx, shown_by(*own)?)))
-            .collect();
-        written.extend(shown);
-        written.extend((0..2).filter_map(|_| Some((drive.1, *dice.pick(&TELLING)?))));
-        let first = written.len().saturating_sub(6);
-        for (rx, register) in written.split_off(first) {
-            case.acts
-                .extend(send(Request::Read { register }.encode(rx).ok(), 1_500));
-        }
-        case
-    }
-
-    fn written(&self, act: &FrameAct) -> Option<(u16, u8)> {
-        let FrameActKind::Send(frame) = &act.what else {
-            return None;
-        };
-        let own = self.scope.drives.iter().map(|(_, rx)| *rx);
-        let rx = own
-            .into_iter()
-            .find(|rx| u32::from(*rx) == frame.id().number())?;
-        let register = *frame.data().first()?;
-        (register != harness_proto::unitek::frame::READ).then_some((rx, register))
-    }
-
-    fn drive(&self, dice: &mut Dice) -> (u8, u16) {
-        dice.pick(&self.scope.drives).copied().unwrap_or((1, 0x201))
-    }
-
-    fn spice(&self, dice: &mut Dice) -> FrameSpice {
-        let own: Vec<_> = FrameSpice::NAMES.iter().map(|(_, own)| *own).collect();
-        let own = self.swarm.of(&own);
-        dice.pick(&own).copied().unwrap_or(FrameSpice::Read)
-    }
-
-    /// An act, or all of an idiom.
-    fn acts(&self, dice: &mut Dice) -> Vec<FrameAct> {
-        let whole = match dice.percent(20) {
-            true => idiom(self.spice(dice), self.drive(dice).1, dice),
-            false => Vec::new(),
-        };
-        match whole.is_empty() {
-            true => vec![self.act(dice)],
-            false => whole,
-        }
-    }
-
-    fn act(&self, dice: &mut Dice) -> FrameAct {
-        let spice = self.spice(dice);
-        let (node, rx) = self.drive(dice);
-        let what = match spice {
-            FrameSpice::Inputs => outside(node, dice),
-            FrameSpice::Power if dice.percent(25) => FrameActKind::Restart { drive: node },
-            FrameSpice::Foreign => FrameActKind::Send(foreign(rx, dice)),
-            FrameSpice::Lengths => FrameActKind::Send(of_length(rx, dice)),
-            own => match request(own, dice).encode(rx) {
-                Ok(frame) => FrameActKind::Send(frame),
-                Err(_) => FrameActKind::Restart { drive: node },
-            },
-        };
-        FrameAct::new(what, wait(dice))
-    }
+/// Requests for some of what was written, and for what shows the drive's state.
+pub(super) fn close(
+    acts: &[FrameAct],
+    (_, own): (u8, u16),
+    drives: &[(u8, u16)],
+    dice: &mut Dice,
+) -> Vec<FrameAct> {
+    let mut asked: Vec<_> = acts.iter().filter_map(|act| written(act, drives)).collect();
+    asked.dedup();
+    let shown: Vec<_> = asked
+        .iter()
+        .filter_map(|(rx, own)| Some((*rx, shown_by(*own)?)))
+        .collect();
+    asked.extend(shown);
+    asked.extend((0..2).filter_map(|_| Some((own, *dice.pick(&TELLING)?))));
+    let last = asked.split_off(asked.len().saturating_sub(6)).into_iter();
+    let read = |(rx, register)| {
+        let frame = Request::Read { register }.encode(rx).ok()?;
+        Some(FrameAct::new(FrameActKind::Send(frame), 1_500))
+    };
+    last.filter_map(read).collect()
 }
 
-fn send(frame: Option<Frame>, wait_us: u64) -> Option<FrameAct> {
-    Some(FrameAct::new(FrameActKind::Send(frame?), wait_us))
+/// The drive and the register that an act writes.
+fn written(act: &FrameAct, drives: &[(u8, u16)]) -> Option<(u16, u8)> {
+    let FrameActKind::Send(frame) = &act.what else {
+        return None;
+    };
+    let mut own = drives.iter().map(|(_, rx)| *rx);
+    let rx = own.find(|rx| u32::from(*rx) == frame.id().number())?;
+    let register = *frame.data().first()?;
+    (register != harness_proto::unitek::frame::READ).then_some((rx, register))
 }
 
 /// Mostly long enough for a reply; sometimes nothing, sometimes many scans.
-fn wait(dice: &mut Dice) -> u64 {
+pub(super) fn wait(dice: &mut Dice) -> u64 {
     let micros = match dice.below(10) {
         0 => 0,
         1..=5 => 400 + dice.below(2_000),
@@ -408,19 +321,17 @@ fn outside(drive: u8, dice: &mut Dice) -> FrameActKind {
     }
 }
 
-/// The same act with another data byte.
-fn changed(act: &FrameAct, dice: &mut Dice) -> FrameAct {
-    let mut new = act.clone();
-    if let FrameActKind::Send(own) = &act.what
-        && own.dlc() > 0
-        && !own.is_remote()
-    {
+/// Another data byte.
+pub(super) fn change(what: &mut FrameActKind, dice: &mut Dice) {
+    let FrameActKind::Send(own) = what else {
+        return;
+    };
+    if own.dlc() > 0 && !own.is_remote() {
         let mut bytes = own.data().to_vec();
         let at = dice.below(bytes.len());
         bytes[at] = dice.byte();
         if let Ok(frame) = Frame::new(own.id(), &bytes) {
-            new.what = FrameActKind::Send(frame);
+            *own = frame;
         }
     }
-    new
 }

@@ -1,12 +1,13 @@
 //! Cases on drives behind an adapter, in real time.
 
 use super::act::{FrameActKind, FrameTalk};
-use super::fuzz_case::features;
 use super::oracle::FrameDifference;
 use super::play::play;
 use crate::buses::unitek::judge::{Breach, Follower};
+use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::rig::{Axis, Session};
 use crate::buses::unitek::simulate::Setup;
+use crate::explore::line::LineBus as _;
 use crate::explore::{ExploreError, Rehearsal, Target, Tried};
 use crate::link::{Line as _, Link as _, Trouble};
 use crate::medium::Out;
@@ -179,7 +180,7 @@ impl Target<FrameTalk> for OnAdapter<'_> {
         }
         Ok(Rehearsal {
             took: seen.took + TAIL[0] + TAIL[0],
-            features: features(case, &seen),
+            features: Unitek::features(case, &seen),
             seen,
             denied,
             of_model: None,

@@ -1,16 +1,12 @@
-//! Whether drives do what the manual says, with any value of what it leaves open.
+//! How frames of drives differ, and what of the open points was measured.
 //!
-//! The frames of a case are compared with those of the model. Where they differ, the model is played again with other values of the
-//! points that the manual leaves open (UNITEK 7; `explore::search`). Only what no such model explains is a difference. Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and
-//! `homing-time`.
+//! Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and `homing-time`.
 
 use super::act::{FrameAct, FrameActKind, FrameTalk};
 use super::play::{FramesSeen, play};
-use super::setup::model;
 use crate::buses::unitek::judge::FrameSymptom;
 use crate::buses::unitek::language::written;
 use crate::buses::unitek::simulate::Setup;
-use crate::explore::search::{Explained, Explains, explain};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::Reply;
@@ -45,20 +41,6 @@ pub struct FrameDifference {
     pub about: String,
 }
 
-/// The properties of every drive of a segment.
-pub type Assignment = Vec<Properties>;
-
-/// What a case comes to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Judgement {
-    /// These properties explain every frame.
-    Explained(Assignment),
-    /// No model does; the best one is this.
-    Differs(Box<FrameDifference>),
-    /// Too many models would have to be played.
-    Undecided,
-}
-
 /// What was measured of a drive: the points that can have any value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Measured {
@@ -67,124 +49,25 @@ struct Measured {
     homing_time: Span,
 }
 
-/// Judges cases on one segment.
-#[derive(Clone, Debug)]
-pub struct Oracle {
-    under_test: Setup,
-    measured: Vec<Measured>,
-    /// What explained the last case.
-    last: Assignment,
-}
-
-impl Oracle {
-    /// Judges the drives of this segment; measures the points that can have any value.
-    #[must_use]
-    pub fn new(under_test: Setup) -> Self {
-        let own = &under_test;
-        let measured = (0..own.drives.len())
-            .map(|drive| measure(own, drive))
-            .collect();
-        let mut new = Self {
-            under_test,
-            measured,
-            last: Vec::new(),
-        };
-        new.last = new.all(Properties::default());
-        new
-    }
-
-    /// The drives under test.
-    #[must_use]
-    pub const fn under_test(&self) -> &Setup {
-        &self.under_test
-    }
-
-    /// Every drive with these properties, but with what was measured of it.
-    fn all(&self, properties: Properties) -> Assignment {
+/// The usual values of every drive and those of the other profile, but with what was measured.
+pub(super) fn begins(setup: &Setup) -> Vec<Vec<Properties>> {
+    let measured: Vec<_> = (0..setup.drives.len())
+        .map(|drive| measure(setup, drive))
+        .collect();
+    let all = |properties: Properties| {
         let own = |measured: &Measured| Properties {
             stuff: measured.stuff,
             reply_delay: measured.reply_delay,
             homing_time: measured.homing_time,
             ..properties
         };
-        self.measured.iter().map(own).collect()
-    }
-
-    /// What the model with these properties does.
-    #[must_use]
-    pub fn expected(&self, case: &FrameTalk, assignment: &[Properties]) -> FramesSeen {
-        play(&model(&self.under_test, assignment), case)
-    }
-
-    /// The properties that the oracle takes for the most likely.
-    #[must_use]
-    pub fn last(&self) -> &[Properties] {
-        &self.last
-    }
-
-    /// Judges what the drives under test have done in a case.
-    pub fn judge(&mut self, case: &FrameTalk, seen: &FramesSeen) -> Judgement {
-        let played = Played {
-            oracle: self,
-            case,
-            seen,
-        };
-        let begins = [
-            self.last.clone(),
-            self.all(Properties::default()),
-            self.all(Properties::fw472()),
-        ];
-        match explain(&played, begins) {
-            Explained::By(found) => {
-                self.last.clone_from(&found);
-                Judgement::Explained(found)
-            }
-            Explained::Not(best) => {
-                let expected = self.expected(case, &best);
-                let found = difference(&self.under_test, &expected, seen, lines(self, &best));
-                found.map_or(Judgement::Undecided, |own| {
-                    Judgement::Differs(Box::new(own))
-                })
-            }
-            Explained::Undecided => Judgement::Undecided,
-        }
-    }
+        measured.iter().map(own).collect()
+    };
+    vec![all(Properties::default()), all(Properties::fw472())]
 }
 
-/// A case that was played on the drives under test.
-struct Played<'o> {
-    oracle: &'o Oracle,
-    case: &'o FrameTalk,
-    seen: &'o FramesSeen,
-}
-
-impl Explains for Played<'_> {
-    type Assumed = Assignment;
-    /// Frames before the first difference, and how like this frame is.
-    type Agreement = (usize, i64);
-
-    fn agreement(&self, assumed: &Assignment) -> Option<(usize, i64)> {
-        let expected = self.oracle.expected(self.case, assumed);
-        let index = first(&expected.frames, &self.seen.frames)?;
-        let pair = (expected.frames.get(index), self.seen.frames.get(index));
-        Some((index, -unlike(pair)))
-    }
-
-    fn neighbours(&self, assumed: &Assignment) -> Vec<Assignment> {
-        let mut all = Vec::new();
-        for (drive, own) in assumed.iter().enumerate() {
-            for changed in neighbours(own) {
-                let mut next = assumed.clone();
-                next[drive] = changed;
-                all.push(next);
-            }
-        }
-        all
-    }
-}
-
-/// Every assignment that differs in one open point.
-fn neighbours(own: &Properties) -> impl Iterator<Item = Properties> {
+/// All properties that differ in one open point.
+pub(super) fn neighbours(own: &Properties) -> impl Iterator<Item = Properties> {
     let own = *own;
     let words = PROPERTIES
         .iter()
@@ -199,9 +82,9 @@ fn neighbours(own: &Properties) -> impl Iterator<Item = Properties> {
 }
 
 /// The open points of an assignment as header lines, where they are not those of the profile `ds`.
-fn lines(oracle: &Oracle, assignment: &[Properties]) -> Vec<String> {
+pub(super) fn lines(setup: &Setup, assignment: &[Properties]) -> Vec<String> {
     let mut lines = Vec::new();
-    for (drive, own) in oracle.under_test.drives.iter().zip(assignment) {
+    for (drive, own) in setup.drives.iter().zip(assignment) {
         let node = drive.node;
         for property in PROPERTIES {
             if let Accepts::Words(words) = property.accepts {
@@ -245,25 +128,13 @@ fn meaning(frame: &Frame) -> &[u8] {
     }
 }
 
-fn same_frame(a: &Frame, b: &Frame) -> bool {
+pub(super) fn same_frame(a: &Frame, b: &Frame) -> bool {
     let head = |own: &Frame| (own.id(), own.is_remote(), own.dlc());
     head(a) == head(b) && meaning(a) == meaning(b)
 }
 
-/// The first frame that differs, in what it says or in its time.
-fn first(expected: &[LineFrame], seen: &[LineFrame]) -> Option<usize> {
-    let same =
-        |(a, b): (&LineFrame, &LineFrame)| same_frame(&a.frame, &b.frame) && a.start == b.start;
-    let shorter = expected.len().min(seen.len());
-    let index = expected.iter().zip(seen).position(|pair| !same(pair));
-    index.or((expected.len() != seen.len()).then_some(shorter))
-}
-
 /// How unlike two frames are.
-fn unlike(pair: (Option<&LineFrame>, Option<&LineFrame>)) -> i64 {
-    let (Some(a), Some(b)) = pair else {
-        return 10_000;
-    };
+pub(super) fn unlike(a: &LineFrame, b: &LineFrame) -> i64 {
     let (own, other) = (&a.frame, &b.frame);
     let head = i64::from(own.id() != other.id()) + i64::from(own.is_remote() != other.is_remote());
     let register = i64::from(own.data().first() != other.data().first());
@@ -274,15 +145,14 @@ fn unlike(pair: (Option<&LineFrame>, Option<&LineFrame>)) -> i64 {
     1_000 * head + 1_000 * register + 100 * length + 2 * i64::from(bits) + time
 }
 
-/// The first difference, in words.
-fn difference(
+/// The difference at a place, in words.
+pub(super) fn difference(
     setup: &Setup,
-    expected: &FramesSeen,
-    seen: &FramesSeen,
+    index: usize,
+    (expected, seen): (&FramesSeen, &FramesSeen),
     under: Vec<String>,
 ) -> Option<FrameDifference> {
-    let index = first(&expected.frames, &seen.frames)?;
-    let (wanted, came) = (expected.frames.get(index), seen.frames.get(index));
+    let (wanted, came) = (expected.said.get(index), seen.said.get(index));
     let what = match (wanted, came) {
         (Some(_), None) => FrameSymptom::Missing,
         (None, _) => FrameSymptom::Unasked,
@@ -357,7 +227,7 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
         play(&alone, &FrameTalk { acts })
     };
     let firmware = said(vec![send(Request::Read { register: 0x1B }, 10_100_000)]);
-    let reply = firmware.frames.first();
+    let reply = firmware.said.first();
     let known = reply.and_then(|own| Some((own, Reply::decode(&own.frame, tx).ok()?)));
     let request = Request::Read { register: 0x1B }.encode(rx);
     let asked = request.map_or(Span::ZERO, |own| alone.rate.time_of(own.wire_bits()));
@@ -380,11 +250,11 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
         send(write(0x78, 1), 10_100_000),
     ]);
     let scan = Span::from_millis(1);
-    let ends = homed.frames.iter().find(|own| {
+    let ends = homed.said.iter().find(|own| {
         let reply = Reply::decode(&own.frame, tx);
         reply.is_ok_and(|own| own.register == 0x40 && own.data.bits() & status::CALIBRATED != 0)
     });
-    let begins = homed.acts.last().map(|at| {
+    let begins = homed.done.last().map(|at| {
         let frame = write(0x78, 1).encode(rx);
         *at + frame.map_or(Span::ZERO, |own| alone.rate.time_of(own.wire_bits()))
     });

@@ -3,6 +3,7 @@
 use super::act::{FrameActKind, FrameTalk};
 use crate::buses::Stimulus;
 use crate::buses::unitek::simulate::{Bench, Setup};
+use crate::explore::line::LineSeen;
 use crate::link::{DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::Out;
 use harness_proto::time::{Instant, Span};
@@ -12,29 +13,18 @@ use harness_sim::unitek;
 /// How long a case goes on behind its last act, for replies.
 const TAIL: Span = Span::from_millis(20);
 
-/// What a case has shown.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FramesSeen {
-    /// The frames of the drives, in order.
-    pub frames: Vec<LineFrame>,
-    /// When each act began.
-    pub acts: Vec<Instant>,
-    /// How long the case took.
-    pub took: Span,
-}
+/// What a case has shown: frames of the drives, and when each act began.
+pub type FramesSeen = LineSeen<LineFrame, Instant>;
 
 /// Plays a case on fresh drives.
 #[must_use]
 pub fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
-    played(&mut Bench::new(setup), case)
-}
-
-/// Plays a case.
-fn played(bench: &mut Bench, case: &FrameTalk) -> FramesSeen {
+    let mut bench = Bench::new(setup);
+    let bench = &mut bench;
     let begin = bench.now();
-    let mut acts = Vec::with_capacity(case.acts.len());
+    let mut done = Vec::with_capacity(case.acts.len());
     for act in &case.acts {
-        acts.push(bench.now());
+        done.push(bench.now());
         match &act.what {
             FrameActKind::Send(frame) => {
                 bench.send(0, Out::Frames(&[*frame]));
@@ -57,8 +47,8 @@ fn played(bench: &mut Bench, case: &FrameTalk) -> FramesSeen {
     let trace = bench.trace(0);
     let all = trace.channels.iter().flat_map(|channel| channel.frames());
     FramesSeen {
-        frames: all.filter(|own| own.from.is_some()).copied().collect(),
-        acts,
+        said: all.filter(|own| own.from.is_some()).copied().collect(),
+        done,
         took: bench.now().since(begin),
     }
 }

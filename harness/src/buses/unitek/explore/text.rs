@@ -1,11 +1,8 @@
-//! The scenario of a finding: it passes if every frame is as the model predicts, and fails if one is not.
+//! The steps of a finding's scenario: it passes if every frame is as the model predicts, and fails if one is not.
 
 use super::act::{FrameActKind, FrameTalk};
-use super::play::{FramesSeen, play};
-use super::setup::FrameSetup;
-use crate::buses::unitek::judge::FrameSymptom;
+use super::play::FramesSeen;
 use crate::buses::unitek::language::written;
-use crate::explore::{ExploreError, Finding};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineFrame;
 use std::fmt::Write as _;
@@ -19,49 +16,11 @@ const EXACT: Span = Span::from_micros(1);
 /// Frames up to this time behind a request need no time in a scenario.
 const AT_ONCE: Span = Span::from_micros(1_500);
 
-/// The scenario of a finding, with this title.
-///
-/// # Errors
-/// The header has mistakes.
-pub(super) fn text(finding: &Finding<FrameTalk>, title: &str) -> Result<String, ExploreError> {
-    let difference = &finding.difference;
-    let header = [&finding.setup.header[..], &difference.under[..]].concat();
-    let setup = FrameSetup::new(header.clone(), Vec::new()).under_test()?;
-    let seen = play(&setup, &finding.case);
-    let mut text = format!(
-        "title   {title}\nsource  unitek {}\nbus     unitek\n",
-        source(&difference.section)
-    );
-    for line in &header {
-        // Writing to a String cannot fail.
-        let _infallible = writeln!(text, "{line}");
-    }
-    let _infallible = writeln!(text, "\n# {}", difference.about);
-    for planted in &finding.setup.deviates {
-        let _infallible = writeln!(text, "# found on {}", planted.line());
-    }
-    let timed = (difference.what == FrameSymptom::Time).then_some(difference.frame);
-    steps(&finding.case, &seen, timed, &mut text);
-    Ok(text)
-}
-
-/// The table of the catalogue for a section, example or appendix item.
-fn source(section: &str) -> String {
-    let tables = crate::buses::unitek::manual::MANUAL
-        .tables()
-        .unwrap_or_default();
-    let own = tables.iter().find(|table| table.section == section);
-    let known = own.or(tables.iter().find(|table| table.section == "5.2"));
-    known.map_or("5.4 ex 8".to_owned(), |table| {
-        table.id.trim_start_matches("unitek ").to_owned()
-    })
-}
-
 /// The steps; the frame `timed`, counted from 1, must come exactly at its time.
-fn steps(case: &FrameTalk, seen: &FramesSeen, timed: Option<usize>, text: &mut String) {
-    let mut frames = (1..).zip(&seen.frames).peekable();
+pub(super) fn steps(case: &FrameTalk, seen: &FramesSeen, timed: Option<usize>, text: &mut String) {
+    let mut frames = (1..).zip(&seen.said).peekable();
     let mut last = Instant::START;
-    for (act, at) in case.acts.iter().zip(&seen.acts) {
+    for (act, at) in case.acts.iter().zip(&seen.done) {
         while let Some((number, own)) = frames.next_if(|(_, own)| own.at <= *at) {
             expect(own, (last, timed == Some(number)), text);
         }
@@ -86,10 +45,7 @@ fn steps(case: &FrameTalk, seen: &FramesSeen, timed: Option<usize>, text: &mut S
         expect(own, (last, timed == Some(number)), text);
     }
     // As long as the case, and no longer: cycles may still run.
-    let ends = seen
-        .acts
-        .iter()
-        .chain(seen.frames.last().map(|own| &own.at));
+    let ends = seen.done.iter().chain(seen.said.last().map(|own| &own.at));
     let spoken = ends.max().copied().unwrap_or(Instant::START);
     let rest = (Instant::START + seen.took).since(spoken);
     let _infallible = writeln!(text, "wait {}", time(Instant::START + rest));

@@ -30,7 +30,7 @@ use harness_proto::can::Frame;
 use harness_proto::time::{self, Instant};
 
 /// The language of scenarios with the words of this bus.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unitek;
 
 impl Language for Unitek {

@@ -1,0 +1,131 @@
+//! Conversations as the engine explores them.
+
+use super::generate::Maker;
+use super::text::text;
+use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
+use crate::explore::smaller::Acts;
+use crate::explore::{
+    Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
+    Pool, Rehearsal, Swarm, Target,
+};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Nothing: simulated drives do the same again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum NoAttempt {}
+
+impl<B: LineBus> FuzzCase for LineTalk<B> {
+    type Scope = LineScope<B>;
+    type Setup = LineSetup;
+    type Spice = B::Spice;
+    type Seen = Seen<B>;
+    type Difference = B::Difference;
+    type Attempt = NoAttempt;
+    type Act = LineAct<B::What>;
+
+    fn swarm(seed: u64, round: u64, scope: &LineScope<B>) -> Swarm<B::Spice> {
+        Swarm::drawn(seed, round, &scope.spices, (B::NEEDED, B::NEEDED[0]))
+    }
+
+    fn tour(_: &LineScope<B>, _: &FuzzSettings<Self>) -> Vec<Self> {
+        Vec::new()
+    }
+
+    fn made(
+        scope: &LineScope<B>,
+        swarm: &Swarm<B::Spice>,
+        _: (&[Self], u64),
+        pool: &Pool<Self>,
+        dice: &mut Dice,
+    ) -> Self {
+        let maker = Maker::new(scope, swarm);
+        let old = dice.percent(40).then(|| pool.pick(0, dice)).flatten();
+        let other = pool.pick(0, dice);
+        match old {
+            Some(old) => maker.mutated(old, other, dice),
+            None => maker.case(dice),
+        }
+    }
+
+    fn lane(&self) -> usize {
+        0
+    }
+
+    fn text(finding: &Finding<Self>) -> Result<String, ExploreError> {
+        let title = format!("Found by fuzzing: {}", finding.difference.signature());
+        text(finding, &title)
+    }
+
+    fn again(
+        finding: &Finding<Self>,
+        about: &FuzzSettings<Self>,
+        _: &BTreeMap<String, u8>,
+    ) -> Result<JudgedAgain, ExploreError> {
+        if about.ports {
+            return Ok(JudgedAgain::Unknown);
+        }
+        let mut target = OnLine::<B>::new(finding.setup.under_test::<B>()?);
+        let rehearsal = target.rehearse(&finding.case)?;
+        let found = target.attempt(&finding.case, &rehearsal)?.difference;
+        Ok(match found.as_ref() == Some(&finding.difference) {
+            true => JudgedAgain::Same,
+            false => JudgedAgain::Differs(
+                "its conversation does not differ as the finding says".to_owned(),
+            ),
+        })
+    }
+
+    fn is_sound(finding: &Finding<Self>) -> bool {
+        finding.case.is_bounded() && finding.setup.bus == B::BUS.name()
+    }
+
+    fn confirm(
+        confirmation: &mut Confirmation<'_>,
+        finding: &mut Finding<Self>,
+        rehearsal: &Rehearsal<Self>,
+        _: Option<&[Self::Act]>,
+        target: &mut dyn Target<Self>,
+    ) -> Result<(), ExploreError> {
+        confirmation.again(finding, rehearsal, target)?;
+        if !finding.confirmed {
+            confirmation.by_others(finding);
+        }
+        Ok(())
+    }
+}
+
+impl<B: LineBus> Acts for LineTalk<B> {
+    fn acts(&mut self) -> &mut Vec<Self::Act> {
+        &mut self.acts
+    }
+
+    fn wait(act: &mut Self::Act) -> &mut u64 {
+        &mut act.wait_us
+    }
+
+    fn simpler(act: &Self::Act) -> Vec<Self::Act> {
+        let fewer = [1, act.times / 2, act.times.saturating_sub(1)].into_iter();
+        let fewer = fewer.filter(|times| (1..act.times).contains(times));
+        let fewer = fewer.map(|times| LineAct {
+            times,
+            ..act.clone()
+        });
+        let others = B::simpler(&act.what).into_iter();
+        fewer
+            .chain(others.map(|what| LineAct { what, ..*act }))
+            .collect()
+    }
+
+    fn measure(&self) -> (usize, u64, u64) {
+        Self::measure(self)
+    }
+}
+
+/// FNV-1a: a number for a feature.
+pub(crate) fn hash(words: &[u32]) -> u32 {
+    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
+    bytes.fold(0x811C_9DC5, |hash: u32, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    })
+}

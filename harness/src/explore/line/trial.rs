@@ -1,0 +1,138 @@
+//! Trials of the engine on a bus, for the tests of its rooms: right drives are never accused, wrong ones are found, shrunk and kept as
+//! scenarios.
+
+use super::{LineBus, LineScope, LineSetup, LineTalk, OnLine, PlantedDrive};
+use crate::explore::smaller::smaller;
+use crate::explore::{
+    Bounds, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd, Spiced, Swarm,
+    Watcher,
+};
+use crate::library::Entry;
+use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+
+struct Found<B: LineBus>(Vec<Finding<LineTalk<B>>>);
+
+impl<B: LineBus> Watcher<LineTalk<B>> for Found<B> {
+    fn round(&mut self, _: u64, _: &Swarm<B::Spice>) {}
+    fn found(&mut self, finding: &Finding<LineTalk<B>>, _: &str) {
+        self.0.push(finding.clone());
+    }
+    fn progress(&mut self, _: &Progress, _: &Pool<LineTalk<B>>) {}
+}
+
+/// Drives that are explored.
+#[derive(Clone, Debug)]
+pub(crate) struct EngineTrial<B: LineBus> {
+    /// Their header lines.
+    pub(crate) header: Vec<String>,
+    /// The drive in which deviations are planted.
+    pub(crate) drive: u8,
+    /// The same as conversations address it.
+    pub(crate) station: B::Station,
+}
+
+/// What was found, why the run ended, and how many cases were not judged.
+pub(crate) type Explored<B> = (Vec<Finding<LineTalk<B>>>, RunEnd, u64);
+
+impl<B: LineBus> EngineTrial<B> {
+    /// Explores for a number of seconds of bus time, up to a number of findings.
+    pub(crate) fn explored(
+        &self,
+        line: &[String],
+        deviates: Option<&str>,
+        (seed, seconds, findings): (u64, u64, usize),
+    ) -> Explored<B> {
+        let deviates = deviates.map(|name| PlantedDrive {
+            drive: self.drive,
+            name: name.to_owned(),
+        });
+        let header = [&self.header, line].concat();
+        let setup = LineSetup::new::<B>(header, deviates.into_iter().collect());
+        let mut target = OnLine::<B>::new(setup.under_test::<B>().expect("a header"));
+        let scope = LineScope::<B> {
+            drives: vec![self.station],
+            spices: B::Spice::ALL.iter().map(|(_, own)| *own).collect(),
+        };
+        let about = FuzzSettings {
+            schema: 1,
+            rig: "sim".to_owned(),
+            drives: 1,
+            second: None,
+            ports: false,
+            seed,
+            confirm: 2,
+            of: 3,
+            setup,
+            spices: B::Spice::ALL.iter().map(|own| own.0.to_owned()).collect(),
+        };
+        let bounds = Bounds {
+            cases: u64::MAX,
+            wire: Some(Span::from_millis(1_000 * seconds)),
+            findings,
+            every: u64::MAX,
+        };
+        let mut found = Found(Vec::new());
+        let mut run = FuzzRun::new(about, scope);
+        let end = run.run(&mut target, None, &bounds, &mut found);
+        (found.0, end.expect("no error"), target.undecided())
+    }
+
+    /// Explores right drives: nothing is found, and every case is judged.
+    pub(crate) fn accuses_nobody(&self, line: &[String], (seed, seconds): (u64, u64)) {
+        let (found, end, undecided) = self.explored(line, None, (seed, seconds, 1));
+        let about: Vec<_> = found.iter().map(|own| &own.difference).collect();
+        assert_eq!((about, end), (Vec::new(), RunEnd::Wire), "{line:?}");
+        assert_eq!(undecided, 0, "{line:?}");
+    }
+
+    /// Explores drives with these deviations for ten minutes of bus time: those that were not found. What is found is made small and is a
+    /// scenario.
+    pub(crate) fn missed(&self, some: impl Iterator<Item = &'static str>) -> Vec<&'static str> {
+        let mut missed = Vec::new();
+        for name in some {
+            let (found, ..) = self.explored(&[], Some(name), (1, 600, 1));
+            let Some(finding) = found.first() else {
+                missed.push(name);
+                continue;
+            };
+            let under_test = finding.setup.under_test::<B>().expect("a header");
+            let mut target = OnLine::<B>::new(under_test);
+            let small = smaller(finding, &mut target, 200)
+                .expect("a header")
+                .finding;
+            assert!(small.case.measure() <= finding.case.measure(), "{name}");
+            let text = LineTalk::<B>::text(&small).expect("a model");
+            let (right, why) = verdict(&text, "", &[]);
+            assert_eq!(right, Verdict::Passed, "{name}: {why}\n{text}");
+            // The values of open points with which the model explains most are not those of the drive.
+            let planted = &small.setup.deviates[0].line::<B>();
+            let under = B::basis(&small.difference).1;
+            let (wrong, why) = verdict(&text, planted, under);
+            assert_eq!(wrong, Verdict::Failed, "{name}: {why}\n{text}");
+        }
+        missed
+    }
+}
+
+/// The verdict of a scenario, with one more line in its header, and without the lines `under`.
+fn verdict(text: &str, line: &str, under: &[String]) -> (Verdict, String) {
+    let lines = text
+        .lines()
+        .filter(|own| under.iter().all(|other| other != own));
+    let text: String = lines.map(|own| format!("{own}\n")).collect();
+    let text = text.replacen("\n# ", &format!("{line}\n\n# "), 1);
+    let source = Source {
+        name: "finding".to_owned(),
+        text: text.clone().into(),
+    };
+    let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
+    let plan = entry.settled().expect("a plan");
+    let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
+    (
+        outcome.verdict,
+        outcome.finding.map_or(text, |own| own.message),
+    )
+}
