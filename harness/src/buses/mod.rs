@@ -1,6 +1,8 @@
 //! The buses: one folder each. Only this file names them all.
 
 mod contents;
+#[cfg(test)]
+mod live_tests;
 pub mod nordac;
 pub mod novobus;
 pub(crate) mod port_row;
@@ -36,12 +38,15 @@ pub use novobus::language::Novobus as DefaultBus;
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
 pub(crate) use nordac::cli::CyclicCommand;
+pub(crate) use nordac::senders::TelegramCutter;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 
 use crate::campaign::line::LineCampaign;
+use crate::capture::live::LiveText;
+use crate::capture::{Carries, RecordedPlace, ends};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::fuzz::{FuzzRunArguments, verify};
@@ -241,6 +246,18 @@ pub(crate) fn line_formats(shared: bool) -> Vec<Format> {
 /// Who sent the octets of a line that stations share, recorded at one place; `None` for a master. `octet` is the time of an octet.
 pub(crate) fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
     nordac::senders::senders(octets, octet)
+}
+
+/// Text of what a place of a capture carries, while it arrives. Of a link of a ring, its rate, and the number of drives where it is known.
+pub(crate) fn live_text(place: &RecordedPlace, drives: Option<u8>) -> Box<dyn LiveText> {
+    match (place.carries, ends(&place.name)) {
+        (Carries::Link, Some((_, from, to))) => {
+            let rate = Rate::from_bits_per_second(place.bits_per_second).unwrap_or_default();
+            Box::new(novobus::report::live::LinkText::new(from, to, rate, drives))
+        }
+        (Carries::Link | Carries::Line, _) => Box::<nordac::report::live::TelegramText>::default(),
+        (Carries::Frames, _) => Box::new(unitek::report::table::FrameText),
+    }
 }
 
 /// Whether these are traces of a bus whose stations share one line; those of a ring have tables and pictures of their own.

@@ -1,7 +1,6 @@
 //! The files of a capture that goes on: a new one by size, by time or on demand, the oldest removed.
 
-use super::recorder::LiveRecorder;
-use harness_proto::line::Rate;
+use super::recorder::{LiveRecorder, RecordedPlace};
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
@@ -21,8 +20,7 @@ pub(crate) struct Rotation {
 /// The files of a capture.
 pub(crate) struct Files {
     path: PathBuf,
-    links: Vec<String>,
-    rate: Rate,
+    places: Vec<RecordedPlace>,
     rotation: Rotation,
     /// The number of the present file.
     number: usize,
@@ -46,8 +44,7 @@ impl Files {
     /// The file cannot be written.
     pub(crate) fn begin(
         path: &Path,
-        links: &[String],
-        rate: Rate,
+        places: &[RecordedPlace],
         rotation: Rotation,
         now: u64,
     ) -> io::Result<Self> {
@@ -55,11 +52,10 @@ impl Files {
             true => path.to_owned(),
             false => numbered(path, 1),
         };
-        let recorder = LiveRecorder::start(File::create(&first)?, links, rate)?;
+        let recorder = LiveRecorder::start(File::create(&first)?, places)?;
         Ok(Self {
             path: path.to_owned(),
-            links: links.to_vec(),
-            rate,
+            places: places.to_vec(),
             rotation,
             number: 1,
             began: now,
@@ -101,7 +97,7 @@ impl Files {
         self.recorder.flush()?;
         self.number += 1;
         let next = numbered(&self.path, self.number);
-        self.recorder = LiveRecorder::start(File::create(&next)?, &self.links, self.rate)?;
+        self.recorder = LiveRecorder::start(File::create(&next)?, &self.places)?;
         self.began = now;
         self.written.push_back(next);
         let most = self.rotation.files.unwrap_or(usize::MAX).max(1);
@@ -119,6 +115,7 @@ impl Files {
 mod tests {
     use super::*;
     use crate::capture::read;
+    use crate::capture::recorder::{Carries, Piece};
     use harness_proto::time::{Instant, Span};
     use harness_sim::record::LineByte;
 
@@ -132,18 +129,21 @@ mod tests {
             every: Some(1_000_000_000),
             files: Some(2),
         };
-        let links = ["1->0".to_owned(), "0->master".to_owned()];
-        let mut files = Files::begin(&path, &links, Rate::Baud38400, rotation, 0).expect("a file");
+        let places = ["1->0", "0->master"].map(|name| RecordedPlace {
+            name: name.to_owned(),
+            carries: Carries::Link,
+            bits_per_second: 38_400,
+        });
+        let mut files = Files::begin(&path, &places, rotation, 0).expect("a file");
         let mut now = 1_700_000_000_000_000_000;
         for number in 0..40_u8 {
             now += 300_000;
             let at = Instant::START + Span::from_nanos(now);
             let byte = LineByte::seen(at, Some(number), Some(number), None);
-            files.recorder().byte(0, &byte).expect("kept");
-            files
-                .recorder()
-                .event(1, now, "the adapter was pulled out")
-                .expect("kept");
+            let event = Piece::Event(now, "the adapter was pulled out".to_owned());
+            for (place, piece) in [Piece::Octet(byte), event].iter().enumerate() {
+                files.recorder().piece(place, piece).expect("kept");
+            }
             files.flush(0).expect("written");
         }
         let kept: Vec<_> = files.paths().map(Path::to_owned).collect();

@@ -25,7 +25,7 @@ pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario}
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
-pub(crate) use recorder::LiveRecorder;
+pub(crate) use recorder::{Carries, LiveRecorder, Piece, RecordedPlace};
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};

@@ -85,5 +85,5 @@ pub(super) fn read(
         reader.content((0, nanos), (data, captured, end))?;
         at = end;
     }
-    finish(reader, rate)
+    finish(reader, rate, &[])
 }

@@ -5,22 +5,32 @@
 //! packet may hold several bytes: the time is that of the first, the others follow without a gap. Where the first
 //! packet is later than a day, times count from a byte time before it.
 
+mod parts;
+mod values;
+
+pub(super) use values::nanoseconds;
+
 use super::frames::{FrameRead, Sender, assemble, packet};
 use super::telegrams::{self, DAY};
-use super::{Assembly, Capture, CaptureError, ends, line_byte};
+use super::{Assembly, Capture, CaptureError, NamedLink, ends, line_byte};
+use crate::buses;
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
-    NANOSECONDS, PACKET, SECTION,
+    PACKET, SECTION,
 };
 use crate::report::pcapng_frames;
 use crate::report::pcapng_telegrams::{PacketOctet, octet_time, octets, station};
 use harness_proto::can::BitRate;
 use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
+use parts::{Part, chosen};
 use std::borrow::Cow;
+use values::sent;
 
 /// Option of an interface: seconds to be added to its times.
 const IF_TSOFFSET: u16 = 14;
+/// What the name of a shared line begins with.
+const LINE: &str = "bus";
 /// Events of the link type that carry no byte of the line: a change of the control lines, the end of a capture.
 const NO_BYTE: [u8; 2] = [0x00, 0x06];
 /// Events of a good byte: sent or received, begun or ended.
@@ -32,6 +42,8 @@ const MAX_INTERFACES: usize = 65_536;
 
 struct Interface {
     carries: Carries,
+    /// The number of its part.
+    part: usize,
     resolution: u8,
     offset: i64,
     /// The time of an octet at its rate.
@@ -45,6 +57,8 @@ enum Carries {
     Link(usize, Option<u8>, Option<u8>),
     /// What a station sends on a line that all stations share; `None` is the master.
     Station(Option<u8>),
+    /// What all stations send on a line that they share.
+    Line,
     /// Frames of a bus.
     Frames(Sender),
 }
@@ -58,20 +72,27 @@ struct Byte {
     error: Option<LineError>,
 }
 
-/// Reads a file.
-pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
+/// Reads a file; `links` chooses a part where it has several.
+pub(crate) fn read(
+    bytes: &[u8],
+    rate: Option<Rate>,
+    links: &[NamedLink],
+) -> Result<Capture, CaptureError> {
     let mut reader = Reader::new(bytes);
     let mut offset = 0;
     while offset < bytes.len() {
         offset = reader.block(offset)?;
     }
-    finish(reader, rate)
+    finish(reader, rate, links)
 }
 
-/// The capture of all packets.
-pub(super) fn finish(reader: Reader<'_>, rate: Option<Rate>) -> Result<Capture, CaptureError> {
-    let known = reader.interfaces;
-    if !known.iter().any(Option::is_some) {
+/// The capture of all packets of one part.
+pub(super) fn finish(
+    reader: Reader<'_>,
+    rate: Option<Rate>,
+    links: &[NamedLink],
+) -> Result<Capture, CaptureError> {
+    if reader.parts.is_empty() {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
             what: "no interface is of link type 250 (RTAC serial) or 227 (CAN): captures of a ring have one of the former for each \
@@ -79,37 +100,42 @@ pub(super) fn finish(reader: Reader<'_>, rate: Option<Rate>) -> Result<Capture, 
                 .to_owned(),
         });
     }
-    let is_link = |own: &Interface| matches!(own.carries, Carries::Link(..));
-    let is_station = |own: &Interface| matches!(own.carries, Carries::Station(_));
-    let links = known.iter().flatten().any(is_link);
-    let stations = known.iter().flatten().any(is_station);
-    let kinds = [
-        (links, "bytes of a ring"),
-        (stations, "telegrams of a shared line"),
-        (!reader.frames.is_empty(), "frames of CAN"),
-    ];
-    let mixed: Vec<_> = kinds.iter().filter(|own| own.0).map(|own| own.1).collect();
-    if let [one, other, ..] = mixed.as_slice() {
-        return Err(CaptureError::Link {
-            place: "the capture".to_owned(),
-            what: format!("it has {one} and {other}: write them into two files"),
-        });
-    }
-    if stations {
-        let own = known.iter().flatten();
-        let senders = own.clone().filter_map(|own| match own.carries {
-            Carries::Station(station) => Some(station),
-            Carries::Link(..) | Carries::Frames(_) => None,
-        });
-        let octet = own.clone().find_map(|own| own.octet);
-        return Ok(telegrams::assemble(
-            senders,
-            reader.octets,
-            octet.unwrap_or(OCTET),
-        ));
-    }
-    if !links {
-        return Ok(assemble(reader.frames, reader.bit_rate));
+    let carries = |part: usize| {
+        let of = |own: &Byte| {
+            let interface = reader.interfaces.get(own.interface);
+            interface.is_some_and(|own| own.as_ref().is_some_and(|own| own.part == part))
+        };
+        reader.octets.iter().any(|own| own.0 == part)
+            || reader.frames.iter().any(|own| own.0 == part)
+            || reader.found.iter().any(of)
+    };
+    let wanted = chosen(&reader.parts, carries, links)?;
+    let known = reader.interfaces;
+    let of_part = || known.iter().flatten().filter(|own| own.part == wanted);
+    let octet = of_part().find_map(|own| own.octet).unwrap_or(OCTET);
+    let octets = reader.octets.into_iter().filter(|own| own.0 == wanted);
+    match &reader.parts[wanted] {
+        Part::Ring => {}
+        Part::Stations => {
+            let senders = of_part().filter_map(|own| match own.carries {
+                Carries::Station(station) => Some(station),
+                Carries::Link(..) | Carries::Frames(_) | Carries::Line => None,
+            });
+            let octets = octets.map(|(_, from, own)| (from, own)).collect();
+            return Ok(telegrams::assemble(senders, octets, octet));
+        }
+        Part::Line(_) => {
+            let mut octets: Vec<_> = octets.map(|(_, _, own)| own).collect();
+            octets.sort_by_key(|own| own.nanos);
+            let senders = buses::senders(&octets, octet);
+            let sent = senders.into_iter().zip(octets).collect();
+            return Ok(telegrams::assemble(std::iter::empty(), sent, octet));
+        }
+        Part::Senders | Part::Frames(_) => {
+            let frames = reader.frames.into_iter().filter(|own| own.0 == wanted);
+            let frames = frames.map(|(_, own)| own).collect();
+            return Ok(assemble(frames, reader.bit_rate));
+        }
     }
     let byte_time = rate.or(reader.speed).unwrap_or_default().byte_time();
     let first = reader.found.iter().map(|byte| byte.nanos).min();
@@ -119,7 +145,7 @@ pub(super) fn finish(reader: Reader<'_>, rate: Option<Rate>) -> Result<Capture, 
     let mut assembly = Assembly::default();
     let link = |interface: &Option<Interface>| match interface.as_ref()?.carries {
         Carries::Link(ring, from, to) => Some((ring, from, to)),
-        Carries::Frames(_) | Carries::Station(_) => None,
+        Carries::Frames(_) | Carries::Station(_) | Carries::Line => None,
     };
     for (ring, from, to) in known.iter().filter_map(link) {
         assembly.link(ring, from, to);
@@ -154,8 +180,11 @@ pub(super) struct Reader<'b> {
     speed: Option<Rate>,
     bit_rate: Option<BitRate>,
     found: Vec<Byte>,
-    octets: Vec<(Option<u8>, PacketOctet)>,
-    frames: Vec<FrameRead>,
+    /// Octets with the number of their part and their station.
+    octets: Vec<(usize, Option<u8>, PacketOctet)>,
+    /// Frames with the number of their part.
+    frames: Vec<(usize, FrameRead)>,
+    parts: Vec<Part>,
 }
 
 impl<'b> Reader<'b> {
@@ -171,7 +200,17 @@ impl<'b> Reader<'b> {
             found: Vec::new(),
             octets: Vec::new(),
             frames: Vec::new(),
+            parts: Vec::new(),
         }
+    }
+
+    /// The number of a part.
+    fn part(&mut self, part: Part) -> usize {
+        let known = self.parts.iter().position(|own| *own == part);
+        known.unwrap_or_else(|| {
+            self.parts.push(part);
+            self.parts.len() - 1
+        })
     }
 
     pub(super) fn wrong<T>(
@@ -346,13 +385,20 @@ impl<'b> Reader<'b> {
     ) -> Result<(), CaptureError> {
         if link_type == pcapng_frames::LINK_TYPE {
             let name = name.map_or("".into(), |own| own.1);
-            let carries = Carries::Frames(Sender::named(name.trim_end_matches('\0')));
+            let name = name.trim_end_matches('\0');
+            let sender = Sender::named(name);
+            let part = self.part(match sender {
+                Sender::Known(_) => Part::Senders,
+                Sender::ByIdentifier => Part::Frames(name.to_owned()),
+            });
+            let carries = Carries::Frames(sender);
             let bits = speed.and_then(|speed| u32::try_from(speed).ok());
             self.bit_rate = self
                 .bit_rate
                 .or(bits.and_then(BitRate::from_bits_per_second));
             self.interfaces.push(Some(Interface {
                 carries,
+                part,
                 resolution,
                 offset,
                 octet: None,
@@ -368,19 +414,27 @@ impl<'b> Reader<'b> {
         let text = text.trim_end_matches('\0');
         let link = ends(text).map(|(ring, from, to)| Carries::Link(ring, from, to));
         let alone = || station(text).map(Carries::Station);
-        let Some(carries) = link.or_else(alone) else {
+        let line = || text.starts_with(LINE).then_some(Carries::Line);
+        let Some(carries) = link.or_else(alone).or_else(line) else {
             let text: String = text.chars().take(40).collect();
             return self.wrong(
                 from,
                 format!(
-                    "{text:?} is neither a link of a ring nor a station: master->K, K->K-1, 0->master, master or slave N is expected"
+                    "{text:?} is neither a link of a ring nor a station: master->K, K->K-1, 0->master, master, slave N or bus is expected"
                 ),
             );
         };
         let known = speed.and_then(|speed| u32::try_from(speed).ok());
         self.speed = self.speed.or(known.and_then(Rate::from_bits_per_second));
+        let part = match carries {
+            Carries::Link(..) => Part::Ring,
+            Carries::Station(_) | Carries::Frames(_) => Part::Stations,
+            Carries::Line => Part::Line(text.to_owned()),
+        };
+        let part = self.part(part);
         self.interfaces.push(Some(Interface {
             carries,
+            part,
             resolution,
             offset,
             octet: speed.and_then(octet_time),
@@ -417,15 +471,22 @@ impl<'b> Reader<'b> {
             return Ok(());
         };
         if let Carries::Frames(sender) = known.carries {
-            return self.frame((data, captured, end), nanos, sender);
+            let part = known.part;
+            return self.frame((data, captured, end), (part, nanos), sender);
         }
         if captured < HEADER || captured > end - data.min(end) {
             return self.wrong(data, format!("a packet of {captured} bytes: at least the {HEADER} of its header, and at most its block, are expected"));
         }
         let event = self.bytes[data + 8];
         let payload = data + HEADER..data + captured;
-        if let Carries::Station(from) = known.carries {
+        let station = match known.carries {
+            Carries::Station(from) => Some(from),
+            Carries::Line => Some(None),
+            Carries::Link(..) | Carries::Frames(_) => None,
+        };
+        if let Some(from) = station {
             let octet = known.octet.unwrap_or(OCTET);
+            let from = (known.part, from);
             return self.telegram((data, captured, end), (from, nanos), octet);
         }
         let mut comment = None;
@@ -443,7 +504,7 @@ impl<'b> Reader<'b> {
     fn telegram(
         &mut self,
         (data, captured, end): (usize, usize, usize),
-        (from, nanos): (Option<u8>, u64),
+        ((part, from), nanos): ((usize, Option<u8>), u64),
         octet: Span,
     ) -> Result<(), CaptureError> {
         let event = self.bytes[data + 8];
@@ -465,7 +526,7 @@ impl<'b> Reader<'b> {
         match octets((event, nanos), arrived, &comment, octet) {
             Ok(octets) => self
                 .octets
-                .extend(octets.into_iter().map(|own| (from, own))),
+                .extend(octets.into_iter().map(|own| (part, from, own))),
             Err(what) => return self.wrong(data + 8, what),
         }
         Ok(())
@@ -475,7 +536,7 @@ impl<'b> Reader<'b> {
     fn frame(
         &mut self,
         (data, captured, end): (usize, usize, usize),
-        nanos: u64,
+        (part, nanos): (usize, u64),
         sender: Sender,
     ) -> Result<(), CaptureError> {
         if captured > end - data.min(end) {
@@ -497,11 +558,14 @@ impl<'b> Reader<'b> {
             Ok(found) => found,
             Err(what) => return self.wrong(data, what),
         };
-        self.frames.extend(found.map(|(frame, ended)| FrameRead {
-            nanos,
-            sender,
-            frame,
-            ended,
+        self.frames.extend(found.map(|(frame, ended)| {
+            let read = FrameRead {
+                nanos,
+                sender,
+                frame,
+                ended,
+            };
+            (part, read)
         }));
         Ok(())
     }
@@ -561,65 +625,5 @@ impl<'b> Reader<'b> {
             }
         }
         Ok(())
-    }
-}
-
-/// What the transmitter sent, where a comment says so: `sent 12`, `sent nothing`.
-fn sent(comment: &[u8]) -> Option<Option<u8>> {
-    match comment.strip_prefix(b"sent ")? {
-        b"nothing" => Some(None),
-        [high, low] => {
-            let digit = |c: u8| {
-                char::from(c)
-                    .to_digit(16)
-                    .and_then(|d| u8::try_from(d).ok())
-            };
-            Some(Some(digit(*high)? << 4 | digit(*low)?))
-        }
-        _ => None,
-    }
-}
-
-/// A time in nanoseconds; `None` where it is out of all range. A resolution is a power of 10, or of 2 with its high bit set.
-pub(super) fn nanoseconds(ticks: u64, resolution: u8, offset: i64) -> Option<u64> {
-    const SECOND: u128 = 1_000_000_000;
-    // The most nanoseconds that an `Instant` can hold.
-    const MOST: u128 = u64::MAX as u128 / 4;
-    let ticks = u128::from(ticks);
-    let nanos = if resolution == NANOSECONDS {
-        ticks
-    } else if resolution & 0x80 == 0 {
-        ticks.checked_mul(SECOND)? / 10_u128.checked_pow(u32::from(resolution))?
-    } else {
-        ticks
-            .checked_mul(SECOND)?
-            .checked_shr(u32::from(resolution & 0x7F))?
-    };
-    let offset = i128::from(offset) * 1_000_000_000;
-    let nanos = i128::try_from(nanos).ok()?.checked_add(offset)?;
-    let nanos = u128::try_from(nanos).ok()?;
-    (nanos <= MOST).then(|| u64::try_from(nanos).ok())?
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn resolutions() {
-        assert_eq!(nanoseconds(1_500, 6, 0), Some(1_500_000));
-        assert_eq!(nanoseconds(1_500, 9, 2), Some(2_000_001_500));
-        assert_eq!(nanoseconds(1 << 20, 0x80 | 20, 0), Some(1_000_000_000));
-        assert_eq!(nanoseconds(5, 9, -1), None);
-        assert_eq!(nanoseconds(u64::MAX, 0, 0), None);
-        assert_eq!(nanoseconds(1, 127, 0), None);
-    }
-
-    #[test]
-    fn comments() {
-        assert_eq!(sent(b"sent 1f"), Some(Some(0x1F)));
-        assert_eq!(sent(b"sent nothing"), Some(None));
-        assert_eq!(sent(b"sent 1"), None);
-        assert_eq!(sent(b"look at this"), None);
     }
 }

@@ -1,21 +1,55 @@
 //! Captures in pcapng that are written as they come: whole after each write, also where the program is killed.
 
-use crate::report::pcapng::{
-    Block, COMMENT, END, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, NANOSECONDS, PACKET,
-    header, packet,
-};
-use harness_proto::line::Rate;
+use crate::report::pcapng::{Block, COMMENT, END, LINK_TYPE, PACKET, header, packet};
+use crate::report::pcapng_telegrams::{self, MOST, octet_time};
+use crate::report::{pcapng_frames, pcapng_telegrams::RECEIVED};
 use harness_proto::time::{Instant, Span};
-use harness_sim::record::LineByte;
+use harness_sim::record::{LineByte, LineFrame};
 use std::io::{self, Write};
 
 /// The event of a packet without a byte: a change of the state of the line.
 const STATE: u8 = 0x00;
 
-/// A capture that is being written: an interface a link, a packet a byte.
+/// What an interface of a capture carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Carries {
+    /// The octets of a link of a ring.
+    Link,
+    /// The octets of a line that stations share.
+    Line,
+    /// Frames.
+    Frames,
+}
+
+/// An interface of a capture that is being written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct RecordedPlace {
+    /// Its name: a link such as `98->97`, or that of a bus.
+    pub(crate) name: String,
+    /// What it carries.
+    pub(crate) carries: Carries,
+    /// Bits a second.
+    pub(crate) bits_per_second: u32,
+}
+
+/// What was heard at a place; times count from 1970.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Piece {
+    /// An octet of a link.
+    Octet(LineByte),
+    /// Octets of a shared line that followed each other, and the station that sent them; `None` is a master.
+    Telegram(Option<u8>, Vec<LineByte>),
+    /// A frame.
+    Frame(LineFrame),
+    /// Something else that happened, in words: nanoseconds, and the words.
+    Event(u64, String),
+}
+
+/// A capture that is being written: an interface a place, a packet an octet of a ring, a telegram or a frame.
 pub(crate) struct LiveRecorder<W> {
     out: W,
     block: Block,
+    places: Vec<RecordedPlace>,
     /// Blocks that are not written yet: they leave in one piece.
     waiting: Vec<u8>,
     /// Bytes written.
@@ -23,55 +57,63 @@ pub(crate) struct LiveRecorder<W> {
 }
 
 impl<W: Write> LiveRecorder<W> {
-    /// Begins a capture of these links.
+    /// Begins a capture of these places.
     ///
     /// # Errors
     /// Those of `out`.
-    pub(crate) fn start(out: W, links: &[String], rate: Rate) -> io::Result<Self> {
+    pub(crate) fn start(out: W, places: &[RecordedPlace]) -> io::Result<Self> {
         let mut own = Self {
             out,
             block: Block::default(),
+            places: places.to_vec(),
             waiting: Vec::new(),
             written: 0,
         };
         own.block.section(&mut own.waiting)?;
-        for link in links {
-            own.block.begin(INTERFACE);
-            own.block.put(&LINK_TYPE.to_le_bytes());
-            own.block.put(&[0; 6]);
-            own.block.option(IF_NAME, link.as_bytes());
-            let speed = u64::from(rate.bits_per_second());
-            own.block.option(IF_SPEED, &speed.to_le_bytes());
-            own.block.option(IF_TSRESOL, &[NANOSECONDS]);
-            own.block.option(END, &[]);
+        for place in places {
+            let link_type = match place.carries {
+                Carries::Link | Carries::Line => LINK_TYPE,
+                Carries::Frames => pcapng_frames::LINK_TYPE,
+            };
+            let speed = u64::from(place.bits_per_second);
+            own.block.interface(link_type, &place.name, Some(speed));
             own.block.end(&mut own.waiting)?;
         }
         own.flush()?;
         Ok(own)
     }
 
-    /// A byte of a link; its time counts from 1970.
+    /// Keeps what was heard at the place with this number.
     ///
     /// # Errors
     /// None: blocks are kept until [`flush`](Self::flush).
-    pub(crate) fn byte(&mut self, link: usize, byte: &LineByte) -> io::Result<()> {
-        packet(&mut self.block, link, byte);
-        self.block.end(&mut self.waiting)
-    }
-
-    /// Something that happened to a link beside its bytes, in words.
-    ///
-    /// # Errors
-    /// None: blocks are kept until [`flush`](Self::flush).
-    pub(crate) fn event(&mut self, link: usize, nanos: u64, words: &str) -> io::Result<()> {
-        let at = Instant::START + Span::from_nanos(nanos);
-        self.block.begin(PACKET);
-        let link = u32::try_from(link).unwrap_or(u32::MAX);
-        self.block.put(&link.to_le_bytes());
-        header(&mut self.block, at, STATE, 0);
-        self.block.option(COMMENT, words.as_bytes());
-        self.block.option(END, &[]);
-        self.block.end(&mut self.waiting)
+    pub(crate) fn piece(&mut self, place: usize, piece: &Piece) -> io::Result<()> {
+        let (block, out) = (&mut self.block, &mut self.waiting);
+        let own = self.places.get(place);
+        match piece {
+            Piece::Octet(byte) => packet(block, place, byte),
+            Piece::Telegram(_, octets) => {
+                let octet = own.and_then(|own| octet_time(own.bits_per_second.into()));
+                for part in octets.chunks(MOST) {
+                    pcapng_telegrams::packet(block, (place, RECEIVED), part, octet);
+                    block.end(out)?;
+                }
+                return Ok(());
+            }
+            Piece::Frame(frame) => pcapng_frames::packet(block, place, frame),
+            Piece::Event(nanos, words) if own.is_some_and(|own| own.carries == Carries::Frames) => {
+                pcapng_frames::event(block, place, *nanos, words);
+            }
+            Piece::Event(nanos, words) => {
+                block.begin(PACKET);
+                let place = u32::try_from(place).unwrap_or(u32::MAX);
+                block.put(&place.to_le_bytes());
+                header(block, Instant::START + Span::from_nanos(*nanos), STATE, 0);
+                block.option(COMMENT, words.as_bytes());
+                block.option(END, &[]);
+            }
+        }
+        block.end(out)
     }
 
     /// Writes what waits, in one piece.

@@ -8,9 +8,10 @@ use super::capture::{listen_into, taps_of};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use crate::capture::LiveRecorder;
+use crate::capture::{Carries, LiveRecorder, Piece, RecordedPlace};
 use crate::library::{Entry, sources};
 use crate::report::pcapng::{LINK_TYPE, name};
+use crate::report::pcapng_frames;
 use crate::report::walk::in_time;
 use crate::rig::find::{self, find};
 use crate::scenario::run::AtMismatch;
@@ -100,9 +101,7 @@ pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Re
             ));
             return Ok(Exit::Usage);
         }
-        Some(_) if arguments.extcap_dlts => output.result(&format!(
-            "dlt {{number={LINK_TYPE}}}{{name=RTAC_SERIAL}}{{display=Serial lines}}\n"
-        ))?,
+        Some(own) if arguments.extcap_dlts => output.result(&link_types(own))?,
         Some(own) if arguments.extcap_config => output.result(config(own))?,
         Some(own) if arguments.capture => return capture(own, arguments, output),
         _ => {
@@ -130,7 +129,7 @@ fn interfaces() -> String {
     );
     for (name, place) in find::all(&find::folder()) {
         let rig = place.source().ok().and_then(|own| find::read(&own).ok());
-        if rig.is_some_and(|own| !own.file.tap.is_empty()) {
+        if rig.is_some_and(|own| taps_of(&own).is_ok()) {
             let name = field(&name);
             // Writing to a String cannot fail.
             let _infallible = writeln!(
@@ -140,6 +139,18 @@ fn interfaces() -> String {
         }
     }
     text
+}
+
+/// The link type of an interface: that of frames, where a rig has a CAN adapter.
+fn link_types(interface: &str) -> String {
+    let rig = interface.strip_prefix(RIG);
+    let rig = rig.and_then(|name| find(name, &find::folder()).ok());
+    let frames = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
+    let (number, name, display) = match frames {
+        true => (pcapng_frames::LINK_TYPE, "CAN_SOCKETCAN", "CAN frames"),
+        false => (LINK_TYPE, "RTAC_SERIAL", "Serial lines"),
+    };
+    format!("dlt {{number={number}}}{{name={name}}}{{display={display}}}\n")
 }
 
 /// The options of an interface.
@@ -213,13 +224,18 @@ fn play_into(pipe: &File, traces: &[Trace], rate: harness_proto::line::Rate) -> 
     let numbered = traces.iter().enumerate();
     let names =
         numbered.flat_map(|(ring, own)| own.channels.iter().map(move |link| name(ring, link)));
-    let names: Vec<String> = names.collect();
+    let places = names.map(|name| RecordedPlace {
+        name,
+        carries: Carries::Link,
+        bits_per_second: rate.bits_per_second(),
+    });
+    let places: Vec<_> = places.collect();
     let all: Vec<Channel> = traces
         .iter()
         .flat_map(|own| own.channels.iter().cloned())
         .collect();
     let failed = |error: &io::Error| format!("failed to write to the pipe: {error}");
-    let mut recorder = match LiveRecorder::start(pipe, &names, rate) {
+    let mut recorder = match LiveRecorder::start(pipe, &places) {
         Ok(own) => own,
         Err(error) => return closed(&error).ok_or_else(|| failed(&error)),
     };
@@ -264,7 +280,7 @@ fn once(
             break;
         }
         let at = byte.at + Span::from_nanos(wall);
-        recorder.byte(place, &LineByte { at, ..byte })?;
+        recorder.piece(place, &Piece::Octet(LineByte { at, ..byte }))?;
     }
     recorder.flush()
 }

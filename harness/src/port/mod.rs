@@ -22,7 +22,7 @@ mod wire;
 
 pub use last_words::{LastWords, Unsaid};
 pub use open::{Endpoint, OpenError, PortSettings, open, open_adapter};
-pub use tap::{SilentTap, TapState};
+pub use tap::{PortCounts, SilentTap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
 
 use rustix::thread::set_current_timer_slack;

@@ -6,7 +6,7 @@
 //! and a byte that arrives between open and raw mode may be echoed. So a tap's TX and RTS are not to be wired.
 
 use super::open::OpenError;
-use harness_proto::line::{LineError, Rate, Received};
+use harness_proto::line::{Format, LineError, Parity, Received};
 use harness_proto::marks::Unmark;
 use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::io::Errno;
@@ -50,7 +50,7 @@ impl SilentTap {
     ///
     /// # Errors
     /// [`OpenError`]; a mode that the port does not take is one.
-    pub fn open(path: &Path, rate: Rate, marks: bool) -> Result<Self, OpenError> {
+    pub fn open(path: &Path, format: Format, marks: bool) -> Result<Self, OpenError> {
         let of = |error: Errno| OpenError::of(path, &error.into());
         let flags = OFlags::RDONLY | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(of)?;
@@ -66,7 +66,7 @@ impl SilentTap {
         let device = rustix::fs::fstat(&fd).map_err(of)?;
         // Major numbers 136 to 143 are the slave ends of pseudo terminals (Documentation/admin-guide/devices.txt).
         let pty = (136..=143).contains(&rustix::fs::major(device.st_rdev));
-        let mode = silent(&before, rate, pty);
+        let mode = silent(&before, format, pty);
         let set = |what: &str| OpenError::Setting {
             port: name.clone(),
             what: what.to_owned(),
@@ -83,13 +83,20 @@ impl SilentTap {
         if let Some(what) = speaks(&now) {
             return Err(set(what));
         }
-        let control = ControlModes::PARENB | ControlModes::PARODD | ControlModes::CS8;
-        let listening = now.control_modes.contains(control)
-            && now
-                .input_modes
-                .contains(InputModes::INPCK | InputModes::PARMRK);
-        if !pty && !listening {
-            return Err(set("8O1 with marked line errors (INPCK and PARMRK)"));
+        if !pty && !listens(&now, &mode) {
+            let Format {
+                bits_per_second,
+                parity,
+                stop_bits,
+            } = format;
+            let parity = match parity {
+                Parity::None => 'N',
+                Parity::Odd => 'O',
+                Parity::Even => 'E',
+            };
+            return Err(set(&format!(
+                "{bits_per_second} 8{parity}{stop_bits} with marked line errors (INPCK and PARMRK)"
+            )));
         }
         rustix::termios::ioctl_tiocexcl(&tap.fd).map_err(of)?;
         Ok(tap)
@@ -130,14 +137,14 @@ impl SilentTap {
         }
     }
 
-    /// Bytes that the kernel has sent at this port so far; `None` where it does not count them for us.
+    /// What the kernel has counted at this port so far; `None` where it does not count for us.
     #[must_use]
-    pub fn transmitted(&self) -> Option<u64> {
+    pub fn counts(&self) -> Option<PortCounts> {
         let path = std::fs::canonicalize(&self.path).ok()?;
         let number = path.to_str()?.strip_prefix("/dev/ttyS")?;
         // Only root may read it.
         let table = std::fs::read_to_string("/proc/tty/driver/serial").ok()?;
-        transmitted(&table, number)
+        counts(&table, number)
     }
 }
 
@@ -147,19 +154,35 @@ impl AsFd for SilentTap {
     }
 }
 
-/// The count of a port in the table of the kernel's driver: `0: uart:16550A port:000003F8 irq:4 tx:11 rx:0`.
-fn transmitted(table: &str, number: &str) -> Option<u64> {
+/// What the kernel has counted at a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PortCounts {
+    /// Bytes sent.
+    pub sent: u64,
+    /// Bytes lost because the port's queue was full.
+    pub overruns: u64,
+}
+
+/// The counts of a port in the table of the kernel's driver: `0: uart:16550A port:000003F8 irq:4 tx:11 rx:0 oe:2`; counts of 0 are left out
+/// but those of bytes.
+fn counts(table: &str, number: &str) -> Option<PortCounts> {
     let line = table
         .lines()
         .find_map(|line| line.strip_prefix(number)?.strip_prefix(':'))?;
-    let count = line
-        .split_whitespace()
-        .find_map(|own| own.strip_prefix("tx:"))?;
-    count.parse().ok()
+    let count = |name: &str| {
+        let count = line
+            .split_whitespace()
+            .find_map(|own| own.strip_prefix(name));
+        count?.parse().ok()
+    };
+    Some(PortCounts {
+        sent: count("tx:")?,
+        overruns: count("oe:").unwrap_or(0),
+    })
 }
 
-/// The mode of a tap: nothing is sent by itself, and 8O1 with every line error marked.
-fn silent(before: &Termios, rate: Rate, pty: bool) -> Termios {
+/// The mode of a tap: nothing is sent by itself, and every line error is marked.
+fn silent(before: &Termios, format: Format, pty: bool) -> Termios {
     let mut mode = before.clone();
     mode.make_raw();
     mode.local_modes -=
@@ -172,11 +195,29 @@ fn silent(before: &Termios, rate: Rate, pty: bool) -> Termios {
     mode.control_modes |= ControlModes::CREAD | ControlModes::CLOCAL | ControlModes::CS8;
     if !pty {
         mode.input_modes |= InputModes::INPCK | InputModes::PARMRK;
-        mode.control_modes |= ControlModes::PARENB | ControlModes::PARODD;
+        mode.control_modes -= ControlModes::PARENB | ControlModes::PARODD;
+        mode.control_modes |= match format.parity {
+            Parity::None => ControlModes::empty(),
+            Parity::Odd => ControlModes::PARENB | ControlModes::PARODD,
+            Parity::Even => ControlModes::PARENB,
+        };
+        mode.control_modes
+            .set(ControlModes::CSTOPB, format.stop_bits > 1);
         // A rate that the port cannot have shows when the mode is read back.
-        let _read_back = mode.set_speed(rate.bits_per_second());
+        let _read_back = mode.set_speed(format.bits_per_second);
     }
     mode
+}
+
+/// Whether a port has the mode that a line needs; its rate may differ by a fiftieth, as the clocks of adapters do.
+fn listens(now: &Termios, wanted: &Termios) -> bool {
+    let control =
+        ControlModes::PARENB | ControlModes::PARODD | ControlModes::CSTOPB | ControlModes::CSIZE;
+    let marks = InputModes::INPCK | InputModes::PARMRK;
+    let (speed, right) = (now.input_speed(), wanted.input_speed());
+    now.control_modes & control == wanted.control_modes & control
+        && now.input_modes.contains(marks)
+        && speed.abs_diff(right) <= right / 50
 }
 
 /// The first flag with which a port answers by itself what it receives.
@@ -206,6 +247,12 @@ fn speaks(mode: &Termios) -> Option<&'static str> {
 mod tests {
     use super::*;
     use rustix::pty::OpenptFlags;
+
+    const FORMAT: Format = Format {
+        bits_per_second: 38_400,
+        parity: Parity::Odd,
+        stop_bits: 1,
+    };
 
     /// The master end of a pseudo terminal in its default mode, which echoes, and the path of its slave end.
     fn terminal() -> (OwnedFd, PathBuf) {
@@ -239,7 +286,7 @@ mod tests {
             found.local_modes.contains(LocalModes::ECHO)
                 && found.input_modes.contains(InputModes::IXON)
         );
-        let mut tap = SilentTap::open(&path, Rate::Baud38400, false).expect("a tap");
+        let mut tap = SilentTap::open(&path, FORMAT, false).expect("a tap");
         assert!(
             rustix::io::write(&tap, b"x").is_err(),
             "it is open for reading only"
@@ -252,8 +299,8 @@ mod tests {
         let heard: Vec<_> = heard.iter().map(|own| own.byte).collect();
         assert_eq!(heard, sent);
         assert!(!arrives(&master, 200), "an echo");
-        assert_eq!(tap.transmitted(), None);
-        let second = SilentTap::open(&path, Rate::Baud38400, false);
+        assert_eq!(tap.counts(), None);
+        let second = SilentTap::open(&path, FORMAT, false);
         assert!(matches!(second, Err(OpenError::InUse(_))));
         drop(tap);
         let now = rustix::termios::tcgetattr(&master).expect("a mode");
@@ -273,7 +320,7 @@ mod tests {
     #[test]
     fn marks_and_the_end() {
         let (master, path) = terminal();
-        let mut tap = SilentTap::open(&path, Rate::Baud38400, true).expect("a tap");
+        let mut tap = SilentTap::open(&path, FORMAT, true).expect("a tap");
         rustix::io::write(&master, &[0x12, 0xFF, 0, 0x13, 0xFF, 0xFF, 0xFF, 0, 0]).expect("sent");
         let mut heard = Vec::new();
         assert!(arrives(&tap, 5_000));
@@ -293,7 +340,7 @@ mod tests {
     #[test]
     fn each_flag_that_speaks_is_refused() {
         let (_master, path) = terminal();
-        let tap = SilentTap::open(&path, Rate::Baud38400, false).expect("a tap");
+        let tap = SilentTap::open(&path, FORMAT, false).expect("a tap");
         let mode = rustix::termios::tcgetattr(&tap).expect("a mode");
         assert_eq!(speaks(&mode), None);
         let mut echo = mode.clone();
@@ -310,11 +357,36 @@ mod tests {
         );
     }
 
+    /// Both parities of the buses, and a rate that the adapter does not have.
+    #[test]
+    fn the_mode_is_read_back() {
+        let (_master, path) = terminal();
+        let tap = SilentTap::open(&path, FORMAT, false).expect("a tap");
+        let before = rustix::termios::tcgetattr(&tap).expect("a mode");
+        let even = Format {
+            bits_per_second: 500_000,
+            parity: Parity::Even,
+            stop_bits: 1,
+        };
+        let [odd, even] = [FORMAT, even].map(|format| silent(&before, format, false));
+        assert!(listens(&odd, &odd) && listens(&even, &even));
+        assert!(!listens(&odd, &even) && !listens(&before, &odd));
+        let mut slow = even.clone();
+        slow.set_speed(460_800).expect("a rate");
+        assert!(!listens(&slow, &even));
+        let mut near = even.clone();
+        near.set_speed(499_712).expect("a rate");
+        assert!(listens(&near, &even));
+    }
+
     #[test]
     fn the_kernel_counts() {
-        let table = "serinfo:1.0 driver revision:\n0: uart:16550A port:000003F8 irq:4 tx:11 rx:0\n10: uart:unknown port:00000000 irq:0\n";
-        assert_eq!(transmitted(table, "0"), Some(11));
-        assert_eq!(transmitted(table, "10"), None);
-        assert_eq!(transmitted(table, "1"), None);
+        let table = "serinfo:1.0 driver revision:\n0: uart:16550A port:000003F8 irq:4 tx:11 rx:0\n\
+                     1: uart:16550A port:000002F8 irq:3 tx:0 rx:900 oe:2 RTS|DTR\n10: uart:unknown port:00000000 irq:0\n";
+        let counted = |sent, overruns| Some(PortCounts { sent, overruns });
+        assert_eq!(counts(table, "0"), counted(11, 0));
+        assert_eq!(counts(table, "1"), counted(0, 2));
+        assert_eq!(counts(table, "10"), None);
+        assert_eq!(counts(table, "2"), None);
     }
 }

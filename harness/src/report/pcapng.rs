@@ -63,14 +63,8 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
     let mut links: Vec<Channel> = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
         for link in &trace.channels {
-            block.begin(INTERFACE);
-            block.put(&LINK_TYPE.to_le_bytes());
-            block.put(&[0; 6]);
-            block.option(IF_NAME, name(ring, link).as_bytes());
             let speed = u64::from(rate.bits_per_second());
-            block.option(IF_SPEED, &speed.to_le_bytes());
-            block.option(IF_TSRESOL, &[NANOSECONDS]);
-            block.option(END, &[]);
+            block.interface(LINK_TYPE, &name(ring, link), Some(speed));
             block.end(&mut out)?;
         }
         if traces.len() > 1 {
@@ -151,6 +145,19 @@ impl Block {
         self.option(USER_APPLICATION, b"drivebench");
         self.option(END, &[]);
         self.end(out)
+    }
+
+    /// Begins an interface: its link type, its name and, where it is known, its bit rate. Its times are in nanoseconds.
+    pub(crate) fn interface(&mut self, link_type: u16, name: &str, speed: Option<u64>) {
+        self.begin(INTERFACE);
+        self.put(&link_type.to_le_bytes());
+        self.put(&[0; 6]);
+        self.option(IF_NAME, name.as_bytes());
+        if let Some(speed) = speed {
+            self.option(IF_SPEED, &speed.to_le_bytes());
+        }
+        self.option(IF_TSRESOL, &[NANOSECONDS]);
+        self.option(END, &[]);
     }
 
     pub(crate) fn begin(&mut self, kind: u32) {

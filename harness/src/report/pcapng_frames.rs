@@ -11,9 +11,7 @@
 //! and a comment that names the frame which it ended: `error-frame 201#3D4000`. A frame that no station has got has the comment `lost`.
 //! So nothing of the frames of a trace is lost, and [`crate::capture`] reads them back.
 
-use super::pcapng::{
-    Block, COMMENT, END, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, NANOSECONDS, PACKET,
-};
+use super::pcapng::{Block, COMMENT, END, PACKET};
 use crate::frames::socketcand::class;
 pub(crate) use crate::frames::socketcand::flag::{ERROR, EXTENDED, REMOTE};
 use harness_proto::can::{BitRate, BusError, MAX_DATA};
@@ -55,18 +53,11 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let senders: Vec<Option<u8>> = std::iter::once(None)
         .chain(senders.into_iter().flatten().map(Some))
         .collect();
+    let rate = frames.iter().find_map(|own| rate_of(own));
+    let speed = rate.map(|own| u64::from(own.bits_per_second()));
     for sender in &senders {
         let name = sender.map_or(MASTER.to_owned(), |drive| format!("{DRIVE}{drive}"));
-        block.begin(INTERFACE);
-        block.put(&LINK_TYPE.to_le_bytes());
-        block.put(&[0; 6]);
-        block.option(IF_NAME, name.as_bytes());
-        if let Some(rate) = frames.iter().find_map(|own| rate_of(own)) {
-            let speed = u64::from(rate.bits_per_second());
-            block.option(IF_SPEED, &speed.to_le_bytes());
-        }
-        block.option(IF_TSRESOL, &[NANOSECONDS]);
-        block.option(END, &[]);
+        block.interface(LINK_TYPE, &name, speed);
         block.end(&mut out)?;
     }
     for own in frames {
@@ -94,7 +85,8 @@ pub(crate) fn rate_of(own: &LineFrame) -> Option<BitRate> {
     rates.find(|rate| own.ended == FrameEnd::Good && fits(rate))
 }
 
-fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
+/// The packet of a frame that the sender with this number sent.
+pub(crate) fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
     let frame = &own.frame;
     let mut data = [0; HEADER + MAX_DATA];
     let mut id = frame.id().number();
@@ -119,8 +111,19 @@ fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
     }
     data[..4].copy_from_slice(&id.to_be_bytes());
     data[4] = len as u8;
-    let data = &data[..HEADER + len];
     let nanos = own.at.since_start().as_nanos();
+    raw(block, interface, nanos, &data[..HEADER + len], comment);
+}
+
+/// The packet of an error frame of which is not known what it ended, or of something else that happened, in words.
+pub(crate) fn event(block: &mut Block, interface: usize, nanos: u64, words: &str) {
+    let mut data = [0; HEADER + MAX_DATA];
+    data[..4].copy_from_slice(&(ERROR | class::BUS_ERROR).to_be_bytes());
+    data[4] = MAX_DATA as u8;
+    raw(block, interface, nanos, &data, Some(words.to_owned()));
+}
+
+fn raw(block: &mut Block, interface: usize, nanos: u64, data: &[u8], comment: Option<String>) {
     let length = u32::try_from(data.len()).unwrap_or(0);
     block.begin(PACKET);
     block.put(&u32::try_from(interface).unwrap_or(0).to_le_bytes());

@@ -12,10 +12,7 @@
 //! `byte 3 sent nothing`, `byte 3 lost` for an octet that did not arrive, and `byte 3 after 50000 ns` for the time from the end of the octet before it.
 //! So nothing of the octets of a trace is lost, and [`crate::capture`] reads them back.
 
-use super::pcapng::{
-    Block, COMMENT, END, ERRORS, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST,
-    NANOSECONDS, PACKET, header,
-};
+use super::pcapng::{Block, COMMENT, END, ERRORS, LINK_TYPE, LOST, PACKET, header};
 use harness_proto::line::{BITS_PER_BYTE, LineError};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
@@ -25,14 +22,14 @@ use std::io::Write;
 
 /// The events of the last octet of a telegram that the master sent, and that it received.
 const SENT: u8 = 0x03;
-const RECEIVED: u8 = 0x04;
+pub(crate) const RECEIVED: u8 = 0x04;
 /// Events with the time of the first octet, in captures of others.
 const BEGUN: [u8; 2] = [0x01, 0x02];
 /// The name of the interface of the master, and what stands in front of a slave's address.
 const MASTER: &str = "master";
 const SLAVE: &str = "slave ";
 /// The most octets of a packet: what a station sends without a pause is cut behind them.
-const MOST: usize = 255;
+pub(crate) const MOST: usize = 255;
 /// Times that are as near as this are the same: they are cut off to nanoseconds.
 const NEAR: Span = Span::from_nanos(1);
 
@@ -61,36 +58,35 @@ pub(crate) fn write(
     let senders: Vec<Option<u8>> = senders.collect();
     for sender in &senders {
         let name = sender.map_or(MASTER.to_owned(), |slave| format!("{SLAVE}{slave}"));
-        block.begin(INTERFACE);
-        block.put(&LINK_TYPE.to_le_bytes());
-        block.put(&[0; 6]);
-        block.option(IF_NAME, name.as_bytes());
-        if let Some(speed) = bits_per_second {
-            block.option(IF_SPEED, &speed.to_le_bytes());
-        }
-        block.option(IF_TSRESOL, &[NANOSECONDS]);
-        block.option(END, &[]);
+        block.interface(LINK_TYPE, &name, bits_per_second);
         block.end(&mut out)?;
     }
     let octet = bits_per_second.and_then(octet_time);
     for (from, octets) in telegrams {
         let interface = senders.iter().position(|own| own == from);
         for part in octets.chunks(MOST) {
-            packet(&mut block, interface.unwrap_or_default(), part, octet);
+            let good = if from.is_none() { SENT } else { RECEIVED };
+            let interface = interface.unwrap_or_default();
+            packet(&mut block, (interface, good), part, octet);
             block.end(&mut out)?;
         }
     }
     out.flush()
 }
 
-fn packet(block: &mut Block, interface: usize, octets: &[LineByte], octet: Option<Span>) {
+/// The packet of octets that followed each other at the interface with this number; the event is that of good octets.
+pub(crate) fn packet(
+    block: &mut Block,
+    (interface, good): (usize, u8),
+    octets: &[LineByte],
+    octet: Option<Span>,
+) {
     let arrived: Vec<u8> = octets.iter().filter_map(|own| own.received).collect();
     let damaged = octets.iter().find_map(|own| own.received.and(own.error));
     let event = match damaged {
         _ if arrived.is_empty() => LOST,
         Some(error) => event_of(error),
-        None if interface == 0 => SENT,
-        None => RECEIVED,
+        None => good,
     };
     let end = octets.last().map_or(Instant::START, |own| own.at);
     block.begin(PACKET);

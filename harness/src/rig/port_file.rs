@@ -2,6 +2,7 @@
 
 use super::file::Marks;
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
+use crate::link::frames::AdapterPlace;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +68,20 @@ impl Port {
     #[must_use]
     pub const fn carries_remote_frames(&self) -> bool {
         self.socketcand.is_none()
+    }
+
+    /// Its CAN adapter, if it has one.
+    #[must_use]
+    pub fn can_adapter(&self) -> Option<AdapterPlace> {
+        let slcan = self.slcan.as_deref().map(AdapterPlace::slcan);
+        let server = self.socketcand.clone();
+        let server = server.map(|address| AdapterPlace::Socketcand {
+            address,
+            channel: self.channel.clone().unwrap_or_else(|| "can0".to_owned()),
+        });
+        let interface = self.socketcan.clone();
+        let kernel = interface.map(|interface| AdapterPlace::Kernel { interface });
+        slcan.or(server).or(kernel)
     }
 
     /// The keys of the adapters that are given: one, or none where the drives are simulated.

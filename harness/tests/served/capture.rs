@@ -2,12 +2,13 @@
 
 use crate::debian::has;
 use crate::program::{Desk, ended, name, said};
-use harness::capture::{Capture, read};
+use harness::capture::{Capture, ReadSettings, read, read_with};
 use rustix::fd::OwnedFd;
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 use rustix::pty::OpenptFlags;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
@@ -141,6 +142,199 @@ fn taps_listen_and_send_nothing() {
     assert_eq!(all[1], [vec![0x99], vec![]]);
 }
 
+/// An SLCAN adapter: it takes the commands that open it, but for one that it refuses, and keeps all commands.
+struct SlcanAdapter {
+    listener: TcpListener,
+    refuses: &'static str,
+    told: Vec<String>,
+    stream: Option<TcpStream>,
+}
+
+impl SlcanAdapter {
+    fn new(refuses: &'static str) -> Self {
+        Self {
+            listener: TcpListener::bind("127.0.0.1:0").expect("a port"),
+            refuses,
+            told: Vec::new(),
+            stream: None,
+        }
+    }
+
+    fn address(&self) -> String {
+        self.listener.local_addr().expect("an address").to_string()
+    }
+
+    /// Answers a client until it has opened the channel, or was refused.
+    fn answer(&mut self) {
+        let (mut stream, _) = self.listener.accept().expect("a client");
+        let mut byte = [0];
+        let mut command = String::new();
+        while stream.read(&mut byte).expect("a client") == 1 {
+            if byte != [b'\r'] {
+                command.push(char::from(byte[0]));
+                continue;
+            }
+            let refused = command == self.refuses;
+            let answer: &[u8] = match command.as_str() {
+                _ if refused => b"\x07",
+                "V" => b"V1013\r",
+                "F" => b"F00\r",
+                _ => b"\r",
+            };
+            stream.write_all(answer).expect("a client");
+            let open = command == "L";
+            self.told.push(std::mem::take(&mut command));
+            if open {
+                break;
+            }
+        }
+        self.stream = Some(stream);
+    }
+
+    fn says(&mut self, text: &str) {
+        let stream = self.stream.as_mut().expect("it is open");
+        stream.write_all(text.as_bytes()).expect("a client");
+    }
+
+    /// All that it was told until the client has gone.
+    fn end(mut self) -> Vec<String> {
+        let mut rest = String::new();
+        let stream = self.stream.as_mut().expect("it is open");
+        stream.read_to_string(&mut rest).expect("a text");
+        self.told
+            .extend(rest.split_terminator('\r').map(str::to_owned));
+        self.told
+    }
+}
+
+/// The bytes or frames of a part of a capture.
+fn part(path: &Path, link: &str) -> String {
+    let settings = ReadSettings {
+        links: vec![link.parse().expect("a link")],
+        ..ReadSettings::default()
+    };
+    let file = std::fs::read(path).expect("a file");
+    let read = read_with(&file, &settings).unwrap_or_else(|error| panic!("{error}"));
+    let mut text = String::new();
+    for own in read.capture.traces.iter().flat_map(|own| &own.channels) {
+        text += &format!("{:?}:", own.from);
+        text.extend(
+            own.octets()
+                .iter()
+                .map(|own| format!(" {:02X}", own.received.unwrap_or(0))),
+        );
+        text.extend(
+            own.frames()
+                .iter()
+                .map(|own| format!(" {:?} {}", own.from, own.frame)),
+        );
+        text += "\n";
+    }
+    text
+}
+
+/// Taps of all three buses in one capture: a line of text for each telegram or frame, an adapter that only listens, its losses and its
+/// absence as events, and each bus judged by itself.
+#[test]
+fn every_bus_in_one_capture() {
+    let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
+    let ((ring, first), (line, second)) = (port(), port());
+    let mut adapter = SlcanAdapter::new("none");
+    let mut taps = vec![
+        "capture".to_owned(),
+        "-o".to_owned(),
+        "all.pcapng".to_owned(),
+    ];
+    for tap in [
+        format!("0->master={}", name(&first)),
+        format!("bus={}", name(&second)),
+        format!("can0=slcan:{}@250", adapter.address()),
+    ] {
+        taps.extend(["--tap".to_owned(), tap]);
+    }
+    let taps: Vec<_> = taps.iter().map(String::as_str).collect();
+    let command = desk.command(&taps);
+    let opened = std::thread::spawn(move || {
+        adapter.answer();
+        adapter
+    });
+    let mut listener = Listener::start(command);
+    let mut adapter = opened.join().expect("a client");
+    adapter.says("t20133D4000\rt1814400");
+    adapter.says("40100\rF01\r");
+    listener.hears("can0 master    201       3D 40 00                 read 40 STATUS");
+    listener.hears("can0 drive 1   181       40 04 01 00");
+    // A request and its reply at once, and a request in two portions.
+    let ask = [0x10, 8, 2, 0x49, 0x53, 0x16];
+    send(
+        &line,
+        &[&ask[..], &[0x10, 2, 8, 0, 0x0A, 0x16], &ask[..2]].concat(),
+    );
+    listener.hears("bus slave 8   2");
+    send(&line, &ask[2..]);
+    listener.hears("bus master    slave 8");
+    send(&ring, &[0x88]);
+    listener.hears("0->master 88");
+    drop(adapter.stream.take());
+    listener.hears("can0 the adapter was pulled out");
+    adapter.answer();
+    listener.hears("can0 the adapter is back");
+    adapter.says("t2010\r");
+    listener.hears("can0 master    201");
+    assert!(is_silent(&ring) && is_silent(&line));
+    listener.signal(Signal::TERM);
+    let told = adapter.end();
+    let (code, said) = listener.end();
+    for own in &told {
+        let known = ["", "C", "V", "S5", "Z1", "L", "F"].contains(&own.as_str());
+        assert!(known, "the adapter was told {own:?}");
+    }
+    assert_eq!(told.iter().filter(|own| *own == "L").count(), 2);
+    assert_eq!(code, Some(5), "{said}");
+    assert!(
+        said.contains("ring not judged: no tap is on the master"),
+        "{said}"
+    );
+    assert!(
+        said.contains("3 frames, 0 errors; the adapter took the listen-only mode (L)"),
+        "{said}"
+    );
+    assert!(said.contains("all.pcapng: 3 telegrams"), "{said}");
+    let file = desk.path("all.pcapng");
+    assert_eq!(part(&file, "ring"), "Some(0): 88\n");
+    let sent = "10 08 02 49 53 16";
+    assert_eq!(
+        part(&file, "bus=bus"),
+        format!("None: {sent} {sent}\nSome(8): 10 02 08 00 0A 16\n")
+    );
+    assert!(part(&file, "bus=can0").starts_with("None: None 201#3D4000 Some(1) 181#40040100"));
+    let mixed = desk.run(&["import", "all.pcapng"]);
+    ended(&mixed, 2, "frames of CAN (--link \"bus=can0\")");
+    let lost = std::fs::read(&file).expect("a file");
+    let words = b"frames lost: the adapter's queue was full";
+    assert!(lost.windows(words.len()).any(|own| own == words));
+}
+
+/// An adapter that cannot listen only is refused; so is a server of which that is not known.
+#[test]
+fn adapters_that_would_acknowledge_are_refused() {
+    let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
+    let mut adapter = SlcanAdapter::new("L");
+    let tap = format!("can0=slcan:{}", adapter.address());
+    let refused = std::thread::spawn(move || {
+        adapter.answer();
+        adapter.told
+    });
+    let output = desk.run(&["capture", "--tap", &tap]);
+    ended(&output, 3, "refuses to listen only (L)");
+    let told = refused.join().expect("a client");
+    assert!(!told.contains(&"O".to_owned()), "{told:?}");
+    let server = desk.run(&["capture", "--tap", "can0=socketcand:127.0.0.1:1"]);
+    ended(&server, 3, "permit it with --may-acknowledge");
+    let twice = ["capture", "--tap", "bus=/dev/a", "--tap", "bus=/dev/b"];
+    ended(&desk.run(&twice), 3, "two taps are named bus");
+}
+
 /// A capture is whole when the program was killed; another ends by itself at a text, and is judged.
 #[test]
 fn a_killed_capture_is_whole() {
@@ -177,9 +371,15 @@ fn the_system_calls_of_a_tap() {
     if !has("strace", "the system calls of a tap") {
         return;
     }
+    for link in ["0->master", "bus"] {
+        silent_calls(link);
+    }
+}
+
+fn silent_calls(link: &str) {
     let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
     let (far, path) = port();
-    let tap = format!("0->master={}", name(&path));
+    let tap = format!("{link}={}", name(&path));
     let log = desk.path("log");
     let inner = desk.command(&["capture", "--quiet", "--tap", &tap, "--for", "1s"]);
     let mut command = Command::new("strace");

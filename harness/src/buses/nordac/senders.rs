@@ -2,43 +2,157 @@
 
 use crate::report::pcapng_telegrams::PacketOctet;
 use harness_proto::decode::Decoded;
+use harness_proto::line::Received;
 use harness_proto::profibus::Telegram;
-use harness_proto::profibus::fdl::{BROADCAST, MAX_TELEGRAM};
+use harness_proto::profibus::fdl::{BROADCAST, MAX_TELEGRAM, Reason};
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::LineByte;
 
 /// The sender of each octet: `None` for a master. A telegram names its sender; a short confirmation is that of the station that was asked.
 /// Damaged octets are those of the station that owes a reply, or of a master where none does. `octet` is the time of an octet.
 pub(crate) fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
     let mut senders: Vec<Option<u8>> = Vec::with_capacity(octets.len());
-    let mut asked = None;
+    let mut line = Asked::default();
     while let Some(left) = octets.get(senders.len()..).filter(|own| !own.is_empty()) {
         // 33 idle bits end a telegram in any case, and 11 a damaged one.
-        let run = run(left, octet, SYN_BITS.div_ceil(OCTET_BITS));
+        let run = run(left, octet, SYN_OCTETS);
         let good = run.iter().take_while(|own| own.error.is_none());
         let bytes: Vec<u8> = good.filter_map(|own| own.received).collect();
         let (sender, used) = match Telegram::decode(&bytes) {
-            Decoded::Value { value, used } => {
-                let sender = match &value {
-                    Telegram::Confirmation => asked.take(),
-                    Telegram::Token { .. } => None,
-                    Telegram::Pdu(own) if own.fc().is_request() => {
-                        asked = Some(own.da()).filter(|own| *own != BROADCAST);
-                        None
-                    }
-                    Telegram::Pdu(own) => {
-                        asked = None;
-                        Some(own.sa())
-                    }
-                };
-                (sender, used)
-            }
-            _ => (asked.take(), self::run(left, octet, 1).len()),
+            Decoded::Value { value, used } => (line.sender(&value), used),
+            _ => (line.0.take(), self::run(left, octet, 1).len()),
         };
         let next = senders.len() + used.max(1);
         senders.resize(next.min(octets.len()), sender);
     }
     senders
+}
+
+/// Idle octet times in front of a request (T_SYN).
+const SYN_OCTETS: u64 = SYN_BITS.div_ceil(OCTET_BITS);
+
+/// The slave that owes a reply.
+#[derive(Clone, Copy, Debug, Default)]
+struct Asked(Option<u8>);
+
+impl Asked {
+    /// The sender of the next telegram; `None` for a master.
+    fn sender(&mut self, telegram: &Telegram) -> Option<u8> {
+        match telegram {
+            Telegram::Confirmation => self.0.take(),
+            Telegram::Token { .. } => None,
+            Telegram::Pdu(own) if own.fc().is_request() => {
+                self.0 = Some(own.da()).filter(|own| *own != BROADCAST);
+                None
+            }
+            Telegram::Pdu(own) => {
+                self.0 = None;
+                Some(own.sa())
+            }
+        }
+    }
+}
+
+/// Cuts what is heard at one place of a line into telegrams while it arrives.
+///
+/// A port gives octets in portions, some milliseconds late, so the idle times between octets are not known. A telegram ends where its own
+/// bytes say so, and its octets count as sent one behind the other, the last one when it was read. The idle time that the rules demand is
+/// kept in front of it: 33 bits before a request, 11 bits before a reply.
+#[derive(Clone, Debug)]
+pub(crate) struct TelegramCutter {
+    octet: u64,
+    asked: Asked,
+    /// What is not cut yet: when it was read, in nanoseconds, and what it is.
+    waiting: Vec<(u64, Received)>,
+    /// The end of the last telegram.
+    end: u64,
+}
+
+impl TelegramCutter {
+    /// A silence that ends what is no whole telegram, in nanoseconds: longer than ports wait with what they have.
+    const PATIENCE: u64 = 20_000_000;
+
+    /// For a line on which an octet takes this long.
+    pub(crate) const fn new(octet: Span) -> Self {
+        Self {
+            octet: octet.as_nanos(),
+            asked: Asked(None),
+            waiting: Vec::new(),
+            end: 0,
+        }
+    }
+
+    /// Takes an octet that was read at this time, in nanoseconds.
+    pub(crate) fn push(&mut self, nanos: u64, own: Received) {
+        self.waiting.push((nanos, own));
+    }
+
+    /// What has ended until now, with its sender; `None` is a master.
+    pub(crate) fn cut(&mut self, now: u64) -> Vec<(Option<u8>, Vec<LineByte>)> {
+        let mut found = Vec::new();
+        while let Some((sender, request, used)) = self.next(now) {
+            let idle = if request { SYN_OCTETS } else { 1 };
+            let octets: Vec<_> = self.waiting.drain(..used).collect();
+            found.push((sender, self.placed(&octets, idle)));
+        }
+        found
+    }
+
+    /// The sender of the first telegram, whether it begins an exchange, and its octets; `None` where it may go on.
+    fn next(&mut self, now: u64) -> Option<(Option<u8>, bool, usize)> {
+        let (last, _) = self.waiting.last()?;
+        let over = now.saturating_sub(*last) >= Self::PATIENCE;
+        match self.decoded(0) {
+            Decoded::Value { value, used } => {
+                let sender = self.asked.sender(&value);
+                return Some((sender, sender.is_none(), used));
+            }
+            Decoded::NeedMore if self.is_good() && !over => return None,
+            _ => {}
+        }
+        let whole = |place: &usize| {
+            let decoded = self.decoded(*place);
+            // One octet, or a token, may as well be a part of what is damaged.
+            matches!(
+                decoded,
+                Decoded::Value {
+                    value: Telegram::Pdu(_),
+                    ..
+                }
+            )
+        };
+        let all = self.waiting.len();
+        let used = (1..all).find(whole);
+        let used = used.or_else(|| (over || all > 2 * MAX_TELEGRAM).then_some(all))?;
+        let sender = self.asked.0.take();
+        Some((sender, sender.is_none(), used))
+    }
+
+    /// The telegram that begins at a place.
+    fn decoded(&self, place: usize) -> Decoded<Telegram, Reason> {
+        let octets = self.waiting.iter().skip(place).take(MAX_TELEGRAM);
+        let good = octets.map_while(|(_, own)| own.error.is_none().then_some(own.byte));
+        Telegram::decode(&good.collect::<Vec<_>>())
+    }
+
+    fn is_good(&self) -> bool {
+        self.waiting.iter().all(|(_, own)| own.error.is_none())
+    }
+
+    /// The octets with their times.
+    fn placed(&mut self, octets: &[(u64, Received)], idle: u64) -> Vec<LineByte> {
+        let count = octets.len() as u64;
+        let read = octets.last().map_or(0, |own| own.0);
+        let least = self.end + self.octet * (idle + count);
+        self.end = if self.end == 0 { read } else { read.max(least) };
+        let placed = octets.iter().zip(1..).map(|((_, own), place)| {
+            let nanos = self.end.saturating_sub(self.octet * (count - place));
+            let at = Instant::START + Span::from_nanos(nanos);
+            LineByte::seen(at, Some(own.byte), Some(own.byte), own.error)
+        });
+        placed.collect()
+    }
 }
 
 /// The octets up to a pause of this many octet times, and no more than a telegram has.
@@ -75,6 +189,49 @@ mod tests {
             }));
         }
         octets
+    }
+
+    /// Telegrams that are read at once and in parts are cut where they end, with the idle time that the rules demand between them; what is
+    /// damaged ends where the next telegram begins, or after a silence.
+    #[test]
+    fn telegrams_are_cut_while_they_arrive() {
+        let ask: &[u8] = &[0x10, 8, 2, 0x49, 0x53, 0x16];
+        let reply: &[u8] = &[0x10, 2, 8, 0x00, 0x0A, 0x16];
+        let mut cutter = TelegramCutter::new(OCTET);
+        let hear = |cutter: &mut TelegramCutter, nanos: u64, bytes: &[u8]| {
+            for byte in bytes {
+                cutter.push(nanos, Received::good(*byte));
+            }
+            let cut = cutter.cut(nanos).into_iter();
+            let bytes = |own: &[LineByte]| {
+                own.iter()
+                    .filter_map(|own| own.received)
+                    .collect::<Vec<_>>()
+            };
+            cut.map(|(from, own)| (from, bytes(&own), own[0].at.since_start().as_nanos()))
+                .collect::<Vec<_>>()
+        };
+        // All in one portion.
+        let all = hear(&mut cutter, 1_000_000, &[ask, reply, ask, &[0xE5]].concat());
+        let (first, octet) = (1_000_000 - 5 * OCTET.as_nanos(), OCTET.as_nanos());
+        let expected = [
+            (None, ask.to_vec(), first),
+            (Some(8), reply.to_vec(), first + 7 * octet),
+            (None, ask.to_vec(), first + 16 * octet),
+            (Some(8), vec![0xE5], first + 23 * octet),
+        ];
+        assert_eq!(all, expected);
+        // In two portions, 16 ms apart.
+        assert_eq!(hear(&mut cutter, 20_000_000, &ask[..3]), []);
+        assert_eq!(hear(&mut cutter, 36_000_000, &ask[3..]).len(), 1);
+        // An octet is missing: the reply that follows shows where the damage ends.
+        let damaged = hear(&mut cutter, 50_000_000, &[&ask[..4], reply].concat());
+        let damaged: Vec<_> = damaged.into_iter().map(|own| own.1).collect();
+        assert_eq!(damaged, [&ask[..4], reply]);
+        assert_eq!(hear(&mut cutter, 60_000_000, &ask[..4]), []);
+        assert_eq!(hear(&mut cutter, 79_000_000, &[]), []);
+        assert_eq!(hear(&mut cutter, 80_000_000, &[]).len(), 1);
+        assert_eq!(hear(&mut cutter, 99_000_000, &[0; 600]).len(), 1);
     }
 
     /// Diagnosis of slave 8 by master 2: status request, its reply, a request with a short confirmation, and a token.

@@ -22,13 +22,17 @@ pub enum ChannelTarget {
     Station(Option<u8>),
     /// A line that all stations share.
     Bus,
+    /// All links of a ring.
+    Ring,
 }
 
 impl ChannelTarget {
     /// By the name of a link or a station: `98->97`, `2:0->master`, `master`, `slave 8`.
     fn named(name: &str) -> Option<Self> {
-        if name == "bus" {
-            return Some(Self::Bus);
+        match name {
+            "bus" => return Some(Self::Bus),
+            "ring" => return Some(Self::Ring),
+            _ => {}
         }
         let link = ends(name).map(|(ring, from, to)| Self::Link(ring, from, to));
         link.or_else(|| station(name).map(Self::Station))
@@ -40,7 +44,8 @@ impl ChannelTarget {
             let name = name.strip_suffix("_line")?;
             Self::named(&name.replace("_to_", "->").replace("ring2_", "2:"))
         };
-        Self::named(name).or_else(plain)
+        let named = Self::named(name).or_else(plain);
+        named.filter(|own| *own != Self::Ring)
     }
 }
 
@@ -125,6 +130,11 @@ fn choose(
 ) -> Result<Vec<Chosen>, CaptureError> {
     let mut targets: Vec<Option<ChannelTarget>> = vec![None; channels.len()];
     for own in &settings.links {
+        if own.target == ChannelTarget::Ring {
+            return Err(wrong(
+                "`--link ring` chooses a part of a pcapng file; `--link 98->97=CHANNEL` expected for a channel".to_owned(),
+            ));
+        }
         let place = match &own.channel {
             Some(name) => channels
                 .iter()
@@ -303,7 +313,9 @@ pub(super) fn settle(
                     stations.push(own);
                     vec![own; octets.len()]
                 }
-                ChannelTarget::Bus | ChannelTarget::Link(..) => buses::senders(&octets, octet),
+                ChannelTarget::Bus | ChannelTarget::Ring | ChannelTarget::Link(..) => {
+                    buses::senders(&octets, octet)
+                }
             };
             all.extend(senders.into_iter().zip(octets));
         }

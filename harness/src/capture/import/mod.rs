@@ -111,7 +111,7 @@ const FORMATS: [Format; 16] = [
     whole(
         "pcapng (Wireshark)",
         |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
-        |bytes, settings| Ok(pcapng::read(bytes, settings.rate)?.into()),
+        |bytes, settings| Ok(pcapng::read(bytes, settings.rate, &settings.links)?.into()),
     ),
     whole(
         "pcap (tcpdump, Wireshark)",

@@ -37,8 +37,15 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// Opens an interface, with reports of its errors.
-    pub(super) fn open(interface: &str) -> Result<Self, AdapterError> {
+    /// Opens an interface, with reports of its errors. With `listen_only` it has to be in that mode.
+    pub(super) fn open(interface: &str, listen_only: bool) -> Result<Self, AdapterError> {
+        if listen_only && !mode_is_listen_only(interface) {
+            return Err(AdapterError::Refused {
+                port: interface.to_owned(),
+                what: "to listen only: `ip -details link show` does not name this mode".to_owned(),
+                remedy: "set it while the interface is down: `ip link set can0 type can bitrate 500000 listen-only on`",
+            });
+        }
         let failed = |error: io::Error| {
             AdapterError::Open(OpenError::Other {
                 port: interface.to_owned(),
@@ -145,6 +152,21 @@ impl Transport for Kernel {
     }
 }
 
+/// Whether an interface is in listen-only mode, as `ip` of iproute2 reads it back from the kernel.
+fn mode_is_listen_only(interface: &str) -> bool {
+    let arguments = ["-details", "-json", "link", "show", "dev", interface];
+    let output = std::process::Command::new("ip").args(arguments).output();
+    output.is_ok_and(|own| listens_only(&own.stdout))
+}
+
+/// The same, of what `ip` says.
+fn listens_only(json: &[u8]) -> bool {
+    let links: serde_json::Value = serde_json::from_slice(json).unwrap_or_default();
+    let mode = links.pointer("/0/linkinfo/info_data/ctrlmode");
+    let words = mode.and_then(serde_json::Value::as_array);
+    words.is_some_and(|own| own.iter().any(|word| word == "LISTEN-ONLY"))
+}
+
 fn encode(frame: &Frame) -> [u8; LENGTH] {
     let mut id = frame.id().number();
     if frame.id().is_extended() {
@@ -214,9 +236,23 @@ mod tests {
         assert_eq!(error(class::RESTARTED), None);
     }
 
+    /// As iproute2 writes it.
+    #[test]
+    fn the_mode_is_read_back() {
+        let of = |modes: &str| {
+            format!(
+                r#"[{{"ifname":"can0","linkinfo":{{"info_kind":"can","info_data":{{"ctrlmode":[{modes}],"state":"ERROR-ACTIVE"}}}}}}]"#
+            )
+        };
+        assert!(listens_only(of(r#""LOOPBACK","LISTEN-ONLY""#).as_bytes()));
+        assert!(!listens_only(of(r#""LOOPBACK""#).as_bytes()));
+        assert!(!listens_only(b"Device \"can0\" does not exist."));
+        assert!(Kernel::open("can-none0", true).is_err());
+    }
+
     #[test]
     fn an_interface_that_is_not_there_is_named() {
-        let error = Kernel::open("can-none0")
+        let error = Kernel::open("can-none0", false)
             .expect_err("no interface")
             .to_string();
         assert!(error.contains("can-none0"), "{error}");

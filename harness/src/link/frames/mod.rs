@@ -67,6 +67,8 @@ pub struct FrameLink {
     /// Input was reported and is still unread.
     lying: bool,
     log: Vec<LineFrame>,
+    /// Frames in the log at most.
+    most_recorded: usize,
     carried: u64,
     unplaced: u64,
     interrupt: Arc<AtomicBool>,
@@ -103,6 +105,7 @@ impl FrameLink {
             received: VecDeque::new(),
             lying: false,
             log: Vec::new(),
+            most_recorded: MOST_RECORDED,
             carried: 0,
             unplaced: 0,
             interrupt,
@@ -114,6 +117,11 @@ impl FrameLink {
     /// Sets how exact its times are; 30 ms at first.
     pub const fn set_time_tolerance(&mut self, tolerance: Span) {
         self.tolerance = tolerance;
+    }
+
+    /// Keeps no trace from now on: a capture takes what is received.
+    pub(crate) fn keep_no_trace(&mut self) {
+        self.most_recorded = 0;
     }
 
     /// The descriptor of its stream, for locks.
@@ -228,7 +236,7 @@ impl FrameLink {
 
     fn keep(&mut self, from: Option<u8>, start: Instant, at: Instant, frame: Frame) {
         self.carried += 1;
-        if self.log.len() < MOST_RECORDED {
+        if self.log.len() < self.most_recorded {
             self.log.push(LineFrame {
                 from,
                 start,

@@ -9,6 +9,8 @@ use crate::trouble::Trouble;
 use harness_proto::can::BitRate;
 use rustix::event::{Timespec, poll};
 use std::collections::VecDeque;
+use std::fmt;
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -59,6 +61,45 @@ impl AdapterPlace {
         Self::Slcan {
             at,
             baud: DEFAULT_BAUD,
+        }
+    }
+}
+
+impl FromStr for AdapterPlace {
+    type Err = String;
+
+    /// `slcan:/dev/ttyACM0`, `slcan:host:port`, `socketcand:host:port/can0` or `socketcan:can0`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "`{text}` is no CAN adapter; slcan:/dev/ttyACM0, slcan:HOST:PORT, socketcand:HOST:PORT/can0 or socketcan:can0 expected"
+            )
+        };
+        let (kind, place) = text.split_once(':').ok_or_else(wrong)?;
+        match kind {
+            _ if place.is_empty() => Err(wrong()),
+            "slcan" => Ok(Self::slcan(place)),
+            "socketcand" => {
+                let (address, channel) = place.split_once('/').unwrap_or((place, "can0"));
+                Ok(Self::Socketcand {
+                    address: address.to_owned(),
+                    channel: channel.to_owned(),
+                })
+            }
+            "socketcan" => Ok(Self::Kernel {
+                interface: place.to_owned(),
+            }),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl fmt::Display for AdapterPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slcan { at, .. } => write!(f, "slcan:{at}"),
+            Self::Socketcand { address, channel } => write!(f, "socketcand:{address}/{channel}"),
+            Self::Kernel { interface } => write!(f, "socketcan:{interface}"),
         }
     }
 }
@@ -159,17 +200,20 @@ pub(super) fn open(
             talk.open_socketcand(channel)?;
             Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))
         }
-        AdapterPlace::Kernel { interface } => kernel(interface),
+        AdapterPlace::Kernel { interface } => kernel(interface, settings.listen_only),
     }
 }
 
 #[cfg(feature = "socketcan")]
-fn kernel(interface: &str) -> Result<Box<dyn Transport>, AdapterError> {
-    Ok(Box::new(super::kernel::Kernel::open(interface)?))
+fn kernel(interface: &str, listen_only: bool) -> Result<Box<dyn Transport>, AdapterError> {
+    Ok(Box::new(super::kernel::Kernel::open(
+        interface,
+        listen_only,
+    )?))
 }
 
 #[cfg(not(feature = "socketcan"))]
-fn kernel(interface: &str) -> Result<Box<dyn Transport>, AdapterError> {
+fn kernel(interface: &str, _listen_only: bool) -> Result<Box<dyn Transport>, AdapterError> {
     Err(AdapterError::NotBuilt(interface.to_owned()))
 }
 
@@ -412,5 +456,6 @@ impl<'a> Talk<'a> {
 }
 
 const RATE: &str = "use an adapter that has the rate";
-const LISTEN: &str = "use an adapter that can, or take `listen_only` out of the rig's file";
+const LISTEN: &str =
+    "use an adapter that can; with `listen_only = false` in a rig's file it acknowledges frames";
 const OPEN: &str = "check that no other program uses it";

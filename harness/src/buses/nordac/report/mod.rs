@@ -4,6 +4,7 @@ pub mod csv;
 pub(crate) mod curves;
 pub mod diff;
 pub mod json;
+pub(crate) mod live;
 pub mod pcapng;
 pub(crate) mod sequence;
 pub mod table;

@@ -38,6 +38,11 @@ pub(super) fn station(slave: Option<u8>) -> String {
 }
 
 fn line(said: &Said, words: &Words) -> String {
+    format!("{:>14}  {}\n", said.at.to_string(), row(said, words))
+}
+
+/// A row without its time.
+pub(super) fn row(said: &Said, words: &Words) -> String {
     let to = match (said.from, words.to) {
         (None, Some(127)) => "all".to_owned(),
         (None, Some(to)) => format!("slave {to}"),
@@ -46,8 +51,7 @@ fn line(said: &Said, words: &Words) -> String {
     };
     let octets: Vec<_> = said.octets.iter().map(|own| format!("{own:02X}")).collect();
     format!(
-        "{:>14}  {:<9} {to:<9} {:<14} {}  [{}]\n",
-        said.at.to_string(),
+        "{:<9} {to:<9} {:<14} {}  [{}]",
         station(said.from),
         words.service,
         words.meaning,

@@ -236,6 +236,12 @@ impl Observer {
         }
     }
 
+    /// Whether a telegram has begun and is not complete.
+    #[must_use]
+    pub const fn in_telegram(&self) -> bool {
+        !self.foreign && (self.address_next || self.net > 0)
+    }
+
     /// Takes the next byte of the link, and what its receiver noticed.
     pub fn see(&mut self, received: Option<u8>, error: Option<LineError>) -> Meaning {
         let Some(byte) = received else {

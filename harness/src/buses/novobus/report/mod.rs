@@ -4,6 +4,7 @@ pub mod csv;
 pub(crate) mod diagram;
 pub mod json;
 pub(crate) mod lines;
+pub(crate) mod live;
 pub mod meaning;
 pub mod plot;
 pub(crate) mod sequence;

@@ -2,6 +2,8 @@
 
 use super::meaning;
 use crate::buses::unitek::language::identifier;
+use crate::capture::Piece;
+use crate::capture::live::{LiveLine, LiveText};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -60,6 +62,11 @@ fn repeats(before: &LineFrame, frame: &LineFrame) -> bool {
 }
 
 fn line(row: &Row<'_>) -> String {
+    format!("{:>14}  {}\n", row.first.at.to_string(), text(row))
+}
+
+/// A row without its time.
+fn text(row: &Row<'_>) -> String {
     let LineFrame {
         from, frame, ended, ..
     } = row.first;
@@ -80,12 +87,28 @@ fn line(row: &Row<'_>) -> String {
         }
     };
     let text = format!(
-        "{:>14}  {:<9} {:<9} {:<24} {}{end}",
-        row.first.at.to_string(),
+        "{:<9} {:<9} {:<24} {}{end}",
         sender,
         identifier(frame.id()),
         bytes.trim_end(),
         meaning(frame, from.is_some())
     );
-    format!("{}\n", text.trim_end())
+    text.trim_end().to_owned()
+}
+
+/// Text of the frames of one bus, while they arrive: the rows of the table.
+pub(crate) struct FrameText;
+
+impl LiveText for FrameText {
+    fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {
+        let Piece::Frame(frame) = piece else {
+            return Vec::new();
+        };
+        let own = Row {
+            first: frame,
+            last: frame,
+            times: 1,
+        };
+        vec![(frame.at.since_start().as_nanos(), text(&own))]
+    }
 }

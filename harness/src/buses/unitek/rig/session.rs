@@ -6,7 +6,7 @@ use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
 use crate::guard::{Guarded, Safe, Standstill};
-use crate::link::frames::{AdapterPlace, AdapterSettings, FrameLink};
+use crate::link::frames::{AdapterSettings, FrameLink};
 use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
@@ -174,19 +174,8 @@ fn adapter(
     axes: &[Axis],
     options: &Options,
 ) -> Result<(Ends, Vec<PortLock>), SessionError> {
-    let place = match (&port.slcan, &port.socketcand) {
-        (Some(place), _) => AdapterPlace::slcan(place),
-        (None, Some(address)) => AdapterPlace::Socketcand {
-            address: address.clone(),
-            channel: port.channel.clone().unwrap_or_else(|| "can0".to_owned()),
-        },
-        (None, None) => AdapterPlace::Kernel {
-            interface: port
-                .socketcan
-                .clone()
-                .ok_or_else(|| failed(rig, "its port has no adapter"))?,
-        },
-    };
+    let place = port.can_adapter();
+    let place = place.ok_or_else(|| failed(rig, "its port has no adapter"))?;
     let settings = AdapterSettings {
         place,
         rate: rate(port),

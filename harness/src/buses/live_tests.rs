@@ -1,0 +1,100 @@
+//! What a capture shows while it goes on, in the words of each bus.
+
+use super::{TelegramCutter, live_text};
+use crate::capture::live::{LiveLine, seconds};
+use crate::capture::{Carries, Piece, RecordedPlace};
+use crate::library::{Entry, sources};
+use crate::scenario::run::AtMismatch;
+use harness_proto::line::Received;
+use harness_proto::time::Span;
+use harness_sim::record::{Channel, Trace};
+
+fn traces(scenario: &str) -> Vec<Trace> {
+    let mut found = sources(&[scenario.into()]).expect("a scenario");
+    let entry = Entry::new(found.remove(0), None).expect("no mistakes");
+    let plan = entry.settled().expect("a plan");
+    let mut link = plan.simulate();
+    plan.play(&mut *link, AtMismatch::GoOn);
+    (0..plan.ports()).map(|port| link.trace(port)).collect()
+}
+
+fn place(name: &str, carries: Carries, bits_per_second: u32) -> RecordedPlace {
+    RecordedPlace {
+        name: name.to_owned(),
+        carries,
+        bits_per_second,
+    }
+}
+
+/// The lines of pieces, each with the time of what it is of.
+fn lines(place: &RecordedPlace, drives: Option<u8>, pieces: &[Piece]) -> String {
+    let mut text = live_text(place, drives);
+    let mut lines: Vec<LiveLine> = pieces.iter().flat_map(|own| text.piece(own)).collect();
+    lines.extend(text.idle(u64::MAX));
+    let line = |(nanos, words): LiveLine| format!("{} {words}\n", seconds(nanos));
+    lines.into_iter().map(line).collect()
+}
+
+fn of_link(link: &Channel, drives: Option<u8>) -> String {
+    let name = crate::report::pcapng::name(0, link);
+    let pieces: Vec<_> = link.octets().iter().copied().map(Piece::Octet).collect();
+    lines(&place(&name, Carries::Link, 38_400), drives, &pieces)
+}
+
+/// A read on the master's outgoing link and on its incoming one: a line a telegram, with its bytes in front.
+#[test]
+fn telegrams_of_a_ring() {
+    let traces = traces("10.1-read-byte");
+    let [first, .., last] = &traces[0].channels[..] else {
+        panic!("links expected");
+    };
+    let (sent, came) = (of_link(first, Some(3)), of_link(last, Some(3)));
+    let begins = "0.000286 88 FE C0 13 FE D1  ReadByte of FE13 for drive 1\n\
+                  0.002864 88 FE C0 00 2F EF  ReadByte of 2F00 for drive 1\n";
+    assert!(sent.starts_with(begins), "{sent}");
+    let begins = "0.001145 88 01 C0 13 88 A5  answer to ReadByte for drive 1\n";
+    assert!(came.starts_with(begins), "{came}");
+}
+
+/// A broken cable is named as soon as the master has received enough, once for each fault.
+#[test]
+fn a_fault_of_a_ring_is_named() {
+    let traces = traces("9.9-broken-ring-3-2");
+    let last = traces[0].channels.last().expect("a link");
+    let expected = "\
+        0.001432 80 80 80  SYNCO\n\
+        0.022005 00 00 00 00 00 00 00 00 01 02 02 02 02  zero of the error mode; number spelled out in the error mode\n\
+        0.025442 located: drive 2 saw a fault first: the fault is on the cable between drive 3 and drive 2, or in the sender there\n\
+        0.025729 02 02  number spelled out in the error mode\n";
+    assert_eq!(of_link(last, Some(traces[0].stations)), expected);
+}
+
+#[test]
+fn frames_and_telegrams() {
+    let frames = traces("unitek-5.2-once");
+    let frames = frames[0].channels.iter().flat_map(|own| own.frames());
+    let frames: Vec<_> = frames.copied().map(Piece::Frame).collect();
+    let shown = lines(&place("can0", Carries::Frames, 500_000), None, &frames);
+    let line = traces("nordac-3.1-ppo-1");
+    let channels = line[0].channels.iter();
+    let mut octets: Vec<_> = channels.flat_map(|own| own.octets().to_vec()).collect();
+    octets.sort_by_key(|own| own.at);
+    let mut cutter = TelegramCutter::new(Span::from_micros(22));
+    let mut pieces = Vec::new();
+    for own in &octets {
+        let nanos = own.at.since_start().as_nanos();
+        cutter.push(nanos, Received::good(own.received.expect("an octet")));
+        let cut = cutter.cut(nanos).into_iter();
+        pieces.extend(cut.map(|(from, octets)| Piece::Telegram(from, octets)));
+    }
+    let telegrams = lines(&place("bus", Carries::Line, 500_000), None, &pieces);
+    let expected = "0.000144 master    201       3D A8 00                 read A8 SPEED_ACTUAL_\n\
+                    0.000310 drive 1   181       A8 CD 0C 00              A8 SPEED_ACTUAL_ = 0CCD  10.0%\n";
+    assert_eq!(shown, expected);
+    let begins = "0.000462 master    slave 8   Set_Prm        lock, min T_SDR 11, ident 7531  \
+                  [68 0C 0C 68 88 82 6C 3D 3E 80 00 00 0B 75 31 00 22 16]\n\
+                  0.000506 slave 8             Set_Prm        confirmed  [E5]\n";
+    assert!(telegrams.starts_with(begins), "{telegrams}");
+    let last = "3.004884 slave 8   2         Data_Exchange  ZSW 0F37 (OE, at setpoint, bus control, reference, clockwise)";
+    assert!(telegrams.contains(last), "{telegrams}");
+}

@@ -1,0 +1,31 @@
+//! Telegrams as lines of text while they arrive: the rows of the table.
+
+use super::table::row;
+use super::telegrams::TelegramRun;
+use super::words::Reader;
+use crate::capture::Piece;
+use crate::capture::live::{LiveLine, LiveText};
+
+/// Text of the telegrams of one line.
+#[derive(Debug, Default)]
+pub(crate) struct TelegramText {
+    reader: Reader,
+}
+
+impl LiveText for TelegramText {
+    fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {
+        let Piece::Telegram(from, octets) = piece else {
+            return Vec::new();
+        };
+        let run = TelegramRun {
+            from: *from,
+            octets: octets.clone(),
+        };
+        let said = run.said().into_iter();
+        let lines = said.map(|own| {
+            let words = self.reader.read(&own);
+            (own.at.since_start().as_nanos(), row(&own, &words))
+        });
+        lines.collect()
+    }
+}

@@ -1,0 +1,218 @@
+//! The bytes of a link as lines of text while they arrive: a line a telegram, its bytes and what they say.
+
+use super::meaning::{ByteRole, Meaning, Observer};
+use crate::buses::MOST_IN_A_RING;
+use crate::buses::novobus::locate::locate;
+use crate::capture::Piece;
+use crate::capture::live::{LiveLine, LiveText};
+use harness_proto::line::{Rate, Received};
+use std::fmt::Write as _;
+
+/// The most bytes of a line that is no telegram.
+const MOST: usize = 16;
+/// A silence that ends a telegram that is not complete, in nanoseconds.
+const PATIENCE: u64 = 50_000_000;
+/// Bytes that a location is read from at most: more than zeros and numbers of one fault.
+const HEARD: usize = 1_024;
+
+/// What the bytes of a line are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Telegram,
+    Idle,
+    ErrorMode,
+    CheckSequence,
+    /// It belongs to whatever the line is of.
+    Any,
+}
+
+impl Kind {
+    const fn of(role: ByteRole) -> Self {
+        match role {
+            ByteRole::Synco | ByteRole::Pause => Self::Idle,
+            ByteRole::ErrorZero | ByteRole::ErrorAddress => Self::ErrorMode,
+            ByteRole::CheckSequence => Self::CheckSequence,
+            ByteRole::Foreign | ByteRole::Lost => Self::Any,
+            _ => Self::Telegram,
+        }
+    }
+}
+
+/// A line that is being made.
+#[derive(Clone, Debug, Default)]
+struct Begun {
+    kind: Kind,
+    bytes: usize,
+    text: String,
+    phrases: Vec<String>,
+    first: u64,
+    last: u64,
+}
+
+/// Text of the bytes of one link.
+pub(crate) struct LinkText {
+    observer: Observer,
+    to: Option<u8>,
+    /// The number of drives, where it is known.
+    drives: Option<u8>,
+    /// A pause that ends a line, in nanoseconds.
+    pause: u64,
+    begun: Begun,
+    /// What the master has received since the last check sequence.
+    heard: Vec<Received>,
+    /// The drive that was named since then.
+    named: Option<u8>,
+}
+
+impl LinkText {
+    /// Text of the link between two ends, of a ring with this number of drives where it is known.
+    pub(crate) fn new(from: Option<u8>, to: Option<u8>, rate: Rate, drives: Option<u8>) -> Self {
+        Self {
+            observer: Observer::new(from, to),
+            to,
+            drives,
+            pause: rate.byte_time().as_nanos() * 2,
+            begun: Begun::default(),
+            heard: Vec::new(),
+            named: None,
+        }
+    }
+
+    fn byte(&mut self, nanos: u64, own: Received) -> Vec<LiveLine> {
+        let mut lines = Vec::from_iter(self.idle(nanos));
+        let meaning = self.observer.see(Some(own.byte), own.error);
+        let kind = Kind::of(meaning.role);
+        let begins = meaning.role == ByteRole::Sync
+            || (kind != Kind::Any && kind != self.begun.kind)
+            || (self.begun.bytes >= MOST && kind != Kind::Telegram);
+        if begins {
+            lines.extend(self.end());
+        }
+        let line = &mut self.begun;
+        if line.bytes == 0 {
+            line.first = nanos;
+            line.kind = kind;
+        } else {
+            line.text.push(' ');
+        }
+        // Writing to a String cannot fail.
+        let _infallible = write!(line.text, "{:02X}", own.byte);
+        if let Some(error) = own.error {
+            let _infallible = write!(line.text, " ({error})");
+        }
+        line.bytes += 1;
+        line.last = nanos;
+        if let Some((phrase, goes_on)) = phrase(&meaning, own.byte) {
+            if goes_on
+                && line
+                    .phrases
+                    .last()
+                    .is_some_and(|last| is_part(last, &phrase))
+            {
+                line.phrases.pop();
+            }
+            if line.phrases.last() != Some(&phrase) {
+                line.phrases.push(phrase);
+            }
+        }
+        if let Some(words) = self.located(meaning.role, own) {
+            lines.extend(self.end());
+            lines.push((nanos, words));
+        }
+        lines
+    }
+
+    fn end(&mut self) -> Option<LiveLine> {
+        let line = std::mem::take(&mut self.begun);
+        let words = line.phrases.join("; ");
+        let text = match words.is_empty() {
+            true => line.text,
+            false => format!("{}  {words}", line.text),
+        };
+        (line.bytes > 0).then_some((line.first, text))
+    }
+
+    /// The fault that the ring spells out, when it is first known.
+    fn located(&mut self, role: ByteRole, own: Received) -> Option<String> {
+        if self.to.is_some() {
+            return None;
+        }
+        let in_error = matches!(role, ByteRole::ErrorZero | ByteRole::ErrorAddress);
+        if role == ByteRole::CheckSequence {
+            self.heard.clear();
+            self.named = None;
+        }
+        if self.heard.len() >= HEARD {
+            self.heard.drain(..HEARD / 2);
+        }
+        self.heard.push(own);
+        let drives = self.drives.unwrap_or(MOST_IN_A_RING as u8);
+        let found = in_error
+            .then(|| locate(&self.heard, drives))
+            .flatten()?
+            .drive;
+        if self.named.replace(found) == Some(found) {
+            return None;
+        }
+        Some(format!(
+            "located: drive {found} saw a fault first: {}",
+            in_front(found, self.drives)
+        ))
+    }
+}
+
+impl LiveText for LinkText {
+    fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {
+        match piece {
+            Piece::Octet(byte) => byte.arrival().map_or(Vec::new(), |own| {
+                self.byte(byte.at.since_start().as_nanos(), own)
+            }),
+            _ => Vec::new(),
+        }
+    }
+
+    fn idle(&mut self, now: u64) -> Option<LiveLine> {
+        let pause = match self.observer.in_telegram() {
+            // A port gives bytes in portions.
+            true => PATIENCE,
+            false => self.pause,
+        };
+        let paused = now.saturating_sub(self.begun.last) > pause;
+        paused.then(|| self.end()).flatten()
+    }
+}
+
+/// The cable in front of a drive, in words; `drives` is the size of the ring where it is known.
+pub(crate) fn in_front(drive: u8, drives: Option<u8>) -> String {
+    let before = match drives {
+        Some(drives) if drive + 1 == drives => "the master".to_owned(),
+        _ => format!("drive {}", u16::from(drive) + 1),
+    };
+    format!("the fault is on the cable between {before} and drive {drive}, or in the sender there")
+}
+
+/// What a byte adds to a line, and whether it replaces what the byte before it of the same command has added.
+fn phrase(meaning: &Meaning, byte: u8) -> Option<(String, bool)> {
+    let words = || meaning.words(Some(byte));
+    match meaning.role {
+        ByteRole::Sync | ByteRole::Address => None,
+        ByteRole::Parameter | ByteRole::Data => {
+            let (words, _) = words()
+                .rsplit_once(": ")
+                .map(|own| (own.0.to_owned(), ()))?;
+            Some((words, true))
+        }
+        ByteRole::Check if meaning.fits != Some(false) => None,
+        _ => Some((words(), false)),
+    }
+}
+
+/// Whether a phrase says the same of a command as another one, but not of which cell.
+fn is_part(shorter: &str, longer: &str) -> bool {
+    let command = |own: &str| own.split(" for drive").next().map(str::to_owned);
+    match (command(shorter), command(longer)) {
+        (Some(shorter), Some(longer)) => longer.starts_with(&shorter),
+        _ => false,
+    }
+}

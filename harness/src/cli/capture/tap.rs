@@ -1,0 +1,353 @@
+//! A port in use: it listens, is taken up again when it was away, and gives what it hears as pieces of a capture.
+
+use super::CaptureArguments;
+use super::place::{TapAt, TapPort};
+use crate::buses::{TelegramCutter, live_text, sender_of};
+use crate::capture::live::LiveText;
+use crate::capture::{Piece, RecordedPlace};
+use crate::link::Line as _;
+use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink};
+use crate::medium;
+use crate::port::{OpenError, PortCounts, SilentTap, TapState};
+use crate::trouble::Trouble;
+use harness_proto::can::{BusError, Frame, Heard};
+use harness_proto::line::{Format, Received};
+use harness_proto::time::{Instant as LineInstant, Span};
+use harness_sim::record::{FrameEnd, LineByte, LineFrame};
+use rustix::event::{PollFd, PollFlags};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How often a port that is away is tried again, and counts of the kernel are read.
+const AGAIN: Duration = Duration::from_millis(500);
+
+/// Why a port cannot be listened to.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ListenError {
+    #[error(transparent)]
+    Tap(#[from] OpenError),
+    #[error(transparent)]
+    Adapter(#[from] AdapterError),
+    #[error(
+        "{0}: whether the server's controller listens only cannot be read back, so it may acknowledge frames; use an SLCAN adapter, or permit it \
+         with --may-acknowledge"
+    )]
+    Unknown(String),
+}
+
+/// What listens.
+enum Ear {
+    Octets(SilentTap),
+    Frames(Box<FrameLink>),
+    /// Opening an adapter takes seconds, and the other taps go on.
+    Opening(JoinHandle<Result<FrameLink, AdapterError>>),
+    Away,
+}
+
+/// A tap in use.
+pub(super) struct Tap {
+    pub(super) at: TapAt,
+    pub(super) place: RecordedPlace,
+    pub(super) text: Box<dyn LiveText>,
+    ear: Ear,
+    settings: TapSettings,
+    cutter: Option<TelegramCutter>,
+    /// What the kernel had counted at the port before, and the overruns until now.
+    before: Option<PortCounts>,
+    overruns: u64,
+    looked: Instant,
+    /// The time of the last octet.
+    last: u64,
+    pub(super) pieces: u64,
+    pub(super) damaged: u64,
+}
+
+/// How a port is opened.
+#[derive(Clone)]
+struct TapSettings {
+    in_band: bool,
+    may_acknowledge: bool,
+    /// The format of rings.
+    ring: Format,
+    stop: Arc<AtomicBool>,
+}
+
+/// Opens a CAN adapter, which listens only.
+fn adapter(at: &TapAt, settings: &TapSettings) -> Result<FrameLink, AdapterError> {
+    let TapPort::Frames(place, rate) = &at.port else {
+        return Err(AdapterError::Interrupted);
+    };
+    let own = AdapterSettings {
+        place: place.clone(),
+        rate: *rate,
+        listen_only: true,
+    };
+    let mut link = FrameLink::open(&own, Vec::new(), Arc::clone(&settings.stop))?;
+    link.keep_no_trace();
+    Ok(link)
+}
+
+impl TapSettings {
+    fn open(&self, at: &TapAt) -> Result<Ear, ListenError> {
+        let tap = |path, format| SilentTap::open(path, format, self.in_band);
+        Ok(match &at.port {
+            TapPort::Link(path) => Ear::Octets(tap(path, self.ring)?),
+            TapPort::Line(path, format) => Ear::Octets(tap(path, *format)?),
+            TapPort::Frames(AdapterPlace::Socketcand { .. }, _) if !self.may_acknowledge => {
+                return Err(ListenError::Unknown(at.port.to_string()));
+            }
+            TapPort::Frames(..) => Ear::Frames(Box::new(adapter(at, self)?)),
+        })
+    }
+}
+
+impl Tap {
+    /// Opens a port. `drives` is the size of the ring, where it is known.
+    pub(super) fn open(
+        at: &TapAt,
+        arguments: &CaptureArguments,
+        drives: Option<u8>,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Self, ListenError> {
+        let place = at.place(arguments.line);
+        let settings = TapSettings {
+            in_band: arguments.in_band,
+            may_acknowledge: arguments.may_acknowledge,
+            ring: Format::from(arguments.line),
+            stop: Arc::clone(stop),
+        };
+        let cutter = match &at.port {
+            TapPort::Line(_, format) => Some(TelegramCutter::new(format.octet_time())),
+            TapPort::Link(_) | TapPort::Frames(..) => None,
+        };
+        let ear = settings.open(at)?;
+        let mut own = Self {
+            at: at.clone(),
+            text: live_text(&place, drives),
+            place,
+            ear,
+            settings,
+            cutter,
+            before: None,
+            overruns: 0,
+            looked: Instant::now(),
+            last: 0,
+            pieces: 0,
+            damaged: 0,
+        };
+        own.before = own.counts();
+        own.overruns = own.before.map_or(0, |own| own.overruns);
+        Ok(own)
+    }
+
+    fn counts(&self) -> Option<PortCounts> {
+        match &self.ear {
+            Ear::Octets(tap) => tap.counts(),
+            Ear::Frames(_) | Ear::Opening(_) | Ear::Away => None,
+        }
+    }
+
+    /// For waiting; `None` while the port is away.
+    pub(super) fn poll_fd(&self) -> Option<PollFd<'_>> {
+        match &self.ear {
+            Ear::Octets(tap) => Some(PollFd::new(tap, PollFlags::IN)),
+            Ear::Frames(link) => Some(PollFd::from_borrowed_fd(link.fd(), PollFlags::IN)),
+            Ear::Opening(_) | Ear::Away => None,
+        }
+    }
+
+    /// What was heard until now, in nanoseconds since 1970.
+    pub(super) fn hear(&mut self, now: u64) -> io::Result<Vec<Piece>> {
+        let mut pieces = Vec::new();
+        match &mut self.ear {
+            Ear::Octets(tap) => {
+                let mut heard = Vec::new();
+                let state = tap.read(&mut heard)?;
+                self.octets(now, heard, &mut pieces);
+                if state == TapState::Gone {
+                    self.leave(now, &mut pieces);
+                }
+            }
+            Ear::Frames(_) => self.frames(now, &mut pieces),
+            Ear::Opening(_) | Ear::Away => self.look_for_it(now, &mut pieces),
+        }
+        if self.before.is_some() && self.looked.elapsed() >= AGAIN {
+            self.looked = Instant::now();
+            let overruns = self.counts().map_or(self.overruns, |own| own.overruns);
+            let lost = overruns.saturating_sub(self.overruns);
+            self.overruns = overruns;
+            if lost > 0 {
+                let words = format!("{lost} or more bytes lost: the port's queue was full");
+                pieces.push(Piece::Event(now, words));
+            }
+        }
+        Ok(pieces)
+    }
+
+    /// Octets that were read now: the last one has just arrived, and those before it came one behind the other.
+    fn octets(&mut self, now: u64, heard: Vec<Received>, pieces: &mut Vec<Piece>) {
+        let octet = match &self.at.port {
+            TapPort::Line(_, format) => format.octet_time(),
+            TapPort::Link(_) | TapPort::Frames(..) => self.settings.ring.octet_time(),
+        };
+        let count = heard.len() as u64;
+        for (received, place) in heard.into_iter().zip(1..) {
+            let behind = octet.as_nanos().saturating_mul(count - place);
+            let nanos = now.saturating_sub(behind).max(self.last);
+            self.last = nanos;
+            self.pieces += 1;
+            self.damaged += u64::from(received.error.is_some());
+            match &mut self.cutter {
+                Some(cutter) => cutter.push(now, received),
+                None => {
+                    let at = instant(nanos);
+                    let byte = LineByte::seen(
+                        at,
+                        Some(received.byte),
+                        Some(received.byte),
+                        received.error,
+                    );
+                    pieces.push(Piece::Octet(byte));
+                }
+            }
+        }
+        let cut = self.cutter.as_mut().map(|own| own.cut(now));
+        let telegrams = cut.into_iter().flatten();
+        pieces.extend(telegrams.map(|(from, octets)| Piece::Telegram(from, octets)));
+    }
+
+    /// Frames that an adapter has heard.
+    fn frames(&mut self, now: u64, pieces: &mut Vec<Piece>) {
+        let Ear::Frames(link) = &mut self.ear else {
+            return;
+        };
+        let rate = match &self.at.port {
+            TapPort::Frames(_, rate) => *rate,
+            TapPort::Link(_) | TapPort::Line(..) => return,
+        };
+        // Reads what has come, without waiting.
+        let sound = link.wait(LineInstant::START);
+        let present = link.now();
+        while let Some((at, heard)) = link.receive(0) {
+            let nanos = now.saturating_sub(present.since(at).as_nanos());
+            match heard {
+                medium::Heard::Frame(Heard::Frame(frame)) => {
+                    self.pieces += 1;
+                    let lasted = rate.time_of(frame.wire_bits());
+                    pieces.push(Piece::Frame(line_frame(nanos, lasted, frame)));
+                }
+                medium::Heard::Frame(Heard::Error(error)) => {
+                    self.damaged += 1;
+                    pieces.push(Piece::Event(nanos, error_words(error).to_owned()));
+                }
+                medium::Heard::Octet(_) => {}
+            }
+        }
+        let overruns = crate::link::PortLink::take_unplaced(&mut **link);
+        if overruns > 0 {
+            let words = "frames lost: the adapter's queue was full".to_owned();
+            pieces.push(Piece::Event(now, words));
+        }
+        let interrupted = link.trouble() == Some(&Trouble::Interrupted);
+        if !sound && !interrupted {
+            self.leave(now, pieces);
+        }
+    }
+
+    fn leave(&mut self, now: u64, pieces: &mut Vec<Piece>) {
+        self.ear = Ear::Away;
+        self.looked = Instant::now();
+        let words = "the adapter was pulled out".to_owned();
+        pieces.push(Piece::Event(now, words));
+    }
+
+    /// Takes a port up again when it has come back.
+    fn look_for_it(&mut self, now: u64, pieces: &mut Vec<Piece>) {
+        match std::mem::replace(&mut self.ear, Ear::Away) {
+            Ear::Opening(thread) if !thread.is_finished() => self.ear = Ear::Opening(thread),
+            Ear::Opening(thread) => {
+                if let Ok(Ok(link)) = thread.join() {
+                    self.ear = Ear::Frames(Box::new(link));
+                }
+            }
+            Ear::Away if self.looked.elapsed() < AGAIN => {}
+            Ear::Away => {
+                self.looked = Instant::now();
+                let (at, settings) = (self.at.clone(), self.settings.clone());
+                match at.port {
+                    TapPort::Frames(..) => {
+                        self.ear =
+                            Ear::Opening(std::thread::spawn(move || adapter(&at, &settings)));
+                    }
+                    TapPort::Link(_) | TapPort::Line(..) => {
+                        self.ear = settings.open(&at).unwrap_or(Ear::Away);
+                    }
+                }
+            }
+            other => self.ear = other,
+        }
+        if matches!(self.ear, Ear::Octets(_) | Ear::Frames(_)) {
+            pieces.push(Piece::Event(now, "the adapter is back".to_owned()));
+        }
+    }
+
+    /// How the capture at this place went, and whether the kernel sent anything.
+    pub(super) fn summary(&self) -> (String, bool) {
+        let mut spoke = false;
+        let silent = match &self.at.port {
+            TapPort::Frames(AdapterPlace::Slcan { .. }, _) => {
+                "the adapter took the listen-only mode (L), in which it sends nothing on the bus"
+                    .to_owned()
+            }
+            TapPort::Frames(AdapterPlace::Kernel { .. }, _) => {
+                "the interface is in listen-only mode, in which it sends nothing on the bus"
+                    .to_owned()
+            }
+            TapPort::Frames(AdapterPlace::Socketcand { .. }, _) => {
+                "whether the server's controller acknowledges is not known".to_owned()
+            }
+            TapPort::Link(_) | TapPort::Line(..) => match self.before.zip(self.counts()) {
+                None => "bytes sent: not counted by the driver".to_owned(),
+                Some((before, now)) => {
+                    spoke = now.sent != before.sent;
+                    format!("bytes sent: {}", now.sent.saturating_sub(before.sent))
+                }
+            },
+        };
+        let (pieces, errors) = match &self.at.port {
+            TapPort::Frames(..) => ("frames", "errors"),
+            TapPort::Link(_) | TapPort::Line(..) => ("bytes", "damaged"),
+        };
+        let text = format!(
+            "  {} at {}: {} {pieces}, {} {errors}; {silent}\n",
+            self.at.name, self.at.port, self.pieces, self.damaged
+        );
+        (text, spoke)
+    }
+}
+
+fn instant(nanos: u64) -> LineInstant {
+    LineInstant::START + Span::from_nanos(nanos)
+}
+
+fn line_frame(nanos: u64, lasted: Span, frame: Frame) -> LineFrame {
+    let at = instant(nanos);
+    LineFrame {
+        from: sender_of(&frame),
+        start: at - lasted,
+        at,
+        frame,
+        ended: FrameEnd::Good,
+    }
+}
+
+const fn error_words(error: BusError) -> &'static str {
+    match error {
+        BusError::ErrorFrame => "an error on the bus",
+        BusError::NoAcknowledge => "a frame without an acknowledge",
+        BusError::BusOff => "the adapter is bus-off",
+    }
+}
