@@ -1,6 +1,7 @@
 //! An estimate of how late the computer wakes up.
 
-use harness_proto::time::Span;
+use super::HARMLESS;
+use harness_proto::time::{self, Span};
 use std::time::{Duration, Instant};
 
 /// Half-life of the estimate. One late wake-up must not count for long, because the SYNCO sent ahead for it delay each job.
@@ -42,9 +43,41 @@ impl Lateness {
     }
 }
 
+/// For how long a computer has stood still while a caller did nothing but use a line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StoodStill {
+    /// When the last call ended.
+    last: time::Instant,
+    total: Span,
+}
+
+impl StoodStill {
+    /// From now on.
+    pub(crate) const fn new(now: time::Instant) -> Self {
+        Self {
+            last: now,
+            total: Span::ZERO,
+        }
+    }
+
+    /// Notes the time now, which should be that of the last call, or `due` where that is later.
+    pub(crate) fn look(&mut self, now: time::Instant, due: time::Instant) {
+        let late = now.since(self.last.max(due));
+        if late > HARMLESS {
+            self.total = self.total + late;
+        }
+        self.last = now;
+    }
+
+    /// All of it, but for what no drive notices.
+    pub(crate) const fn total(&self) -> Span {
+        self.total
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{HALF, Lateness};
+    use super::{HALF, Lateness, StoodStill};
     use harness_proto::time::Span;
     use std::time::{Duration, Instant};
 
@@ -68,6 +101,19 @@ mod tests {
             "worse than what is left of it"
         );
         assert_eq!(late.at(then + 200 * HALF), Span::ZERO);
+    }
+
+    #[test]
+    fn only_what_drives_notice_counts() {
+        let at = |ms| harness_proto::time::Instant::START + Span::from_millis(ms);
+        let mut still = StoodStill::new(at(0));
+        still.look(at(4), at(0));
+        // Asked to wait until then.
+        still.look(at(104), at(100));
+        assert_eq!(still.total(), Span::ZERO);
+        still.look(at(304), at(204));
+        still.look(at(314), at(0));
+        assert_eq!(still.total(), Span::from_millis(110));
     }
 
     #[test]

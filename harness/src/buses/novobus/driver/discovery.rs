@@ -13,14 +13,14 @@ use harness_proto::nd21::units::{
 };
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
-use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
 /// A telegram that addresses no drive: each of N drives adds 1 to the 00, and no sum is 0 (9.3). All drives pass the net byte on.
 const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 
-/// Counts the drives of a ring. If nothing sensible comes back, counts once more after 17 zeros and the check sequence (9.8). Changes
+/// Counts the drives of a ring. If nothing sensible comes back, counts once more after the check sequence (9.8). Changes
 /// nothing in the drives.
 ///
 /// # Errors
@@ -32,11 +32,11 @@ pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error>
         .ok_or_else(|| link.trouble().cloned().map_or_else(no_answer, Error::Link))
 }
 
-/// The bytes that recover a ring: 17 zeros and the check sequence (9.8).
-fn repair() -> Vec<u8> {
-    let mut bytes = vec![0; usize::from(ZEROS)];
-    bytes.extend(CHECK_SEQUENCE);
-    bytes
+/// The bytes that recover a ring: the check sequence behind its 17 zeros (9.8), twice. Drives behind a time-out pass on seven zeros and then
+/// an address (9.9), so that a drive behind them may not hear the eight zeros for which it waits (9.7). After the first check sequence
+/// they are drives that pass on 17.
+pub(crate) fn repair() -> Vec<u8> {
+    CHECK_SEQUENCE.repeat(2)
 }
 
 fn no_answer() -> Error {

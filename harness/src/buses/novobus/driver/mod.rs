@@ -22,8 +22,8 @@ mod scope;
 
 pub use access::Width;
 pub use axis::Axis;
-pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
+pub(crate) use discovery::{count_behind, repair};
 pub use error::Error;
 /// What a master may send, by the rules of the bus alone.
 pub use harness_sim::novobus::fuzz::jobs::conduct;
@@ -107,8 +107,9 @@ impl<'l> OpenRings<'l> {
 
     fn wait_until_open(&self) -> Result<(), Error> {
         let mut pump = self.lock();
-        let end = pump.now() + self.options.patience;
+        let began = pump.begin();
         loop {
+            let end = pump.end(began, self.options.patience);
             if let Some(halt) = pump.halt() {
                 return Err(halt);
             }
@@ -270,9 +271,10 @@ impl<'l> OpenRings<'l> {
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
     pub fn outcome(&self, order: OrderNumber) -> Result<Outcome, Error> {
-        let end = self.lock().now() + self.options.patience;
+        let began = self.lock().begin();
         loop {
             let mut pump = self.lock();
+            let end = pump.end(began, self.options.patience);
             if let Some(outcome) = pump.take(order.ring, order.id) {
                 return Ok(outcome);
             }

@@ -2,6 +2,7 @@
 
 use super::{Error, Options};
 use crate::buses::novobus::guard::safe_state::telegram;
+use crate::link::lateness::StoodStill;
 use crate::link::{Lead, Line, Octets, Trouble};
 use crate::medium::Out;
 use harness_proto::line::Rate;
@@ -41,6 +42,7 @@ pub(crate) struct Masters<'l> {
     rings: Vec<Ring>,
     /// Events that belong to no job, oldest first, with the number of the ring.
     log: Vec<(usize, Event)>,
+    still: StoodStill,
 }
 
 impl<'l> Masters<'l> {
@@ -70,11 +72,25 @@ impl<'l> Masters<'l> {
             rings: rings.collect(),
             link,
             log: Vec::new(),
+            still: StoodStill::new(now),
         }
     }
 
     pub(crate) fn now(&self) -> Instant {
         self.link.now()
+    }
+
+    /// When `patience` is over that began at a time, when the computer had stood still for `before` in all: a caller that stands still
+    /// itself waits for nothing.
+    pub(crate) fn end(&self, (began, before): (Instant, Span), patience: Span) -> Instant {
+        began + patience + self.still.total().saturating_sub(before)
+    }
+
+    /// The time, and for how long the computer has stood still before it.
+    pub(crate) fn begin(&mut self) -> (Instant, Span) {
+        let now = self.link.now();
+        self.still.look(now, now);
+        (now, self.still.total())
     }
 
     pub(crate) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
@@ -221,8 +237,12 @@ impl<'l> Masters<'l> {
         let mut news = self.poll();
         let rings = 0..self.rings.len();
         let until = rings.fold(end, |until, ring| until.min(self.transmit(ring, awaited)));
+        let now = self.link.now();
+        self.still
+            .look(now, if awaited { Instant::START } else { now });
         while !news && self.link.now() < until && self.link.trouble().is_none() {
             self.link.wait(until);
+            self.still.look(self.link.now(), until);
             news = self.poll();
         }
     }

@@ -3,6 +3,7 @@
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, OrderNumber, recover};
 use crate::counted::counted;
 use crate::guard::Safe;
+use crate::link::lateness::StoodStill;
 use crate::link::{Lead, Line, Octets, Trouble, wait_keeping};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
@@ -14,10 +15,14 @@ use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
 use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
 use harness_proto::time::{Instant, Span};
+use std::cell::Cell;
 use std::fmt;
 
 /// Number of recovery attempts before a ring counts as lost (ND21 9.8; no ring has needed more than three).
 const ATTEMPTS: u8 = 3;
+
+/// How often a ring is taken to its safe state where the computer stood still on the way. Drives are asked in vain meanwhile.
+const TURNS: u8 = 3;
 
 /// A step on the way to the safe state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,7 +113,8 @@ impl fmt::Display for SafeState {
 /// motion on its ramp (11.8). The software block comes with a nominal speed of 0. A drive is confirmed if its `Flags` show all steps
 /// (14.4.2) and it stands. A ring that does not answer gets the stops anyway, because drives in front of a break still receive them.
 ///
-/// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop.
+/// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop. Where the computer stood still on
+/// the way, which drives cannot tell from a master that has gone, a ring gets up to three attempts.
 pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standstill) -> SafeState {
     let mut not_safe = Vec::new();
     for (ring, &size) in rings.iter().enumerate() {
@@ -127,28 +133,52 @@ fn ring_to_safe_state(
     size: RingSize,
     standing: &Standstill,
 ) -> Vec<NotSafe> {
+    let mut late = Span::ZERO;
+    for turn in 1.. {
+        let mut own = OneRing::new(line, ring);
+        let mut not_safe = once(&mut own, size, standing);
+        let here = own.still.get().total();
+        late = late + here;
+        let again = here > Span::ZERO && turn < TURNS && line.trouble().is_none();
+        if not_safe.is_empty() || !again {
+            for own in &mut not_safe {
+                own.axis = Axis::new(ring, own.axis.drive()).unwrap_or(own.axis);
+                if late > Span::ZERO {
+                    let ms = late.as_nanos() / 1_000_000;
+                    own.why.push_str(&format!(
+                        "; the computer stood still for {ms} ms in {} at it",
+                        counted(turn, "attempt")
+                    ));
+                }
+            }
+            return not_safe;
+        }
+    }
+    Vec::new()
+}
+
+/// One attempt at the only ring of a line.
+fn once(line: &mut OneRing<'_>, size: RingSize, standing: &Standstill) -> Vec<NotSafe> {
     let all = |why: String| {
-        let axes = (0..size.drives()).filter_map(|drive| Axis::new(ring, drive));
+        let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
         let not_safe = axes.map(|axis| NotSafe {
             axis,
             why: why.clone(),
         });
         not_safe.collect()
     };
-    if let Err(why) = bring_back(line, ring, size) {
-        stop_blindly(line, ring, size);
+    if let Err(why) = bring_back(line, 0, size) {
+        stop_blindly(line, 0, size);
         return all(why);
     }
     let options = Options {
         patience: Span::from_millis(2_000),
         ..Options::default()
     };
-    let line = OneRing { line, ring };
     let bus = match OpenRings::open(Box::new(line), &[size], options) {
         Ok(bus) => bus,
         Err(error) => return all(error.to_string()),
     };
-    // The bus has one ring, which is ring 0 there.
     let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
     let mut drives: Vec<_> = axes.map(Told::new).collect();
     let mut told = 0;
@@ -165,7 +195,7 @@ fn ring_to_safe_state(
     bus.close();
     let not_safe = drives.into_iter().filter_map(|drive| {
         Some(NotSafe {
-            axis: Axis::new(ring, drive.axis.drive())?,
+            axis: drive.axis,
             why: drive.why?,
         })
     });
@@ -378,10 +408,30 @@ impl SafeStep {
     }
 }
 
-/// One ring of a line, as a line of its own.
+/// One ring of a line, as a line of its own. It measures for how long the computer stands still: nothing but the line takes time on the way
+/// to the safe state.
 struct OneRing<'l> {
     line: &'l mut dyn Line,
     ring: usize,
+    still: Cell<StoodStill>,
+}
+
+impl<'l> OneRing<'l> {
+    fn new(line: &'l mut dyn Line, ring: usize) -> Self {
+        Self {
+            still: Cell::new(StoodStill::new(line.now())),
+            line,
+            ring,
+        }
+    }
+
+    /// The time, which should be that of the last call, or `due` where that is later.
+    fn look(&self, due: Instant) -> Instant {
+        let (now, mut still) = (self.line.now(), self.still.get());
+        still.look(now, due);
+        self.still.set(still);
+        now
+    }
 }
 
 impl Line for OneRing<'_> {
@@ -390,11 +440,13 @@ impl Line for OneRing<'_> {
     }
 
     fn now(&self) -> Instant {
-        self.line.now()
+        self.look(Instant::START)
     }
 
     fn send(&mut self, _: usize, what: Out<'_>) -> Instant {
-        self.line.send(self.ring, what)
+        let end = self.line.send(self.ring, what);
+        self.look(Instant::START);
+        end
     }
 
     fn receive(&mut self, _: usize) -> Option<(Instant, Heard)> {
@@ -402,7 +454,10 @@ impl Line for OneRing<'_> {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.line.wait(until)
+        self.look(Instant::START);
+        let more = self.line.wait(until);
+        self.look(until);
+        more
     }
 
     fn attend(&mut self, _: usize, at: Instant) {

@@ -2,6 +2,7 @@
 //!
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
+use crate::buses::novobus::driver::repair;
 use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
@@ -20,7 +21,7 @@ use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::own::is_of_the_scope;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::at_rest;
 use harness_proto::novobus::sync::SYNCO;
@@ -318,7 +319,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
             .collect();
         match waiting.first() {
             None => {
-                ask_whether_they_monitor(link, all);
+                let _in_the_record = monitors(link, all);
                 return Ok(());
             }
             Some(cell) if link.now() >= end || link.trouble().is_some() => {
@@ -334,8 +335,9 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
     }
 }
 
-/// Reads `Flags2`: whether drives monitor time-outs (ND21 14.10.2) is a setting of their EEPROM (14.3.6), and the model must know it.
-fn ask_whether_they_monitor(link: &mut dyn Link, all: &[(usize, u8)]) {
+/// Whether one of these drives monitors time-outs (ND21 14.10.2), which is a setting of its EEPROM (14.3.6); `None` where a drive does not
+/// answer.
+pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool> {
     let cell = |&(ring, drive): &(usize, u8)| Before {
         ring,
         drive,
@@ -343,10 +345,18 @@ fn ask_whether_they_monitor(link: &mut dyn Link, all: &[(usize, u8)]) {
         data: 0,
     };
     let cells: Vec<Before> = all.iter().map(cell).collect();
+    let monitors = |data: &Vec<u8>| {
+        data.iter()
+            .any(|own| own & nd21::bits::flags2::MONITORING != 0)
+    };
+    let mut any = Some(false);
+    // Every ring is asked: the model reads the answers in the record.
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        // The model reads the answers in the record.
-        let _in_the_record = together(link, own, Before::read);
+        let flags = together(link, own, Before::read);
+        let here = flags.map(|flags| flags.iter().any(monitors));
+        any = any.zip(here).map(|(any, here)| any || here);
     }
+    any
 }
 
 /// Lets time pass without a byte on the ring: a drive may be silent while it tests itself (property `self-test-bus`, ND21 11.8), and one that
@@ -365,7 +375,7 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
         .collect();
     let size = RingSize::new(u64::from(link.drives(ring))).ok();
     if heard.len() > MAX_ZEROS && sounds_timed_out(&heard, size) {
-        let left = link.send_octets(ring, &CHECK_SEQUENCE);
+        let left = link.send_octets(ring, &repair());
         settle(link, left);
     }
 }
@@ -374,7 +384,7 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
 /// time-outs miss their bytes meanwhile (9.9), so the check sequence comes first each time (9.8).
 fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     let end = link.now() + SELF_TEST;
-    let bytes = [&CHECK_SEQUENCE[..], &[SYNCO]].concat();
+    let bytes = [&repair()[..], &[SYNCO]].concat();
     while !comes_round(link, ring, &bytes, PATIENCE) {
         if link.now() >= end || link.trouble().is_some() {
             return false;
@@ -384,10 +394,11 @@ fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     true
 }
 
-/// Whether the last bytes of some that begin with the check sequence come round (9.8), no later than `patience` behind the time that the ring
+/// Whether a check sequence and what follows it come round, of bytes that end so (9.8), no later than `patience` behind the time that the ring
 /// itself needs.
 fn comes_round(link: &mut dyn Link, ring: usize, bytes: &[u8], patience: Span) -> bool {
-    let last = &bytes[usize::from(ZEROS)..];
+    let from = bytes.iter().rposition(|byte| *byte == SEQUENCE[0]);
+    let last = &bytes[from.unwrap_or(0)..];
     let drives = u64::from(link.drives(ring));
     while link.receive_octet(ring).is_some() {}
     let end = link.send_octets(ring, bytes) + link.byte_time() * (drives + 4) + patience;
