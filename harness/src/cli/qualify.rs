@@ -13,8 +13,7 @@ use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
-use crate::link::{Link as _, Octets as _};
-use crate::qualify::{Bench, Qualification, QualificationFacts};
+use crate::qualify::{Bench, Qualification};
 use crate::rig::{Played, Run, state};
 use crate::scenario::problem::Problems;
 use std::path::PathBuf;
@@ -88,23 +87,6 @@ impl Bench for Live<'_, '_> {
 
     fn show(&mut self, entry: &Entry, played: &Played) -> Result<(), Stop> {
         Ok(show(entry, played, self.output)?)
-    }
-}
-
-/// What is known of a qualification that begins.
-pub(super) fn facts(run: &mut Run<'_>, began: String, thorough: bool) -> QualificationFacts {
-    let rig = run.session().rig().clone();
-    let links = 0..usize::from(rig.ring_size());
-    QualificationFacts {
-        rig,
-        byte_time: run.session().link().byte_time(),
-        exactness: run.exactness(),
-        resets: run.way().anew,
-        reached: links
-            .filter(|link| run.session().link().reaches(0, *link))
-            .collect(),
-        began,
-        thorough,
     }
 }
 

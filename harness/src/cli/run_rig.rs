@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::junit::Cases;
 use super::output::Output;
 use super::page::{Page, write};
-use super::qualify::{Live, facts, settle};
+use super::qualify::{Live, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
@@ -12,7 +12,7 @@ use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Octets, Trouble};
-use crate::qualify::Qualification;
+use crate::qualify::{Qualification, QualificationFacts};
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Keeper, Options, Played, Rig, Run, Session, SessionError};
@@ -175,7 +175,7 @@ fn all(
         let began = folder
             .as_ref()
             .map_or_else(String::new, |own| own.began().to_owned());
-        Qualification::new(facts(&mut run, began, job.thorough))
+        Qualification::new(QualificationFacts::of(&mut run, began, job.thorough))
     });
     let mut course = OnRings { run, course };
     let mut exit = course_of(&mut course, entries, job, (folder.as_mut(), page), output)?;

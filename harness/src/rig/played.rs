@@ -89,6 +89,18 @@ impl Attempt {
         self.outcome.unready.is_none()
     }
 
+    /// Whether the first byte that differs follows a silence or a delay of the bench, which may be its cause.
+    #[must_use]
+    pub fn is_silenced(&self) -> bool {
+        self.comparisons.iter().any(|own| own.silenced)
+    }
+
+    /// The attempt, if its steps were played and the bench's own lateness is no cause of a difference in it.
+    #[must_use]
+    pub fn sound(&self) -> Option<&Self> {
+        (self.was_played() && !self.is_silenced()).then_some(self)
+    }
+
     /// Why the drives could not be made ready, where a drive gave no answer: the computer may have been the cause.
     fn unanswered(&self) -> Option<&str> {
         let why = self.outcome.remarks.first().map(String::as_str);
@@ -102,7 +114,7 @@ impl Attempt {
     }
 
     /// The first byte that came at another time than the model says.
-    fn untimely(&self) -> Option<&Divergence> {
+    pub(crate) fn untimely(&self) -> Option<&Divergence> {
         self.comparisons.iter().find_map(|c| c.untimely.as_ref())
     }
 }
@@ -167,6 +179,8 @@ impl Played {
         let last = self.last_played()?;
         let divergences: Vec<_> = match self.outcome.verdict {
             Verdict::Passed | Verdict::Flaky | Verdict::Inconclusive => Vec::new(),
+            // What the bench or its line could not do says nothing about a drive.
+            Verdict::Aborted | Verdict::RigError if real_time => Vec::new(),
             Verdict::Marginal if real_time => Vec::new(),
             Verdict::Marginal => last.untimely().into_iter().collect(),
             _ => {

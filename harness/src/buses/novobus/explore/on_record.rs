@@ -8,8 +8,7 @@ use crate::buses::novobus::twin;
 use crate::explore::{ExploreError, Rehearsal, Target, Tried};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::PAUSE;
+use harness_proto::novobus::role::Role;
 use harness_proto::time::{Instant, Span};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::VecDeque;
@@ -29,6 +28,9 @@ pub struct AttemptRecord {
     pub(super) last: AnsweredCase,
     /// Whether it was played.
     pub(super) played: bool,
+    /// Whether its drives may monitor time-outs (ND21 9.9), in real time.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) may_monitor: bool,
     /// Whether a known deviation of the rig's file explains its difference.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(super) known: bool,
@@ -88,7 +90,9 @@ impl AttemptRecord {
         let exchange = BytesExchanged::of(&last.case, last.received.clone());
         let found = judge.see(exchange);
         let found = found.or_else(|| untimely(&last.case, &last.received, &self.times));
-        found.filter(|_| !self.known)
+        let silenced =
+            |found: &Difference| self.may_monitor && is_silenced(last, &self.times, found);
+        found.filter(|found| !self.known && !silenced(found))
     }
 }
 
@@ -105,18 +109,15 @@ pub(super) fn untimely(
     times: &ByteTimes,
 ) -> Option<Difference> {
     let size = RingSize::new(u64::from(case.drives)).ok()?;
-    let all = sent(case);
-    let roles = roles(size, &all);
-    let answered = roles.iter().zip(&all).zip(&times.sent);
-    let answered = answered.filter(|((role, (byte, _)), _)| (**role, *byte) != (Role::Idle, PAUSE));
-    let answered: Vec<_> = answered.map(|((role, _), sent)| (*role, *sent)).collect();
+    let (places, roles) = twin::answered(size, &sent(case));
+    let starts = places.iter().map_while(|place| times.sent.get(*place));
+    let answered: Vec<_> = roles.into_iter().zip(starts.copied()).collect();
     if answered.len() != received.len()
         || received.len() != times.came.len()
         || !case.faults().is_empty()
     {
         return None;
     }
-    let at = |units: u64| Instant::START + Span::from_units(units);
     let round = Span::from_units(times.byte.saturating_mul(u64::from(case.drives)));
     let tolerance = Span::from_units(times.tolerance);
     let apart = |(index, (_, sent)): (usize, &(Role, u64))| {
@@ -135,6 +136,48 @@ pub(super) fn untimely(
         step: None,
         drive: None,
     }))
+}
+
+/// Whether drives that may monitor time-outs have missed their bytes in front of a difference, because the bench was silent or late
+/// (ND21 9.9).
+pub(super) fn is_silenced(last: &AnsweredCase, times: &ByteTimes, found: &Difference) -> bool {
+    let AnsweredCase { case, received } = last;
+    let (Ok(size), Some(index)) = (
+        RingSize::new(u64::from(case.drives)),
+        found.byte.and_then(|byte| byte.checked_sub(1)),
+    ) else {
+        return false;
+    };
+    let (places, _) = twin::answered(size, &sent(case));
+    let starts = places.iter().map_while(|place| times.sent.get(*place));
+    let answered: Vec<_> = starts.copied().map(at).collect();
+    let all: Vec<_> = times.sent.iter().copied().map(at).collect();
+    let way = Span::from_units(times.byte.saturating_mul(u64::from(case.drives) + 1));
+    let received = times
+        .came
+        .iter()
+        .copied()
+        .map(at)
+        .zip(received.iter().copied());
+    let received: Vec<_> = received.collect();
+    // Where nothing differs the model expects what came.
+    let expected = answered.iter().zip(&received).enumerate();
+    let expected = expected.map(|(place, (start, (_, came)))| match place < index {
+        true => (*start + way, *came),
+        false => (*start + way, Received::good(!came.byte)),
+    });
+    let expected: Vec<_> = expected.collect();
+    let sent = twin::Sent {
+        answered: &answered,
+        all: &all,
+        way,
+    };
+    let excused = sent.excused_from(size, (&expected, &received), (true, true));
+    excused.is_some_and(|from| received.get(index).is_none_or(|(came, _)| *came >= from))
+}
+
+fn at(units: u64) -> Instant {
+    Instant::START + Span::from_units(units)
 }
 
 /// The attempts of a finding, one after the other, in place of a rig.
@@ -215,4 +258,50 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Received>, D::
     words
         .map(|word| byte(word).ok_or_else(|| de::Error::custom(format!("`{word}` is no byte"))))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::judge::prologue;
+    use super::*;
+
+    /// ND21 9.9: drives that monitor time-outs answer with zeros behind a silence of the bench. Zeros behind none are a drive's fault.
+    #[test]
+    fn only_a_silence_excuses_zeros() {
+        let case = prologue(3, None);
+        let count = case.bytes().len() as u64;
+        let byte = Span::from_micros(286).units();
+        let silenced = |silence: Span| {
+            let sent: Vec<u64> = (0..count)
+                .map(|place| place * byte + if place < 3 { 0 } else { silence.units() })
+                .collect();
+            let mut came: Vec<_> = sent.iter().map(|sent| sent + 4 * byte).collect();
+            let mut received: Vec<_> = case.bytes().into_iter().map(Received::good).collect();
+            received[3..].fill(Received::good(0));
+            came.truncate(received.len());
+            let times = ByteTimes {
+                byte,
+                tolerance: Span::from_millis(20).units(),
+                sent,
+                came,
+            };
+            let last = AnsweredCase {
+                case: case.clone(),
+                received,
+            };
+            let found = Difference::from(&twin::Divergence {
+                ring: 0,
+                byte: 4,
+                what: twin::Symptom::Value,
+                expected: None,
+                received: None,
+                role: Role::Foreign,
+                step: None,
+                drive: None,
+            });
+            is_silenced(&last, &times, &found)
+        };
+        assert!(silenced(Span::from_millis(12)));
+        assert!(!silenced(Span::from_millis(1)));
+    }
 }

@@ -3,17 +3,19 @@
 
 use super::case::{ActKind, Case, Harm, OtherRing};
 use super::judge::{BytesExchanged, Judge, prologue};
-use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, untimely};
+use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, is_silenced, untimely};
 use super::order::{Command, CommandSent};
 use super::play::MasterView;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::run::over_bus::monitors;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::twin::SILENCED;
 use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
 use crate::guard::Guarded;
-use crate::link::{Capability, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
+use crate::link::{Capability, Lead, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::rig::{Run, examine};
 use crate::scenario::run::start_anew;
 use crate::scenario::simulate;
@@ -33,6 +35,9 @@ pub(super) const LONGEST_HISTORY: usize = 40_000;
 /// How long a byte may be missing before it counts as lost, in addition to the tolerance of the rig.
 const PATIENCE: Span = Span::from_millis(60);
 
+/// How much later than that a late computer may receive a byte.
+const LATEST: Span = Span::from_millis(1_000);
+
 /// A rig in use.
 pub struct OnRig<'r, 's> {
     run: &'r mut Run<'s>,
@@ -49,6 +54,8 @@ pub struct OnRig<'r, 's> {
     last: Option<(AttemptRecord, usize)>,
     /// Whether the state of the drives is unknown.
     stale: bool,
+    /// Whether drives monitor time-outs (ND21 9.9), where they say so. No case changes it.
+    monitors: Option<bool>,
 }
 
 impl<'r, 's> OnRig<'r, 's> {
@@ -80,6 +87,7 @@ impl<'r, 's> OnRig<'r, 's> {
             last: None,
             judges,
             stale: true,
+            monitors: None,
         })
     }
 
@@ -93,6 +101,12 @@ impl<'r, 's> OnRig<'r, 's> {
         if anew && start_anew(session.link(), &rings).is_err() {
             self.run.leave_as_they_are();
         }
+        let session = self.run.session();
+        let drives: Vec<_> = session.axes();
+        let drives: Vec<_> = drives.iter().map(|own| (own.ring(), own.drive())).collect();
+        if self.monitors.is_none() {
+            self.monitors = monitors(session.link(), &drives);
+        }
         let took = self.run.session().link().now().since_start();
         self.run.session().health()?;
         self.history.iter_mut().for_each(Vec::clear);
@@ -101,7 +115,7 @@ impl<'r, 's> OnRig<'r, 's> {
             self.possible[ring] = judge.possible();
             let case = prologue(rings[ring].drives(), beside_of(&rings, ring));
             let link = self.run.session().link();
-            let (received, ..) = converse(link, &case, case.bytes().len());
+            let Said { received, .. } = converse(link, &case, case.bytes().len());
             let received: Vec<_> = received.into_iter().map(|(_, byte)| byte).collect();
             // A difference here shows again in the first case.
             let _again = judge
@@ -115,6 +129,11 @@ impl<'r, 's> OnRig<'r, 's> {
 }
 
 impl OnRig<'_, '_> {
+    /// Whether drives may miss their master in a silence of the bench.
+    fn may_monitor(&self) -> bool {
+        self.run.exactness().tolerance > Span::ZERO && self.monitors != Some(false)
+    }
+
     /// An attempt of which nothing was played yet.
     fn record(&self, case: &Case) -> AttemptRecord {
         let ring = case.ring();
@@ -127,20 +146,24 @@ impl OnRig<'_, '_> {
                 received: Vec::new(),
             },
             played: false,
+            may_monitor: self.may_monitor(),
             known: false,
             times: ByteTimes::default(),
         }
     }
 
-    /// When bytes went and came.
-    fn times(&mut self, received: &[(Instant, Received)], sent: &[Instant]) -> ByteTimes {
+    /// When bytes went and came. Times that a late computer saw tell nothing of the drives.
+    fn times(&mut self, said: &Said) -> ByteTimes {
         let link = self.run.session().link();
         let units = |at: &Instant| at.since_start().units();
         ByteTimes {
             byte: link.byte_time().units(),
-            tolerance: link.time_tolerance().units(),
-            sent: sent.iter().map(units).collect(),
-            came: received.iter().map(|(at, _)| units(at)).collect(),
+            tolerance: match said.late {
+                true => u64::MAX,
+                false => link.time_tolerance().units(),
+            },
+            sent: said.sent.iter().map(units).collect(),
+            came: said.received.iter().map(|(at, _)| units(at)).collect(),
         }
     }
 }
@@ -158,7 +181,7 @@ impl Target for OnRig<'_, '_> {
             }
         }
         let ring = case.ring();
-        let (received, _, took) = converse(&mut link, case, usize::MAX);
+        let Said { received, took, .. } = converse(&mut link, case, usize::MAX);
         let trace = link.trace(ring);
         let denied = match link.trouble() {
             Some(trouble) => Some(trouble.to_string()),
@@ -179,7 +202,9 @@ impl Target for OnRig<'_, '_> {
         let mut made_ready = Span::ZERO;
         let sent = self.history.iter().flatten();
         let used: usize = sent.map(|own| own.case.bytes().len()).sum();
-        if self.stale || used > LONGEST_HISTORY {
+        // The program has been computing, and drives that monitor time-outs have missed it.
+        let waited = self.monitors == Some(true);
+        if self.stale || waited || used > LONGEST_HISTORY {
             made_ready = self.begin_anew()?;
         }
         if !self.run.session().rig().file.interlock.is_empty() {
@@ -197,7 +222,7 @@ impl Target for OnRig<'_, '_> {
                 ..Tried::default()
             });
         }
-        let (received, due, took) = converse(self.run.session().link(), case, foreseen.count);
+        let said = converse(self.run.session().link(), case, foreseen.count);
         let mut tried: Tried = Tried::default();
         if let Some(trouble) = self.run.session().link().trouble() {
             self.stale = true;
@@ -210,13 +235,22 @@ impl Target for OnRig<'_, '_> {
                 }
             }
         } else {
-            let times = self.times(&received, &due);
-            let received: Vec<_> = received.iter().map(|(_, byte)| *byte).collect();
+            let times = self.times(&said);
+            let received: Vec<_> = said.received.iter().map(|(_, byte)| *byte).collect();
             let before = acts(&self.history[ring]);
             tried.difference = self.judges[ring].see(BytesExchanged::of(case, received.clone()));
             if tried.difference.is_none() {
                 tried.difference = untimely(case, &received, &times);
             }
+            let answered = AnsweredCase {
+                case: case.clone(),
+                received,
+            };
+            let may_monitor = self.may_monitor();
+            let silenced = tried
+                .difference
+                .take_if(|found| may_monitor && is_silenced(&answered, &times, found));
+            tried.not_played = silenced.as_ref().map(|_| SILENCED.to_owned());
             // A known deviation of the rig's file explains it.
             let deviations = &self.run.session().rig().file.deviation;
             let known = tried.difference.take_if(|found| {
@@ -224,20 +258,17 @@ impl Target for OnRig<'_, '_> {
                 deviations.iter().any(|entry| entry.rule == rule)
             });
             tried.before = (tried.difference.is_some() && !before.is_empty()).then_some(before);
-            let answered = AnsweredCase {
-                case: case.clone(),
-                received,
-            };
             self.history[ring].push(answered.clone());
             if let Some((record, _)) = &mut self.last {
                 (record.last, record.times) = (answered, times);
                 (record.played, record.known) = (true, known.is_some());
             }
             // For how long a drive tests itself is its choice (ND21 11.8).
-            self.stale = known.is_some() || tried.difference.is_some() || case.orders().any(resets);
+            let disturbed = silenced.is_some() || known.is_some() || tried.difference.is_some();
+            self.stale = disturbed || case.orders().any(resets);
         }
         tried.took = match self.run.session().rig().is_simulated() {
-            true => made_ready + took,
+            true => made_ready + said.took,
             false => {
                 Span::from_nanos(u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX))
             }
@@ -270,13 +301,21 @@ impl Target for OnRig<'_, '_> {
     }
 }
 
-/// Sends a case and waits for `count` bytes. Returns the bytes received, the time of each byte sent, and how long the line was used.
-fn converse(
-    link: &mut dyn Link,
-    case: &Case,
-    count: usize,
-) -> (Vec<(Instant, Received)>, Vec<Instant>, Span) {
+/// What was said in a case.
+struct Said {
+    received: Vec<(Instant, Received)>,
+    /// The time of each byte sent.
+    sent: Vec<Instant>,
+    /// How long the line was used.
+    took: Span,
+    /// Whether the computer was late at times by more than any drive is.
+    late: bool,
+}
+
+/// Sends a case and waits for `count` bytes.
+fn converse(link: &mut dyn Link, case: &Case, count: usize) -> Said {
     let ring = case.ring();
+    let mut late = false;
     link.begin();
     for (place, byte, harm) in case.faults() {
         let fault = PlacedFault::Link(usize::from(place), harm.fault());
@@ -288,7 +327,7 @@ fn converse(
     for act in &case.acts {
         if let ActKind::Wait(ms) = act.what {
             let end = link.now() + Span::from_millis(u64::from(ms));
-            await_bytes(link, ring, usize::MAX, end, &mut received);
+            late |= await_bytes(link, ring, usize::MAX, end, &mut received);
         }
         let parts = act.parts(case.drives);
         for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -299,24 +338,36 @@ fn converse(
     }
     let round = byte_time * (u64::from(case.drives) + 2) + link.time_tolerance() + PATIENCE;
     let end = due.last().copied().unwrap_or(link.now()) + round;
-    await_bytes(link, ring, count, end, &mut received);
-    (received, due, link.now().since_start())
+    late |= await_bytes(link, ring, count, end, &mut received);
+    Said {
+        received,
+        sent: due,
+        took: link.now().since_start(),
+        late,
+    }
 }
 
-/// Receives bytes until there are `count` of them, or until `end`.
+/// Receives bytes until there are `count` of them, or until `end`. Returns whether the computer was late meanwhile.
 fn await_bytes(
     link: &mut dyn Link,
     ring: usize,
     count: usize,
     end: Instant,
     received: &mut Vec<(Instant, Received)>,
-) {
+) -> bool {
+    let mut late = false;
     loop {
+        let lead = link.lead();
+        late |= lead.near == lead.far && lead != Lead::NONE;
         received.extend(std::iter::from_fn(|| link.receive_octet(ring)));
-        if received.len() >= count || link.now() >= end || link.trouble().is_some() {
-            return;
+        // A computer that was late in sending awaits the answers later.
+        let real = link.time_tolerance() > Span::ZERO;
+        let later = real && link.now() < end + LATEST && link.busy();
+        let over = link.now() >= end && !later;
+        if received.len() >= count || over || link.trouble().is_some() {
+            return late;
         }
-        link.wait(end);
+        link.wait(end.max(link.now() + link.byte_time()));
     }
 }
 

@@ -14,7 +14,6 @@ use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::reference;
 use harness_sim::novobus::witness::Complaint;
@@ -134,7 +133,7 @@ pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Opti
         None => (pairs().position(|(a, b)| a.0 != b.0)?, Symptom::Time),
     };
     let sent = sent(case);
-    let found = answered(&roles(size, &sent), &sent).nth(index);
+    let found = twin::answering(&roles(size, &sent), &sent).nth(index);
     let (place, role) = found.unwrap_or((sent.len(), Role::Foreign));
     let is_calm = calm(size, &sent).get(place) == Some(&true);
     let divergence = twin::Divergence {
@@ -162,17 +161,6 @@ pub(crate) fn sent(case: &Case) -> Vec<(u8, bool)> {
     let numbered = (1..).zip(case.bytes());
     let whole = numbered.map(|(number, byte)| (byte, !damaged.contains(&number)));
     whole.collect()
-}
-
-/// The bytes that are answered, by their places, and their roles: a PAUSE where a sync byte is due is not answered (ND21 9.2).
-pub(crate) fn answered<'a>(
-    roles: &'a [Role],
-    sent: &'a [(u8, bool)],
-) -> impl Iterator<Item = (usize, Role)> + 'a {
-    let pairs = roles.iter().zip(sent).enumerate();
-    pairs
-        .filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE))
-        .map(|(place, (role, _))| (place, *role))
 }
 
 /// The first place where a simulated ring of plain drives differs from the reference model. `None` also if the model does not cover

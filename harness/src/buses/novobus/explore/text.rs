@@ -1,11 +1,12 @@
 //! A case as a scenario: every finding is one.
 
 use super::case::{Act, ActKind, Case, Harm, Talk, To};
-use super::oracle::{answered, sent};
+use super::oracle::sent;
 use super::play::MasterView;
 use crate::buses::novobus::language::syntax::{
     Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
 };
+use crate::buses::novobus::twin::answering;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::{Expected as Byte, Pattern};
 use crate::scenario::problem::Span;
@@ -195,11 +196,11 @@ fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
     let sent = sent(case);
     let roles = RingSize::new(u64::from(case.drives)).map(|size| roles(size, &sent));
     let roles = roles.unwrap_or_default();
-    if received.len() == answered(&roles, &sent).count() {
+    if received.len() == answering(&roles, &sent).count() {
         let mut rest = (&roles[..], &sent[..]);
         for part in case.acts.iter().flat_map(|act| act.parts(case.drives)) {
             let (own, later) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
-            let count = answered(own.0, later.0).count();
+            let count = answering(own.0, later.0).count();
             answer(text, case, from..from + count, expected);
             from += count;
             rest = (own.1, later.1);

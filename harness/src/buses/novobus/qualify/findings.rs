@@ -91,6 +91,9 @@ impl Findings {
         let whole = last.comparisons.len() == last.conversations.len() && !left_out;
         let why = match verdict {
             Verdict::Skipped => "the drives could not be made ready",
+            Verdict::Inconclusive if last.is_silenced() => {
+                "the computer was late or left the line silent before the first byte that differs (ND21 9.9)"
+            }
             Verdict::Inconclusive if differs => {
                 "a byte differed where the manual leaves the drive a choice"
             }
@@ -158,7 +161,7 @@ impl Findings {
     /// Notes an attempt with the drives' roles exchanged: to whom the byte belonged at which it differed, if it did. `None` where it says
     /// nothing.
     pub(super) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
-        let last = played.last_played().filter(|own| own.was_played())?;
+        let last = played.last_played().and_then(Attempt::sound)?;
         let differs = |attempt: &Attempt| {
             let mut comparisons = attempt.comparisons.iter();
             comparisons.any(|own| own.divergence.is_some())

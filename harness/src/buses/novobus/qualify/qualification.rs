@@ -11,10 +11,11 @@ use super::pinned::questions;
 use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
 use super::settle::{Answer, answer, silence};
 use crate::buses::novobus::language::syntax::Header;
-use crate::buses::novobus::twin::{Exactness, Twin};
+use crate::buses::novobus::twin::{Exactness, SILENCED, Twin};
 use crate::library::Entry;
+use crate::link::{Link as _, Octets as _};
 use crate::rig::segment::Qualified;
-use crate::rig::{Played, Profile, Rig};
+use crate::rig::{Attempt, Played, Profile, Rig, Run};
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -79,6 +80,25 @@ pub(crate) struct QualificationFacts {
     pub(crate) began: String,
     /// Whether the long conversations are played too.
     pub(crate) thorough: bool,
+}
+
+impl QualificationFacts {
+    /// Those of a qualification that begins on a rig in use.
+    pub(crate) fn of(run: &mut Run<'_>, began: String, thorough: bool) -> Self {
+        let rig = run.session().rig().clone();
+        let links = 0..usize::from(rig.ring_size());
+        Self {
+            rig,
+            byte_time: run.session().link().byte_time(),
+            exactness: run.exactness(),
+            resets: run.way().anew,
+            reached: links
+                .filter(|link| run.session().link().reaches(0, *link))
+                .collect(),
+            began,
+            thorough,
+        }
+    }
 }
 
 /// A qualification in progress.
@@ -191,9 +211,8 @@ impl Qualification {
 
     /// Notes which drives hold bytes back. Where times are exact the model has judged them.
     fn measure(&mut self, played: &Played) {
-        let last = played
-            .last_played()
-            .and_then(|own| own.conversations.last());
+        let last = played.last_played().and_then(Attempt::sound);
+        let last = last.and_then(|own| own.conversations.last());
         let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
         let held = last.map(|own| held_back(self.drives, self.facts.byte_time, own));
         for own in held.into_iter().flatten() {
@@ -242,7 +261,7 @@ impl Qualification {
                 break;
             }
             let played = bench.play(&question.entry)?;
-            let last = played.last_played().filter(|own| own.was_played());
+            let last = played.last_played().and_then(Attempt::sound);
             let shown = last.and_then(|own| question.answer(&own.conversations));
             shown
                 .into_iter()
@@ -413,27 +432,37 @@ impl Qualification {
             _ => PROBED,
         };
         let mut last = Vec::new();
-        for _ in 0..most {
+        let mut silenced = false;
+        for turn in 1..=most {
             let mut conversations = Vec::new();
             last.clear();
+            silenced = false;
+            let mut late = false;
             for entry in &probe.entries {
                 let played = bench.play(entry)?;
                 let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
                     self.findings.note_attempts(entry.short_name(), &played);
                     return Ok(Err(played.outcome.remarks.join("; ")));
                 };
+                silenced |= attempt.is_silenced();
+                late |= attempt.untimely().is_some();
                 conversations.push(attempt.conversations.clone());
                 last.push((entry.short_name(), played));
             }
             let twin = |header: &Header| bench.twin(&known.and(header));
             match answer(probe, self.drives, &conversations, exactness, &twin) {
                 Ok(Answer::Unexplained) => {}
-                Ok(answer) => return Ok(Ok(answer)),
+                // A question that a late computer has asked says little of a time. A drive is as late at each turn.
+                Ok(answer) if !late || turn == most => return Ok(Ok(answer)),
+                Ok(_) => {}
                 Err(problems) => return Ok(Err(problems.to_string())),
             }
             if bench.over() {
                 break;
             }
+        }
+        if silenced {
+            return Ok(Err(SILENCED.to_owned()));
         }
         for (name, played) in &last {
             self.findings.note_attempts(name, played);
@@ -451,7 +480,7 @@ impl Qualification {
         entry: &Entry,
     ) -> Result<Result<Answer, String>, B::Stop> {
         let played = bench.play(entry)?;
-        let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
+        let Some(attempt) = played.last_played().and_then(Attempt::sound) else {
             return Ok(Err(played.outcome.remarks.join("; ")));
         };
         let mut own = attempt.conversations.iter();

@@ -2,7 +2,9 @@
 
 use super::left_open::{self, Explanation};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
-use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, OwnByte};
+use crate::buses::novobus::twin::{
+    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED,
+};
 use crate::link::{LinkEvent, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
@@ -16,10 +18,6 @@ use harness_sim::novobus::deviation;
 
 /// Cells that the twin took over and that are listed at most.
 const MOST_ADOPTED: usize = 8;
-
-/// Why a difference behind a silence of the bench accuses no drive.
-const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
-    (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
 
 /// What is known of an attempt besides its outcome.
 pub(crate) struct Heard<'h> {
@@ -132,6 +130,13 @@ fn diverged(
             outcome.remarks.push(told(entry));
         }
         None => match left_open::explanation(heard) {
+            Some(found) if found.comparisons.iter().any(|own| own.silenced) => {
+                outcome.verdict = Verdict::Inconclusive;
+                outcome.remarks.push(format!(
+                    "{} explains every byte up to a silence of the bench: {SILENCED}",
+                    found.words
+                ));
+            }
             Some(found) => {
                 let passed = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
                 if passed && found.before_steps && outcome.unready.is_none() {

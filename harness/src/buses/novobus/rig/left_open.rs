@@ -190,7 +190,8 @@ fn choices(rig: &Rig) -> Vec<Choice> {
         .collect()
 }
 
-/// How an attempt compares with drives with this header that have just been switched on.
+/// How an attempt compares with drives with this header that have just been switched on, up to a silence of the bench that may be the
+/// cause of a difference.
 ///
 /// # Errors
 /// Where it first differs, and whether one of the drives monitors time-outs.
@@ -205,7 +206,9 @@ fn compare(header: &Header, heard: &Heard<'_>) -> Result<Vec<Comparison>, (Place
     };
     let comparisons = twin.follow_while_alike(heard.conversations, heard.exactness);
     let conversation = comparisons.len();
-    match comparisons.last().and_then(|own| own.divergence.clone()) {
+    // What differs behind a silence of the bench says nothing about a choice.
+    let last = comparisons.last().filter(|own| !own.silenced);
+    match last.and_then(|own| own.divergence.clone()) {
         None => Ok(comparisons),
         divergence => Err((
             Place {

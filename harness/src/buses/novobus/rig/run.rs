@@ -6,7 +6,7 @@ use super::health::{Unhealthy, examine};
 use super::judge::{Heard, judge, known};
 use super::session::Session;
 use crate::buses::novobus::language::syntax::Header;
-use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin};
+use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
 use crate::guard::Guarded;
 use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
@@ -201,7 +201,7 @@ impl<'s> Run<'s> {
         let unplaced = ports.map_or(0, |ports| ports.take_unplaced());
         let all = Conversation::all(&both.events, self.byte_time, simulated);
         if let (false, Some(last)) = (simulated, all.last()) {
-            drop_late(self.session.link(), rings, last);
+            drop_late(self.session.link(), &way.rings, last);
         }
         let opening = opening(self.session.rig(), &way, &all, self.exactness);
         let (conversations, fresh) = way.compared(all, self.exactness);
@@ -455,12 +455,12 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
 }
 
 /// Drops the bytes that come back behind the end of a conversation, from rings that owe some.
-fn drop_late(link: &mut dyn Link, rings: usize, last: &Conversation) {
-    let owed = |ring| {
-        let sent = last.sent_in(ring).len();
-        sent.saturating_sub(last.received_in(ring).len())
+fn drop_late(link: &mut dyn Link, rings: &[RingSize], last: &Conversation) {
+    let owed = |(ring, size): (usize, &RingSize)| {
+        let answered = answered(*size, &last.sent_in(ring)).0.len();
+        answered.saturating_sub(last.received_in(ring).len())
     };
-    let mut owed: Vec<usize> = (0..rings).map(owed).collect();
+    let mut owed: Vec<usize> = rings.iter().enumerate().map(owed).collect();
     let end = link.now() + LATEST;
     while owed.iter().any(|owed| *owed > 0) && link.now() < end && link.trouble().is_none() {
         if !wait_keeping(link, end) {

@@ -429,11 +429,20 @@ impl Comparer<'_> {
     }
 }
 
-/// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).
-fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
-    let all = roles(size, sent).into_iter().zip(sent).enumerate();
-    let answered = all.filter(|(_, (role, (byte, _)))| (*role, *byte) != (Role::Idle, PAUSE));
-    answered.map(|(place, (role, _))| (place, role)).unzip()
+/// The bytes that are answered, by their places among those sent, and their roles.
+pub(crate) fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
+    answering(&roles(size, sent), sent).unzip()
+}
+
+/// The same of bytes whose roles are known: a PAUSE where a sync byte is due is swallowed (ND21 9.2).
+pub(crate) fn answering<'a>(
+    roles: &'a [Role],
+    sent: &'a [(u8, bool)],
+) -> impl Iterator<Item = (usize, Role)> + 'a {
+    let pairs = roles.iter().zip(sent).enumerate();
+    pairs
+        .filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE))
+        .map(|(place, (role, _))| (place, *role))
 }
 
 /// The bytes that the model answers, of those that a ring answers where every drive listens. A drive that is silent while it tests itself

@@ -13,9 +13,10 @@ mod program;
 mod rows;
 mod unasked;
 
-pub(crate) use compare::{unknowable, what_of};
+pub(crate) use compare::{answered, answering, unknowable, what_of};
 pub use comparison::{
     Adopted, Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
 };
 pub use follow::{Conversation, Done, Twin};
 pub use harness_proto::novobus::role::Role;
+pub(crate) use unasked::{SILENCED, Sent};

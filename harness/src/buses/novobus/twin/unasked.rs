@@ -17,6 +17,10 @@ use harness_proto::time::{Instant, Span};
 /// A byte and when it came.
 type Heard = (Instant, Received);
 
+/// Why a difference behind a silence of the bench accuses no drive.
+pub(crate) const SILENCED: &str = "the computer was late or the line was silent before the first byte that differs: drives that monitor time-outs miss their bytes then \
+    (ND21 9.9), and these drives do, or it is not known that they do not; run it again on a computer with less load";
+
 /// Where a race of clocks begins: at the first byte that was sent unasked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Race {

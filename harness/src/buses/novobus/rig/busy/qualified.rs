@@ -1,0 +1,196 @@
+//! Qualifications and fuzz runs on such a computer: no right drive fails, no deviation is named, and nothing is found.
+
+use super::line::Stalls;
+use super::{Run, rig, session};
+use crate::buses::novobus::explore::{OnRig, RingSetup};
+use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::twin::Twin;
+use crate::cli::fuzz::scope;
+use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swarm, Watcher};
+use crate::library::Entry;
+use crate::qualify::{Bench, Qualification, QualificationFacts};
+use crate::rig::Played;
+use crate::scenario::problem::Problems;
+use crate::scenario::verdict::Verdict;
+
+/// A rig whose outcomes are kept.
+struct Watched<'r, 's> {
+    run: &'r mut Run<'s>,
+    failed: Vec<String>,
+    told: String,
+}
+
+impl Bench for Watched<'_, '_> {
+    type Stop = String;
+
+    fn play(&mut self, entry: &Entry) -> Result<Played, String> {
+        let plan = entry.plan.as_ref().expect("a plan");
+        let played = self.run.play(plan, None);
+        let played = played.map_err(|error| format!("{}: {error}", entry.short_name()))?;
+        if played.outcome.verdict == Verdict::Failed {
+            let why = played.outcome.remarks.join("; ");
+            self.failed.push(format!("{}: {why}", entry.short_name()));
+        }
+        Ok(played)
+    }
+
+    fn over(&mut self) -> bool {
+        false
+    }
+
+    fn twin(&self, header: &Header) -> Result<Twin, Problems> {
+        self.run.twin_with(header)
+    }
+
+    fn tell(&mut self, text: &str) -> Result<(), String> {
+        self.told.push_str(text);
+        Ok(())
+    }
+
+    fn show(&mut self, _: &Entry, _: &Played) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// What a qualification of right drives says that it must not say.
+fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
+    let rig = rig("");
+    let stalls = Stalls::new(seed, one_in);
+    let mut session = session(&rig, drives, stalls).expect("a right ring that opens");
+    let mut run = Run::new(&mut session).expect("a run");
+    run.repeat();
+    let facts = QualificationFacts::of(&mut run, String::new(), false);
+    let mut watched = Watched {
+        run: &mut run,
+        failed: Vec::new(),
+        told: String::new(),
+    };
+    let mut said = match Qualification::new(facts).settle(&mut watched) {
+        Ok(found) => {
+            let named = found.deviations.lines();
+            let named = named.filter(|line| {
+                line.starts_with("deviation:") || line.contains("the drives differ from the model")
+            });
+            let mut named: Vec<_> = named.map(str::to_owned).collect();
+            if found.verdict == Verdict::Failed {
+                named.push("exit code 1".to_owned());
+            }
+            named
+        }
+        Err(why) => vec![why],
+    };
+    if !said.is_empty() {
+        eprintln!("{}", watched.told);
+    }
+    said.extend(watched.failed);
+    said.iter()
+        .map(|own| format!("seed {seed}: {own}"))
+        .collect()
+}
+
+/// Keeps what a run finds.
+#[derive(Default)]
+struct Found(Vec<String>);
+
+impl Watcher for Found {
+    fn round(&mut self, _: u64, _: &Swarm) {}
+
+    fn found(&mut self, finding: &Finding, file: &str) {
+        let Finding {
+            confirmed,
+            difference,
+            ..
+        } = finding;
+        // A byte that was late, and was not late again, is told and blames no drive.
+        if *confirmed || !difference.time {
+            let confirmed = if *confirmed { "confirmed" } else { "flaky" };
+            self.0
+                .push(format!("{file}, {confirmed}: {}", difference.about));
+        }
+    }
+
+    fn progress(&mut self, _: &Progress, _: &Pool) {}
+}
+
+/// What a fuzz run finds on right drives.
+fn found(drives: &str, (seed, one_in): (u64, u64), cases: u64) -> Vec<String> {
+    let rig = rig("");
+    let stalls = Stalls::new(seed, one_in);
+    let mut session = session(&rig, drives, stalls).expect("a right ring that opens");
+    let mut run = Run::new(&mut session).expect("a run");
+    let scope = scope(&mut run);
+    let about = FuzzSettings {
+        schema: <FuzzSettings>::SCHEMA,
+        rig: "busy".to_owned(),
+        drives: 3,
+        second: None,
+        ports: true,
+        seed,
+        confirm: 2,
+        of: 3,
+        setup: RingSetup::of_ports(1),
+        spices: Vec::new(),
+    };
+    let mut target = OnRig::new(&mut run, scope.limits).expect("a target");
+    let bounds = Bounds {
+        cases,
+        wire: None,
+        findings: 1_000,
+        every: 1,
+    };
+    let mut found = Found::default();
+    let mut fuzz = FuzzRun::new(about, scope);
+    if let Err(error) = fuzz.run(&mut target, None, &bounds, &mut found) {
+        found.0.push(error.to_string());
+    }
+    eprintln!("{:?}", fuzz.progress());
+    found
+        .0
+        .iter()
+        .map(|own| format!("seed {seed}: {own}"))
+        .collect()
+}
+
+const NOTHING: [String; 0] = [];
+
+/// The settings of a right ring: the manual's, monitoring by the EEPROM (ND21 14.3.6), and other choices that it leaves open.
+const RIGHT: [&str; 3] = [
+    "",
+    "drive 0..last eeprom 47 = 80",
+    "drive 0..last eeprom 47 = 80\ndrive 0..last property read-long = as-printed\ndrive 0..last property short-address = kept-sum",
+];
+
+/// Numbers of a trial by hand: `BUSY=one_in,first,last,drives`.
+#[test]
+#[ignore = "takes minutes"]
+fn by_hand() {
+    let text = std::env::var("BUSY").unwrap_or_default();
+    let numbers: Vec<u64> = text
+        .split(',')
+        .map(|own| own.parse().expect("a number"))
+        .collect();
+    let [one_in, first, last, drives, cases] = numbers[..] else {
+        panic!("five numbers")
+    };
+    let drives = RIGHT[usize::try_from(drives).expect("a number")];
+    for seed in first..last {
+        let all = match cases {
+            0 => blamed(drives, (seed, one_in)),
+            1 => super::accused(drives, (seed, one_in), ""),
+            _ => found(drives, (seed, one_in), cases),
+        };
+        for one in all {
+            eprintln!("{one}");
+        }
+    }
+}
+
+#[test]
+fn a_qualification_on_a_busy_computer_blames_no_drive() {
+    assert_eq!(blamed("", (1, 300)), NOTHING);
+}
+
+#[test]
+fn a_fuzz_run_on_a_busy_computer_finds_nothing() {
+    assert_eq!(found("", (1, 300), 60), NOTHING);
+}
