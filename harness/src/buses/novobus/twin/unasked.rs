@@ -95,7 +95,9 @@ impl Sent<'_> {
         for (index, heard) in received.iter().enumerate().rev() {
             run = if spelled(heard) { run + 1 } else { 0 };
             let at_end = last.is_none_or(|last| index > last);
-            in_error_mode[index] = run > usize::from(ZEROS) || at_end;
+            // What comes before any answer can come is unasked: the line was silent before the conversation.
+            let before = index == 0 && run > 0 && early(0);
+            in_error_mode[index] = run > usize::from(ZEROS) || at_end || before;
         }
         let same =
             |index: &usize| expected.get(*index).map(|own| own.1) == Some(received[*index].1);

@@ -292,13 +292,7 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), NotRead
 /// The first drive that does not come back, in a sentence.
 pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotReady> {
     link.begin();
-    let cell = |&(ring, drive): &(usize, u8)| Before {
-        ring,
-        drive,
-        address: nd21::ram::STATUS,
-        data: 0,
-    };
-    let cells: Vec<Before> = all.iter().map(cell).collect();
+    let cells = in_each(all, nd21::ram::STATUS);
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {
         reset_ring(link, own)?;
     }
@@ -335,16 +329,9 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
     }
 }
 
-/// Whether one of these drives monitors time-outs (ND21 14.10.2), which is a setting of its EEPROM (14.3.6); `None` where a drive does not
-/// answer.
+/// Whether one of these drives monitors time-outs (ND21 14.10.2, 14.3.6); `None` where a drive does not answer.
 pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool> {
-    let cell = |&(ring, drive): &(usize, u8)| Before {
-        ring,
-        drive,
-        address: nd21::ram::FLAGS2,
-        data: 0,
-    };
-    let cells: Vec<Before> = all.iter().map(cell).collect();
+    let cells = in_each(all, nd21::ram::FLAGS2);
     let monitors = |data: &Vec<u8>| {
         data.iter()
             .any(|own| own & nd21::bits::flags2::MONITORING != 0)
@@ -359,8 +346,18 @@ pub(crate) fn monitors(link: &mut dyn Link, all: &[(usize, u8)]) -> Option<bool>
     any
 }
 
-/// Lets time pass without a byte on the ring: a drive may be silent while it tests itself (property `self-test-bus`, ND21 11.8), and one that
-/// comes back in the middle of a telegram takes its next byte for a sync byte.
+/// A cell in each of these drives.
+fn in_each(all: &[(usize, u8)], address: u16) -> Vec<Before> {
+    let cell = |&(ring, drive)| Before {
+        ring,
+        drive,
+        address,
+        data: 0,
+    };
+    all.iter().map(cell).collect()
+}
+
+/// Lets time pass without a byte: a drive that comes back from its self-test (ND21 11.8) within a telegram takes its next byte for a sync byte.
 fn be_quiet(link: &mut dyn Link) {
     let end = link.now() + QUIET;
     while link.now() < end && link.trouble().is_none() {
@@ -394,8 +391,7 @@ fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     true
 }
 
-/// Whether a check sequence and what follows it come round, of bytes that end so (9.8), no later than `patience` behind the time that the ring
-/// itself needs.
+/// Whether the last check sequence of these bytes and what follows it come round (9.8), `patience` behind the ring's own time at the latest.
 fn comes_round(link: &mut dyn Link, ring: usize, bytes: &[u8], patience: Span) -> bool {
     let from = bytes.iter().rposition(|byte| *byte == SEQUENCE[0]);
     let last = &bytes[from.unwrap_or(0)..];
