@@ -111,11 +111,21 @@ fn what_a_scenario_needs_follows_from_its_telegrams() {
 /// An edit of any line or file is found: the inverters are simulated, so that the run can be played again.
 #[test]
 fn edited_evidence_is_found() {
+    edits::check_each(&edits::of(edited(), false), 12);
+}
+
+#[test]
+#[ignore = "plays the run again for each edit, some minutes in all; .ci/nightly runs it"]
+fn each_edit_of_evidence_is_found() {
+    edits::check(&edits::of(edited(), false));
+}
+
+fn edited() -> Desk {
     let desk = desk("deviates no-off2", ALL);
     let off2 = "title Off\nsource nordac 3.2.1\nbus nordac\nslave 8\nstart 8 ppo 1\non 8\nexchange 8 STW=047D\nexchange 8 STW=047D -> ZSW=xx60\n";
     with(&desk, "off2.scn", off2);
     with(&desk, "looks.scn", LOOKS);
     let more = ["off2.scn", "looks.scn", "--evidence", "kept"];
     ended(&run(&desk, &more), 5, "inconclusive");
-    edits::check_each(&edits::of(desk, false), 3);
+    desk
 }

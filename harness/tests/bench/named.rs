@@ -4,7 +4,7 @@ use crate::program::{Desk, ended, said};
 
 #[test]
 fn deviations_are_named() {
-    named(&["checksum-wrong", "counts-7-zeros"]);
+    named(&["counts-7-zeros"]);
 }
 
 #[test]

@@ -182,5 +182,5 @@ fn edited_evidence_is_found() {
         "kept",
     ];
     ended(&run(&desk, &more), 1, "failed");
-    edits::check_each(&edits::of(desk, false), 3);
+    edits::check_each(&edits::of(desk, false), 6);
 }

@@ -25,7 +25,7 @@ fn of_rings_of_their_own() {
 /// A rig that denies what it can has few conversations, which are played again for each edit.
 #[test]
 fn of_a_careful_qualification() {
-    check_each(&kept(Desk::limited(OWN, ""), "qualify", false), 4);
+    check_each(&kept(Desk::limited(OWN, ""), "qualify", false), 16);
 }
 
 #[test]
