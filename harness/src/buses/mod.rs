@@ -319,6 +319,11 @@ pub(crate) fn judge_shared(
     setup: Option<&Source>,
 ) -> Result<JudgedFrames, String> {
     match shared(traces) {
+        Some(Bus::Nordac) if setup.is_some() => Err(
+            "--setup changes nothing where telegrams are judged: a slave is accused only of what no right slave does, whatever its settings; \
+             leave it out"
+                .to_owned(),
+        ),
         Some(Bus::Nordac) => Ok(nordac::capture::judged(traces)),
         _ => unitek::capture::judged(traces, setup),
     }

@@ -6,7 +6,7 @@ use super::exit::Exit;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_any_rig;
-use super::run::select;
+use super::run::{of_rig, select};
 use super::run_rig::{PlayOrder, Stop, over, play, show, work};
 use super::run_segment;
 use crate::buses::syntax::Header;
@@ -26,7 +26,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     };
     let size = Some(rig.ring_size()).filter(|own| *own > 0);
     let entries = match select(&arguments.selection, size) {
-        Ok(entries) => entries,
+        Ok(entries) => of_rig(entries, &rig, output),
         Err(errors) => {
             errors.iter().for_each(|error| output.library_error(error));
             return Ok(Exit::Usage);

@@ -9,6 +9,8 @@ use super::rig_failure::find_any_rig;
 use super::run_rig::{PlayOrder, reports, work};
 use super::run_segment;
 use super::tally::Tally;
+use crate::buses::Bus;
+use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Recording;
@@ -47,6 +49,21 @@ pub(crate) fn select(
     Ok(entries)
 }
 
+/// The scenarios for the bus of a rig; says how many others were selected.
+pub(crate) fn of_rig(mut entries: Vec<Entry>, rig: &Rig, output: &mut Output) -> Vec<Entry> {
+    let bus = rig.port().map_or(Bus::DEFAULT, |port| port.bus.bus());
+    let all = entries.len();
+    entries.retain(|entry| entry.scenario.bus == bus);
+    let left_out = all - entries.len();
+    if left_out > 0 {
+        let count = counted(left_out, "scenario");
+        output.say(&format!(
+            "left out, for other buses than the rig's: {count}\n"
+        ));
+    }
+    entries
+}
+
 /// Plays scenarios, one line each.
 pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
     let rig = match arguments
@@ -68,6 +85,11 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             return Ok(Exit::Usage);
         }
     };
+    let in_use = rig.as_ref().filter(|rig| !rig.is_bare());
+    let entries = match in_use {
+        Some(rig) => of_rig(entries, rig, output),
+        None => entries,
+    };
     if entries.is_empty() {
         output.complain("no scenario was selected; `drivebench list` shows what there is");
         return Ok(Exit::NothingSelected);
@@ -75,7 +97,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
         return Ok(Exit::Usage);
     };
-    if let Some(rig) = rig.as_ref().filter(|rig| !rig.is_bare()) {
+    if let Some(rig) = in_use {
         let job = PlayOrder {
             purpose: "run",
             allow_motion: arguments.allow_motion,

@@ -10,7 +10,6 @@ use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;
 use crate::rig::{Options, Played, Rig};
-use crate::scenario::run::Skip;
 use crate::signals::interrupt_flag;
 
 /// Plays scenarios on a rig with a port, and gives the rig back in its safe state.
@@ -83,7 +82,6 @@ fn all(
     }
     if let Some(path) = &job.evidence {
         let segment = course.run.segment();
-        let selected = entries.iter().filter(|entry| course.is_for(entry));
         let about = AboutRun {
             rig: course.rig,
             rate: segment.rate,
@@ -92,7 +90,7 @@ fn all(
             anew: false,
             own_rings: false,
             purpose: job.purpose,
-            selected: selected.map(|entry| &*entry.source.text).collect(),
+            selected: entries.iter().map(|entry| &*entry.source.text).collect(),
             sign: job.sign.as_deref(),
         };
         *folder = Some(Folder::create(path, &about)?);
@@ -150,14 +148,6 @@ struct SegmentCourse<'r> {
     run: Box<dyn SegmentRun>,
 }
 
-impl SegmentCourse<'_> {
-    /// Whether a scenario is for the bus of the rig.
-    fn is_for(&self, entry: &Entry) -> bool {
-        let bus = self.rig.port().map(|port| port.bus.bus());
-        bus == Some(entry.scenario.bus)
-    }
-}
-
 impl Course for SegmentCourse<'_> {
     fn name(&mut self) -> String {
         self.rig.id().to_owned()
@@ -169,10 +159,6 @@ impl Course for SegmentCourse<'_> {
         folder: Option<&mut Folder>,
     ) -> Result<(String, Played), Stop> {
         let name = entry.short_name().to_owned();
-        if !self.is_for(entry) {
-            let skip = Skip::not_on_rig(entry.scenario.bus);
-            return Ok((name, Played::skipped(skip)));
-        }
         match folder {
             None => Ok((name, self.run.play(&entry.source, None)?)),
             Some(folder) => keep(entry, folder, |keeper| {

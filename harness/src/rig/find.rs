@@ -61,7 +61,7 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
     if let Some(sizes) = name.strip_prefix("sim:") {
         let text = match simulated_port(sizes) {
             Some((bus, drives)) => drives.map(|drives| simulated_bus(bus, drives)),
-            None => simulated_rings(sizes),
+            None => simulated_rings(sizes).map_err(|reason| or_meant(sizes, reason)),
         };
         let text = text.map_err(|reason| FindError::Simulated {
             name: name.to_owned(),
@@ -96,8 +96,34 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
     })
 }
 
-/// The name of a simulated rig that was probably meant: `simm:3`, `sim3` and `SIM 3` mean `sim:3`.
+/// The name of the simulated rig that was probably meant, given what stands behind `sim:`: `nordca:2` means `sim:nordac:2`.
+fn meant_bus(text: &str) -> Option<String> {
+    let (word, number) = text.split_once(':').map_or((text, ""), |own| own);
+    let names = PortBus::ALL.map(PortBus::name);
+    let bus = nearest(word, &names)?;
+    let colon = if number.is_empty() { "" } else { ":" };
+    let meant = format!("{bus}{colon}{number}");
+    simulated_port(&meant)?.1.ok()?;
+    Some(format!("sim:{meant}"))
+}
+
+/// Why there is no simulated rig of this name, given what stands behind `sim:`: the bus that was probably meant, or this reason.
+pub(crate) fn or_meant(text: &str, reason: String) -> String {
+    meant_bus(text).map_or(reason, |meant| {
+        format!("there is no bus of this name; did you mean `{meant}`?")
+    })
+}
+
+/// The name of a simulated rig that was probably meant: `simm:3`, `sim3` and `SIM 3` mean `sim:3`, `sin:nordac` means `sim:nordac`.
 fn simulated_name(name: &str) -> Option<String> {
+    if let Some((word, bus)) = name.split_once(':') {
+        nearest(word, &["sim"])?;
+        if let Some(meant) = meant_bus(bus) {
+            return Some(meant);
+        }
+    } else if let Some(meant) = meant_bus(name) {
+        return Some(meant);
+    }
     let digit = name.find(|c: char| c.is_ascii_digit())?;
     let (word, sizes) = name.split_at(digit);
     let word = word.trim_end_matches(|c: char| !c.is_alphanumeric());

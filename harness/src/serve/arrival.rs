@@ -7,7 +7,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
 pub(super) use system::ask;
-use system::receive;
+use system::{acknowledge, receive};
 
 /// A client's socket.
 #[derive(Debug)]
@@ -34,7 +34,10 @@ impl Client {
         let result = receive(&self.stream, buffer);
         let now = Instant::now();
         match result {
-            Ok((count, age)) => Ok((count, credible(age, now - self.empty))),
+            Ok((count, age)) => {
+                acknowledge(&self.stream);
+                Ok((count, credible(age, now - self.empty)))
+            }
             Err(error) => {
                 self.empty = now;
                 Err(error)
@@ -104,6 +107,12 @@ mod system {
         });
         Ok((read.bytes, age))
     }
+
+    /// Acknowledges what was read at once. A client whose system holds small writes back until the last one is acknowledged (Nagle) would
+    /// wait 40 ms behind each write that gets no reply. The system forgets the setting with the next packet.
+    pub(super) fn acknowledge(stream: &TcpStream) {
+        let _late = rustix::net::sockopt::set_tcp_quickack(stream, true);
+    }
 }
 
 /// Where the system has no stamps, bytes arrive when they are read.
@@ -114,6 +123,8 @@ mod system {
     use std::time::Duration;
 
     pub(in super::super) fn ask(_listener: &TcpListener) {}
+
+    pub(super) const fn acknowledge(_stream: &TcpStream) {}
 
     pub(super) fn receive(
         mut stream: &TcpStream,
@@ -176,5 +187,25 @@ mod tests {
         assert!(ago <= Span::from_nanos(since), "{ago}");
         drop(far);
         assert_eq!(client.read(&mut buffer).expect("the end").0, 0);
+    }
+
+    /// What a client sends is acknowledged at once, even where replies follow requests: the system would wait for a reply to go with it.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_is_read_is_acknowledged_at_once() {
+        use std::io::Read as _;
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let mut far = TcpStream::connect(listener.local_addr().expect("bound")).expect("there");
+        let (stream, _) = listener.accept().expect("a client");
+        let mut client = Client::new(stream, Instant::now());
+        let mut buffer = [0; 8];
+        for _ in 0..8 {
+            far.write_all(&[1]).expect("room");
+            assert_eq!(client.read(&mut buffer).expect("a byte").0, 1);
+            let quick = rustix::net::sockopt::tcp_quickack(&client.stream);
+            assert!(quick.expect("a socket"), "the acknowledgement waits");
+            assert_eq!(client.write(&[2]).expect("room"), 1);
+            far.read_exact(&mut buffer[..1]).expect("a reply");
+        }
     }
 }

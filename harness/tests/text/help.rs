@@ -85,6 +85,19 @@ fn a_misspelt_word_gets_a_suggestion() {
             "did you mean `sim:3`?",
         ),
         (&["info", "--rig", "sim3"], "did you mean `sim:3`?"),
+        (
+            &["info", "--rig", "sim:nordca"],
+            "did you mean `sim:nordac`?",
+        ),
+        (
+            &["info", "--rig", "sim:Unitec:2"],
+            "did you mean `sim:unitek:2`?",
+        ),
+        (
+            &["info", "--rig", "sin:nordac:2"],
+            "did you mean `sim:nordac:2`?",
+        ),
+        (&["info", "--rig", "unitek"], "did you mean `sim:unitek`?"),
         (&["info", "--rig", "SIM:2,3"], "did you mean `sim:2,3`?"),
         (
             &["fuzz", "run", "--deviates", "1=write-ignored"],

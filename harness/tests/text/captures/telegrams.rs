@@ -208,6 +208,11 @@ fn telegrams_of_a_capture_are_judged() {
         said.contains("slave 8: Slave_Diag: Prm_Req and the address of a master contradict each other (NORDAC EN 2)"),
         "{said}"
     );
+    // What a setup says would be ignored.
+    let [path, right] = captured("telegrams-with-setup", talk);
+    let refused = drivebench(&["import", plain(&right), "--setup", plain(&path)]);
+    let said = ended(&refused, 2);
+    assert!(said.contains("--setup changes nothing"), "{said}");
 }
 
 /// A scenario made of a capture plays as the run that was captured, faults of the line included.

@@ -6,13 +6,14 @@ use super::axes;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options};
 use crate::buses::novobus::drives;
+use crate::buses::novobus::rig::named::sizes_of_rings;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::counted::counted;
 use crate::link::{Line, Trouble};
-use crate::rig::find::simulated_port;
+use crate::rig::find::{or_meant, simulated_port};
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::Plan;
@@ -52,9 +53,10 @@ impl FromStr for RigName {
             return drives.map(|_| Self::Named(text.to_owned()));
         }
         match text.strip_prefix("sim:") {
-            Some(sizes) => {
-                crate::buses::novobus::rig::named::sizes_of_rings(sizes).map(Self::Simulated)
-            }
+            Some(sizes) => match sizes_of_rings(sizes) {
+                Ok(sizes) => Ok(Self::Simulated(sizes)),
+                Err(reason) => Err(or_meant(sizes, reason)),
+            },
             None => Ok(Self::Named(text.to_owned())),
         }
     }
