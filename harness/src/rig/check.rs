@@ -191,7 +191,9 @@ impl RigCheck<'_> {
             self.safe_state();
             self.programs();
             self.quarantine();
-            return (None, Header::default());
+            let port = file.port.as_ref().map(|ports| &ports.first);
+            let profile = port.and_then(|port| self.port_profile(port, find_profile));
+            return (profile, Header::default());
         }
         for (ring, number) in file.rings().zip(["1", "2"]) {
             let path = [Step::Key("ring"), Step::Key(number)];

@@ -103,14 +103,6 @@ impl RigCheck<'_> {
                 "nothing expected here",
             );
         }
-        if file.rig.profile.is_some() {
-            let message = "profiles are for benches with rings";
-            self.wrong(
-                &["rig".into(), "profile".into()],
-                message,
-                "nothing expected here",
-            );
-        }
     }
 
     /// What only other buses have is no part of a file for this one.

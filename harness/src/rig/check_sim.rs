@@ -2,25 +2,58 @@
 
 use super::check::{FindProfile, RigCheck};
 use super::file::Sim;
-use super::profile::{KnownProfile, Profile};
+use super::port_file::Port;
+use super::profile::{KnownProfile, Profile, ProfileLines, ProfileSetup};
 use crate::buses::header::{for_other_rings, parse_lines};
 use crate::buses::syntax::Header;
 use crate::file::schema::Step;
 use crate::rig::sim::{mistakes, sizes};
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::source::{Source, line_number};
+use serde::de::DeserializeOwned;
 
 impl RigCheck<'_> {
-    /// The profile that the rig's file names.
+    /// The profile that the rig's file names, of drives in rings.
     pub(crate) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
+        let (header, text) = self.read_profile(find)?;
+        let lines = Vec::new();
+        Some(KnownProfile {
+            text,
+            header,
+            lines,
+        })
+    }
+
+    /// The same, of drives behind a port. Each of its lines must be about one of them.
+    pub(crate) fn port_profile(
+        &mut self,
+        port: &Port,
+        find: &FindProfile<'_>,
+    ) -> Option<KnownProfile> {
+        let (lines, text) = self.read_profile::<ProfileLines>(find)?;
+        for (_, problem) in port.bus.setup_mistakes(port, &lines) {
+            self.wrong(
+                &["rig".into(), "profile".into()],
+                format!("the profile is not of these drives: {}", problem.message),
+                "the profile that `drivebench qualify` writes for the drives of this file expected here",
+            );
+        }
+        Some(KnownProfile {
+            text,
+            header: Header::default(),
+            lines,
+        })
+    }
+
+    fn read_profile<S: ProfileSetup + DeserializeOwned>(
+        &mut self,
+        find: &FindProfile<'_>,
+    ) -> Option<(S, String)> {
         let named = self.file.rig.profile.as_ref()?;
         let profile = find(named).and_then(|source| {
-            let profile = Profile::parse(&source.text);
+            let profile = Profile::<S>::parse(&source.text);
             let profile = profile.map_err(|error| format!("{}: {error}", source.name))?;
-            Ok(KnownProfile {
-                header: profile.header(),
-                text: source.text.to_string(),
-            })
+            Ok((profile.header(), source.text.to_string()))
         });
         match profile {
             Ok(profile) => Some(profile),

@@ -272,12 +272,18 @@ impl<D: PortDrives> Drop for PortSession<D> {
     }
 }
 
-/// The `setup` lines of a rig with simulated drives.
-pub(crate) fn setup_lines(rig: &Rig) -> Source {
-    let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
+/// The header lines that a rig's file has for its drives: those of its profile, and behind them those of `[sim]`.
+pub(crate) fn setup_lines(rig: &Rig) -> Vec<String> {
+    let profile = rig.profile.iter().flat_map(|own| &own.lines);
+    let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    profile.chain(own).cloned().collect()
+}
+
+/// The same as a text.
+pub(crate) fn setup_text(rig: &Rig) -> Source {
     Source {
         name: rig.origin.clone(),
-        text: lines.collect::<Vec<_>>().join("\n").into(),
+        text: setup_lines(rig).join("\n").into(),
     }
 }
 

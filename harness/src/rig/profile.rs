@@ -63,8 +63,10 @@ pub struct SettledProperty<S = Header> {
 pub struct KnownProfile {
     /// Its text.
     pub text: String,
-    /// What makes simulated drives behave so.
+    /// What makes simulated drives behave so, in rings.
     pub header: Header,
+    /// The same of drives behind a port: header lines of a scenario.
+    pub lines: ProfileLines,
 }
 
 /// Why a text is not a profile.

@@ -187,3 +187,78 @@ fn edited_evidence_is_found() {
     ended(&run(&desk, &more), 1, "failed");
     edits::check_each(&edits::of(desk, false), 6);
 }
+
+/// A profile settles what is not permitted to find out, for the run and for its judge. One of other drives is refused, and so is one that the
+/// drive contradicts.
+#[test]
+fn a_profile_is_known() {
+    let profile = |drive: &Desk, line: &str| {
+        let text = format!(
+            "schema = 1\nrig = \"desk\"\ndate = \"\"\nrings = [1]\n[property.own]\nvalue = \"\"\nsection = \"unitek ex 10\"\nsetup = [\"{line}\"]\n"
+        );
+        std::fs::write(drive.path("profile.toml"), text).expect("room");
+        let path = drive.path("desk.toml");
+        let rig = std::fs::read_to_string(&path).expect("the rig");
+        let rig = rig.replace(
+            "id = \"desk\"\n",
+            "id = \"desk\"\nprofile = \"profile.toml\"\n",
+        );
+        std::fs::write(path, rig).expect("room");
+    };
+    let needs = NATIVE.replace("map-reply = native", "lock-clears-command = yes");
+    let desk = |setup| {
+        let desk = desk(setup, "");
+        with(&desk, "needs.scn", &needs);
+        desk
+    };
+    let unknown = desk("property lock-clears-command = yes");
+    ended(&run(&unknown, &["needs.scn"]), 5, "is not settled");
+    let known = desk("");
+    profile(&known, "drive 1 property lock-clears-command = yes");
+    let kept = ["needs.scn", "--evidence", "kept"];
+    ended(&run(&known, &kept), 0, "1 passed");
+    ended(&known.run(&["verify", "kept"]), 0, "");
+    let other = desk("");
+    profile(&other, "drive 2 property lock-clears-command = yes");
+    ended(
+        &run(&other, &["needs.scn"]),
+        2,
+        "the profile is not of these drives: the port has no drive 2",
+    );
+    let contradicted = desk("property map-reply = native");
+    profile(&contradicted, "drive 1 property map-reply = short");
+    let said = "drive 1 has map-reply = native, and the profile of the rig's file says short";
+    ended(&run(&contradicted, &["needs.scn"]), 3, said);
+}
+
+/// A move releases a locked drive, and bounds its speed as the rig's file says. Without --move nothing is done.
+#[test]
+fn a_move_releases_a_locked_drive() {
+    let locked = "mode position\", \"drive 1 register 51 = 0004";
+    for (limits, more) in [
+        ("", ""),
+        (
+            "max_speed = \"10%\"\n",
+            "SPEED_LIMIT (34) set to 3277 of 32767",
+        ),
+    ] {
+        let desk = desk(locked, &format!("allow_motion = true\n{limits}"));
+        let refused = ["position", "1", "--to", "1turns", "--rig", "desk.toml"];
+        ended(&desk.run(&refused), 2, "add --move to allow it");
+        let moves = desk.run(&[&refused[..], &["--move"]].concat());
+        ended(&moves, 0, "drive 1: released");
+        ended(&moves, 0, "drive 1: arrived at 1.000 turns");
+        ended(&moves, 0, more);
+    }
+    let fixed = desk(locked, "");
+    let moves = fixed.run(&[
+        "position",
+        "1",
+        "--to",
+        "1turns",
+        "--move",
+        "--rig",
+        "desk.toml",
+    ]);
+    ended(&moves, 2, "`allow_motion`");
+}

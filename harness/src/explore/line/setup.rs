@@ -3,6 +3,7 @@
 use super::LineBus;
 use crate::explore::ExploreError;
 use crate::rig::Rig;
+use crate::rig::port_session::setup_lines;
 use crate::scenario::source::Source;
 use serde::{Deserialize, Serialize};
 
@@ -69,8 +70,8 @@ impl LineSetup {
     /// The line of a rig, with more deviations than its file plants.
     #[must_use]
     pub fn of_rig<B: LineBus>(rig: &Rig, more: Vec<PlantedDrive>) -> Self {
-        let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
-        Self::new::<B>(B::header(rig).into_iter().chain(lines).collect(), more)
+        let lines = B::header(rig).into_iter().chain(setup_lines(rig));
+        Self::new::<B>(lines.collect(), more)
     }
 
     /// The drives under test.

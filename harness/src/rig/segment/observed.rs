@@ -7,8 +7,8 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
 
-/// What a bus notes of its link. Notes follow from what the link shows, so that a record gives the same ones.
-pub(crate) trait Notes: Default + Send {
+/// What a bus notes of its link. LinkNotes follow from what the link shows, so that a record gives the same ones.
+pub(crate) trait LinkNotes: Default + Send {
     /// Something was sent; it has left at `end`.
     fn sent(&mut self, what: Out<'_>, end: Instant);
 
@@ -48,7 +48,7 @@ const LATE: [u64; 3] = [1_000, 3_000, 15_000];
 
 /// The way to the drives and back, as it was in an attempt.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Way {
+pub(crate) struct LinkTimes {
     /// By how much a wait has ended late, at most.
     pub(crate) late: Span,
     /// The longest time that a reply took.
@@ -57,7 +57,7 @@ pub(crate) struct Way {
     pub(crate) tolerance: Span,
 }
 
-impl Way {
+impl LinkTimes {
     /// Ways that are as bad as this one may have been; none where time is virtual.
     pub(crate) fn slow(self) -> impl Iterator<Item = Slow> {
         let measured = [self.longest, self.longest * 2];
@@ -75,14 +75,14 @@ impl Way {
 
 /// How much was received, and a checksum of it (FNV-1a).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sum {
+pub(crate) struct ReceivedSum {
     /// How many frames or octets.
     pub(crate) pieces: usize,
     /// Their checksum.
     pub(crate) sum: u32,
 }
 
-impl Default for Sum {
+impl Default for ReceivedSum {
     fn default() -> Self {
         Self {
             pieces: 0,
@@ -91,14 +91,14 @@ impl Default for Sum {
     }
 }
 
-impl Sum {
+impl ReceivedSum {
     /// Adds a part of a piece to the checksum.
     pub(crate) const fn add(&mut self, bits: u32) {
         self.sum = (self.sum ^ bits).wrapping_mul(0x0100_0193);
     }
 }
 
-impl<'l, N: Notes> Observed<'l, N> {
+impl<'l, N: LinkNotes> Observed<'l, N> {
     /// Observes a link.
     pub(crate) fn new(link: &'l mut dyn Link) -> Self {
         Self {
@@ -134,7 +134,7 @@ impl<'l, N: Notes> Observed<'l, N> {
     }
 }
 
-impl<N: Notes> Line for Observed<'_, N> {
+impl<N: LinkNotes> Line for Observed<'_, N> {
     fn medium(&self, port: usize) -> Medium {
         self.link.medium(port)
     }
@@ -199,7 +199,7 @@ impl<N: Notes> Line for Observed<'_, N> {
     }
 }
 
-impl<N: Notes> Link for Observed<'_, N> {
+impl<N: LinkNotes> Link for Observed<'_, N> {
     fn capabilities(&self) -> &[Capability] {
         self.link.capabilities()
     }

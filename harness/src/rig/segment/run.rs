@@ -18,7 +18,7 @@ pub(crate) trait PortPlayer: Sized {
     /// The bus of its scenarios.
     const BUS: Bus;
 
-    /// Whether simulated drives are switched on anew for each attempt: no scenario sees what another one has left.
+    /// Whether simulated drives are restarted for each attempt: no scenario sees what another one has left.
     const ANEW: bool;
 
     /// The drives of a rig.

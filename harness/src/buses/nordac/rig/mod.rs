@@ -4,6 +4,7 @@ mod known;
 mod observed;
 mod permitted;
 mod player;
+mod profile;
 mod run;
 mod session;
 mod settle;

@@ -1,7 +1,7 @@
 //! What is noted of a link to NORDAC inverters: which parameters are written, and how late replies come.
 
 use crate::medium::{Heard, Medium, Out};
-use crate::rig::segment::observed::{Notes, Sum};
+use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::{Image, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::Service;
@@ -24,18 +24,18 @@ pub(super) struct TelegramNotes {
     /// The longest time from the end of a request until the bench had read its whole reply, beside the reply's own time on the line.
     pub(super) longest: Span,
     /// How many octets were received, and their checksum.
-    heard: Sum,
+    heard: ReceivedSum,
 }
 
 impl TelegramNotes {
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
-        let Sum { pieces, sum } = self.heard;
+        let ReceivedSum { pieces, sum } = self.heard;
         format!("{pieces} octets from the slaves, checksum {sum:08X}")
     }
 }
 
-impl Notes for TelegramNotes {
+impl LinkNotes for TelegramNotes {
     /// A telegram was sent. In every layout that its length fits, its parameter channel may write.
     fn sent(&mut self, what: Out<'_>, end: Instant) {
         self.asked = Some(end);

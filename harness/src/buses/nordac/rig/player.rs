@@ -8,6 +8,7 @@
 use super::RigSlave;
 use super::known::Known;
 use super::observed::Observed;
+use super::profile::Profiled;
 use super::settle;
 use super::talk::{Talk, TalkError};
 use crate::buses::LimitSetting;
@@ -18,7 +19,7 @@ use crate::link::{
     Capability, DriveFault, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use crate::medium::Medium;
-use crate::rig::segment::observed::{Slow, Way};
+use crate::rig::segment::observed::{LinkTimes, Slow};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::Problems;
@@ -89,6 +90,8 @@ pub(crate) struct Player {
     capabilities: Vec<Capability>,
     /// Slaves can be switched off and on: they are simulated.
     restarts: bool,
+    /// What the rig's file says of the slaves, unless they are qualified.
+    pub(super) profile: Profiled,
     /// Known from the first attempt on.
     known: Option<Vec<Known>>,
     /// What the last attempt may have written: station, number and IND.
@@ -112,6 +115,7 @@ impl Player {
             limits,
             capabilities,
             restarts,
+            profile: Profiled::default(),
             known: None,
             written: BTreeSet::new(),
             before: None,
@@ -209,7 +213,7 @@ impl Player {
         link.begin();
         link.take_late();
         let outcome = play(&own.plan, link, AtMismatch::Stop);
-        let way = Way {
+        let way = LinkTimes {
             late: link.take_late(),
             longest: link.noted.longest,
             tolerance: link.time_tolerance(),
@@ -248,6 +252,7 @@ impl Player {
             let model = |properties| self.model_replies(known, properties);
             let (properties, open) = settle::settle(seen, model);
             (known.properties, known.open) = (properties, open);
+            self.profile.settle(known)?;
         }
         self.known = Some(all);
         Ok(())
@@ -429,7 +434,7 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the slave.
-    fn judged(&self, own: &Own, outcome: Outcome, way: Way) -> Outcome {
+    fn judged(&self, own: &Own, outcome: Outcome, way: LinkTimes) -> Outcome {
         if outcome.verdict != Verdict::Failed {
             return outcome;
         }
@@ -458,7 +463,7 @@ impl Player {
 
     /// A difference from the model with which a right slave does not meet the scenario either: another value of a point that the manual leaves
     /// open, or times at which telegrams leave.
-    fn left_open(&self, own: &Own, way: Way) -> Option<String> {
+    fn left_open(&self, own: &Own, way: LinkTimes) -> Option<String> {
         let fails = |other: Other| {
             let played = self.rehearse(own, &self.limits, other);
             played.denied.is_some() || played.outcome.verdict != Verdict::Passed

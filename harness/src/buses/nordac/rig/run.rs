@@ -1,6 +1,7 @@
 //! NORDAC inverters on which scenarios are played: what their player offers, and what is set back behind a scenario.
 
 use super::player::{Own, Player};
+use super::profile::Profiled;
 use super::session::{Inverters, patience_of};
 use super::{Session, limits, rate, slaves};
 use crate::buses::Bus;
@@ -24,9 +25,9 @@ impl PortPlayer for Player {
     type Drives = Inverters;
     type Own = Own;
 
-    fn new(rig: &Rig, allow_motion: bool, _: bool) -> Self {
+    fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let port = rig.port();
-        Self::of(
+        let mut player = Self::of(
             port.map(slaves).unwrap_or_default(),
             port.map(rate).unwrap_or_default(),
             port.map_or(Span::ZERO, |port| patience_of(rig, port)),
@@ -35,7 +36,11 @@ impl PortPlayer for Player {
                 Self::segment(rig, allow_motion).capabilities,
                 rig.is_simulated(),
             ),
-        )
+        );
+        if !qualifies {
+            player.profile = Profiled::of(rig);
+        }
+        player
     }
 
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {

@@ -12,7 +12,7 @@ use crate::port::{Endpoint, PortSettings};
 use crate::rig::file::Marks;
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
-use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_lines};
+use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
 use crate::rig::{Ends, Options, Rig, SessionError};
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::profibus::dp::Diagnosis;
@@ -178,7 +178,7 @@ fn differs(slave: &RigSlave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(
 /// The end of the line: simulated, or an adapter that is opened and locked. Nothing is sent.
 fn ends(rig: &Rig, port: &Port, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
     if rig.is_simulated() {
-        let setup = setup(port, &setup_lines(rig));
+        let setup = setup(port, &setup_text(rig));
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
         return Ok((Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new()));
     }

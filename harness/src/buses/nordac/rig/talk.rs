@@ -23,6 +23,18 @@ pub enum TalkError {
     /// The adapter hears what the bench sends.
     #[error("the adapter gives back what the bench sends: set `echo = true` in [port.1]")]
     Echo,
+    /// It behaves in another way than the profile of the rig's file says.
+    #[error(
+        "slave {slave} does not have {property} = {says}, as the profile of the rig's file says: the profile is of another slave; qualify this one, or take `profile` out of the file"
+    )]
+    OtherThanProfile {
+        /// Its address.
+        slave: u8,
+        /// The property.
+        property: &'static str,
+        /// What the profile says.
+        says: String,
+    },
     /// It does not reply.
     #[error("slave {slave} does not reply to {service}")]
     NoReply {

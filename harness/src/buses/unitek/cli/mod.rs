@@ -67,6 +67,7 @@ impl From<driver::Error> for Failure {
             driver::Error::NoReply { .. }
             | driver::Error::Differs { .. }
             | driver::Error::NotReady { .. } => Exit::Failed,
+            driver::Error::OtherThanProfile { .. } => Exit::RigError,
             driver::Error::Refused(_) | driver::Error::NoSuchDrive(_) => Exit::Usage,
             driver::Error::Link(trouble) => exit_of_trouble(trouble),
         };

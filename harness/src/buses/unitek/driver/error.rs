@@ -48,6 +48,20 @@ pub enum Error {
         /// What was read.
         reads: Reply,
     },
+    /// A drive behaves in another way than the profile of the rig's file says.
+    #[error(
+        "drive {node} has {property} = {shows}, and the profile of the rig's file says {says}: the profile is of another drive; qualify this one, or take `profile` out of the file"
+    )]
+    OtherThanProfile {
+        /// Which drive.
+        node: u8,
+        /// The property.
+        property: &'static str,
+        /// What the profile says.
+        says: String,
+        /// What the drive has shown.
+        shows: String,
+    },
     /// The request is impossible.
     #[error("{0}")]
     Refused(Refused),

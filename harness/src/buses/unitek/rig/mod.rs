@@ -5,6 +5,7 @@ mod observed;
 mod permitted;
 mod player;
 mod probe;
+mod profile;
 mod qualify;
 mod run;
 mod session;

@@ -1,7 +1,7 @@
 //! What is noted of a link to UNITEK drives: what is written, and how fast replies come.
 
 use crate::medium::{Heard, Medium, Out};
-use crate::rig::segment::observed::{Notes, Sum};
+use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
 use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Request;
@@ -26,7 +26,7 @@ pub(super) struct FrameNotes {
     /// The longest time from the end of a request until the bench had read its reply: what the way to the drive and back takes.
     pub(super) longest: Span,
     /// How many frames were received, and their checksum.
-    heard: Sum,
+    heard: ReceivedSum,
     /// The frames that were received, and how many of them before the last conversation began, all of them if none has; `None` where they are
     /// not kept.
     kept: Option<(Vec<Frame>, usize)>,
@@ -48,12 +48,12 @@ impl FrameNotes {
 
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
-        let Sum { pieces, sum } = self.heard;
+        let ReceivedSum { pieces, sum } = self.heard;
         format!("{pieces} frames from the drives, checksum {sum:08X}")
     }
 }
 
-impl Notes for FrameNotes {
+impl LinkNotes for FrameNotes {
     fn sent(&mut self, what: Out<'_>, end: Instant) {
         for frame in what.frames() {
             let Ok(rx) = u16::try_from(frame.id().number()) else {

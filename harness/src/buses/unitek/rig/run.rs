@@ -1,6 +1,7 @@
 //! UNITEK drives on which scenarios are played: what their player offers, and what is set back behind a scenario.
 
 use super::player::{Own, Player, stores};
+use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
 use super::{Axis, Session, axes, limits, rate};
@@ -52,10 +53,13 @@ impl PortPlayer for Player {
                 port.is_none_or(Port::carries_remote_frames),
             ),
         );
-        if qualifies {
-            player.qualify();
+        match qualifies {
+            true => {
+                player.qualify();
+                player
+            }
+            false => player.with_profile(Profiled::of(rig)),
         }
-        player
     }
 
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {

@@ -10,7 +10,7 @@ use crate::link::frames::{AdapterSettings, FrameLink};
 use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
-use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_lines};
+use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
 use crate::rig::{Ends, Options, Rig, SessionError};
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
@@ -43,7 +43,7 @@ impl PortDrives for UnitekDrives {
     ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
         let axes = axes(port);
         let (ends, locks) = if rig.is_simulated() {
-            let setup = setup(port, &setup_lines(rig));
+            let setup = setup(port, &setup_text(rig));
             let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
             (Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new())
         } else {

@@ -188,7 +188,7 @@ fn apply(line: &SlaveLine, slaves: &mut Vec<SlaveSetup>) -> Result<(), Problem> 
     Ok(())
 }
 
-fn address(slave: &Located, scope: Scope) -> Result<u8, Problem> {
+pub(crate) fn address(slave: &Located, scope: Scope) -> Result<u8, Problem> {
     let number = slave.value(scope)?;
     let fits = (1..=MOST_ADDRESS).contains(&number);
     let address = u8::try_from(number).ok().filter(|_| fits);

@@ -13,6 +13,7 @@ pub(super) use own::{Own, stores};
 
 use super::known::Known;
 use super::observed::Observed;
+use super::profile::Profiled;
 use super::{Axis, probe};
 use crate::buses::LimitSetting;
 use crate::buses::unitek::driver::{Driver, Error};
@@ -23,7 +24,7 @@ use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
-use crate::rig::segment::observed::{Slow, Way};
+use crate::rig::segment::observed::{LinkTimes, Slow};
 use crate::scenario::expression::Scope;
 use crate::scenario::run::outcome::Unready;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
@@ -94,6 +95,8 @@ pub(crate) struct Player {
     capabilities: Vec<Capability>,
     /// Whether its adapter carries remote frames.
     remote: bool,
+    /// What the rig's file says of the drives, unless they are qualified.
+    profile: Profiled,
     /// Known from the first attempt on.
     known: Option<Vec<Known>>,
     /// What was found out where finding out has failed.
@@ -127,6 +130,7 @@ impl Player {
             limits,
             capabilities,
             remote,
+            profile: Profiled::default(),
             known: None,
             partly: Vec::new(),
             written: BTreeSet::new(),
@@ -136,6 +140,12 @@ impl Player {
             qualifies: false,
             notes: Vec::new(),
         }
+    }
+
+    /// Takes the properties of drives over from a profile.
+    pub(super) fn with_profile(mut self, profile: Profiled) -> Self {
+        self.profile = profile;
+        self
     }
 
     /// Keeps every attempt from now on, and settles by probes what the limits permit to find out.
@@ -232,7 +242,7 @@ impl Player {
         if let Some(begun) = begun {
             self.note(begun, own, &link, &gone);
         }
-        let way = Way {
+        let way = LinkTimes {
             late: link.take_late(),
             longest: link.noted.longest,
             tolerance: link.time_tolerance(),
@@ -311,6 +321,7 @@ impl Player {
             if self.qualifies && self.limits.motion {
                 probe::settle_moving(known, link, (self.patience, self.rate))?;
             }
+            self.profile.settle(known, self.rate)?;
             driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
         }
         known.read_again(&mut driver, &self.written)
@@ -321,6 +332,7 @@ impl Player {
         let remark = error.to_string();
         match error {
             Error::Link(trouble) => Outcome::trouble(trouble),
+            Error::OtherThanProfile { .. } => Outcome::rig_error(remark),
             // Nothing was ever heard of it.
             Error::NoReply { .. } if self.known.is_none() => Outcome::rig_error(remark),
             Error::NoReply { .. } => Outcome::not_ready(Verdict::Failed, Unready::NoAnswer, remark),
@@ -510,7 +522,7 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the drive.
-    fn judged(&self, own: &Own, outcome: Outcome, way: Way, unlike: &[(u8, u8)]) -> Outcome {
+    fn judged(&self, own: &Own, outcome: Outcome, way: LinkTimes, unlike: &[(u8, u8)]) -> Outcome {
         if outcome.verdict != Verdict::Failed {
             return outcome;
         }
@@ -554,7 +566,7 @@ impl Player {
 
     /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
     /// settled, the place of its clock, or times in which frames leave.
-    fn left_open(&self, own: &Own, way: Way) -> Option<String> {
+    fn left_open(&self, own: &Own, way: LinkTimes) -> Option<String> {
         let fails = |other: Other<'_>| {
             let played = self.rehearse(own, &self.limits, other);
             played.denied.is_some() || played.outcome.verdict != Verdict::Passed
