@@ -58,7 +58,7 @@ pub(super) fn go(
 }
 
 /// What the routine of ex 11 writes: lock, commands 0, release.
-fn start_up(axis: Axis) -> [Order; 4] {
+pub(super) fn start_up(axis: Axis) -> [Order; 4] {
     let writes = [(0x51, MODE_LOCK), (0x31, 0), (0x90, 0), (0x51, 0)];
     writes.map(|(register, value)| (axis, Register::of(register), Data::Short(value)))
 }

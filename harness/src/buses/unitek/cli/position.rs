@@ -1,5 +1,6 @@
 //! `drivebench position` on UNITEK drives: homing, and a move to a destination (ex 12).
 
+use super::control::start_up;
 use super::write::refuse_denied;
 use crate::buses::commands::{PositionArguments, Use};
 use crate::buses::unitek::driver::Driver;
@@ -13,7 +14,8 @@ use crate::scenario::quantity::Quantity;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;
-use harness_proto::unitek::words::status;
+use harness_proto::unitek::master::Job;
+use harness_proto::unitek::words::{MODE_LOCK, status};
 
 /// Increments of a revolution (UNITEK 6.1).
 const TURN: f64 = 65_536.0;
@@ -49,6 +51,7 @@ pub(super) fn position(
             )));
         }
         let mut driver = session.driver();
+        make_ready(&mut driver, axis, output)?;
         if arguments.reference {
             home(&mut driver, axis)?;
             output.result(&format!("drive {}: homed\n", axis.node))?;
@@ -75,6 +78,32 @@ pub(super) fn position(
         ))?;
         Ok(Exit::Passed)
     })
+}
+
+/// Makes a drive ready to move: its speed limited where the rig's file limits it, and released where it is locked.
+fn make_ready(driver: &mut Driver<'_>, axis: Axis, output: &mut Output) -> Result<(), Failure> {
+    let node = axis.node;
+    let destination = Job::Write {
+        register: 0x6E,
+        data: Data::Long(0),
+    };
+    if !driver.permits(axis, destination) {
+        // The highest limit that `max_speed` lets pass; none where motors may not turn at all.
+        let all: Vec<u16> = (0..=0x7FFF).collect();
+        let permitted = all.partition_point(|own| driver.permits_write(axis, 0x34, *own));
+        if let Some(most) = permitted.checked_sub(1).and_then(|last| all.get(last)) {
+            driver.write(axis, 0x34, Data::Short(*most))?;
+            output.say(&format!(
+                "drive {node}: SPEED_LIMIT (34) set to {most} of 32767, which is `max_speed` of the rig's file\n"
+            ));
+        }
+    }
+    if read(driver, axis, 0x51)? & u32::from(MODE_LOCK) != 0 {
+        refuse_denied(driver, &start_up(axis))?;
+        driver.release(axis)?;
+        output.result(&format!("drive {node}: released\n"))?;
+    }
+    Ok(())
 }
 
 fn increments(of: &Quantity) -> f64 {
