@@ -74,6 +74,11 @@ impl Files {
         self.written.iter().map(PathBuf::as_path)
     }
 
+    /// Whether files were removed.
+    pub(crate) fn removed(&self) -> bool {
+        self.written.len() < self.number
+    }
+
     /// Writes what waits, and begins a new file where the present one is full or old enough.
     ///
     /// # Errors

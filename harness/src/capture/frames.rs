@@ -160,7 +160,10 @@ pub(super) fn candump(bytes: &[u8], links: &[NamedLink]) -> Result<Imported, Cap
     }
     let frames = one_bus(frames, links, &mut notes)?;
     let capture = assemble(frames, None);
-    Ok(Imported { capture, notes })
+    Ok(Imported {
+        notes,
+        ..capture.into()
+    })
 }
 
 /// The capture of a log in ASC, of which the times may be before 0.
@@ -186,7 +189,10 @@ pub(super) fn asc(
     }
     let frames = one_bus(frames, links, &mut notes)?;
     let capture = assemble(frames, None);
-    Ok(Imported { capture, notes })
+    Ok(Imported {
+        notes,
+        ..capture.into()
+    })
 }
 
 /// The frames of one interface: that which `links` names, or the only one.

@@ -25,7 +25,7 @@ pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario}
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
-pub(crate) use recorder::{Carries, LiveRecorder, Piece, RecordedPlace};
+pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};
@@ -35,7 +35,7 @@ use harness_sim::record::LineByte;
 use harness_sim::record::{Carried, Channel, Remark, Trace};
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The longest file that is read, in bytes.
 pub const MAX_FILE: u64 = 256 * 1024 * 1024;
@@ -86,19 +86,29 @@ pub enum CaptureError {
     },
 }
 
-/// Reads a file.
+/// Reads a file, or the files of one capture: parts of it one after another, or a file for each channel.
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_file(path: &Path, settings: &ReadSettings) -> Result<Imported, CaptureError> {
-    let failed =
-        |error: std::io::Error| CaptureError::File(path.display().to_string(), error.to_string());
-    let mut file = regular::open_input(path)
-        .map_err(failed)?
-        .take(MAX_FILE + 1);
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(failed)?;
-    read_with(&bytes, settings)
+pub fn read_files(paths: &[PathBuf], settings: &ReadSettings) -> Result<Imported, CaptureError> {
+    let mut files = Vec::new();
+    let mut left = MAX_FILE;
+    for path in paths {
+        let failed = |error: std::io::Error| {
+            CaptureError::File(path.display().to_string(), error.to_string())
+        };
+        let file = regular::open_input(path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.take(left + 1)
+            .read_to_end(&mut bytes)
+            .map_err(failed)?;
+        left = left
+            .checked_sub(bytes.len() as u64)
+            .ok_or(CaptureError::TooLong)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        files.push((name.into_owned(), bytes));
+    }
+    import::read_files(files, settings)
 }
 
 /// Reads the bytes of a file; the rate is taken where it does not say one.

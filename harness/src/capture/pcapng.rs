@@ -12,7 +12,7 @@ pub(super) use values::nanoseconds;
 
 use super::frames::{FrameRead, Sender, assemble, packet};
 use super::telegrams::{self, DAY};
-use super::{Assembly, Capture, CaptureError, NamedLink, ends, line_byte};
+use super::{Assembly, Capture, CaptureError, Imported, NamedLink, ends, line_byte};
 use crate::buses;
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
@@ -25,7 +25,7 @@ use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
 use parts::{Part, chosen};
 use std::borrow::Cow;
-use values::sent;
+use values::{means_loss, noted, sent};
 
 /// Option of an interface: seconds to be added to its times.
 const IF_TSOFFSET: u16 = 14;
@@ -77,13 +77,19 @@ pub(crate) fn read(
     bytes: &[u8],
     rate: Option<Rate>,
     links: &[NamedLink],
-) -> Result<Capture, CaptureError> {
+) -> Result<Imported, CaptureError> {
     let mut reader = Reader::new(bytes);
     let mut offset = 0;
     while offset < bytes.len() {
         offset = reader.block(offset)?;
     }
-    finish(reader, rate, links)
+    let events = std::mem::take(&mut reader.events);
+    let imported = Imported::from(finish(reader, rate, links)?);
+    Ok(Imported {
+        lost: events.iter().any(|own| means_loss(own)),
+        notes: noted(events),
+        ..imported
+    })
 }
 
 /// The capture of all packets of one part.
@@ -185,6 +191,8 @@ pub(super) struct Reader<'b> {
     /// Frames with the number of their part.
     frames: Vec<(usize, FrameRead)>,
     parts: Vec<Part>,
+    /// What `capture` has noted beside bytes and frames.
+    events: Vec<String>,
 }
 
 impl<'b> Reader<'b> {
@@ -201,6 +209,7 @@ impl<'b> Reader<'b> {
             octets: Vec::new(),
             frames: Vec::new(),
             parts: Vec::new(),
+            events: Vec::new(),
         }
     }
 
@@ -490,13 +499,19 @@ impl<'b> Reader<'b> {
             return self.telegram((data, captured, end), (from, nanos), octet);
         }
         let mut comment = None;
+        let mut words = None;
         let options = data + captured.next_multiple_of(4);
         self.options((options, end), |code, from, to| {
             if code == COMMENT {
                 comment = sent(&self.bytes[from..to]).or(comment);
+                words = Some((from, to));
             }
             Ok(())
         })?;
+        if let Some((from, to)) = words.filter(|_| NO_BYTE.contains(&event)) {
+            let words = String::from_utf8_lossy(&self.bytes[from..to]);
+            self.events.push(words.into_owned());
+        }
         self.bytes_of(data + 8, event, payload, (interface, nanos), comment)
     }
 
@@ -508,9 +523,6 @@ impl<'b> Reader<'b> {
         octet: Span,
     ) -> Result<(), CaptureError> {
         let event = self.bytes[data + 8];
-        if NO_BYTE.contains(&event) {
-            return Ok(());
-        }
         let mut comment = String::new();
         let options = data + captured.next_multiple_of(4);
         self.options((options, end), |code, from, to| {
@@ -522,6 +534,11 @@ impl<'b> Reader<'b> {
             }
             Ok(())
         })?;
+        if NO_BYTE.contains(&event) {
+            let words = comment.trim_start_matches(", ");
+            self.events.push(words.to_owned());
+            return Ok(());
+        }
         let arrived = &self.bytes[data + HEADER..data + captured];
         match octets((event, nanos), arrived, &comment, octet) {
             Ok(octets) => self
@@ -558,6 +575,9 @@ impl<'b> Reader<'b> {
             Ok(found) => found,
             Err(what) => return self.wrong(data, what),
         };
+        if found.is_none() {
+            self.events.extend(comment.map(Cow::into_owned));
+        }
         self.frames.extend(found.map(|(frame, ended)| {
             let read = FrameRead {
                 nanos,

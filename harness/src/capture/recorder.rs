@@ -10,6 +10,9 @@ use std::io::{self, Write};
 /// The event of a packet without a byte: a change of the state of the line.
 const STATE: u8 = 0x00;
 
+/// The event of an adapter that was pulled out.
+pub(crate) const AWAY: &str = "the adapter was pulled out";
+
 /// What an interface of a capture carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Carries {

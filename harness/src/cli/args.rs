@@ -318,8 +318,10 @@ pub struct TraceOutput {
 /// For `import`.
 #[derive(Clone, Debug, Args)]
 pub struct ImportArguments {
-    /// The capture: pcapng, pcap, what `trace` writes, VCD, Saleae's and sigrok's files, the log of candump, ASC.
-    pub file: PathBuf,
+    /// The capture: pcapng, pcap, what `trace` writes, VCD, Saleae's and sigrok's files, the log of candump, ASC. Files of one capture are joined:
+    /// the parts that `capture` has written, or a file for each channel.
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
     /// Show the capture in this format instead of comparing it.
     #[arg(long, value_enum, conflicts_with = "scenario")]
     pub format: Option<TraceFormat>,

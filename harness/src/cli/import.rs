@@ -8,8 +8,8 @@ use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, ComparedRun, Judged, Options, ReadSettings, diff as compare, is_capture, judge,
-    read_file, scenario,
+    Capture, ComparedRun, Imported, Judged, Options, ReadSettings, diff as compare, is_capture,
+    judge, read_files, scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -21,7 +21,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Prints the dissector.
@@ -44,8 +44,11 @@ pub(crate) fn gsd(output: &mut Output) -> std::io::Result<Exit> {
 
 /// Reads a capture and judges it, shows it or makes a scenario of it.
 pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let path = &arguments.file;
-    let Some(capture) = read(path, &arguments.reading, output) else {
+    let Some(Imported { capture, lost, .. }) = read(&arguments.files, &arguments.reading, output)
+    else {
+        return Ok(Exit::Usage);
+    };
+    let Some(path) = arguments.files.first() else {
         return Ok(Exit::Usage);
     };
     let title = title(path);
@@ -76,7 +79,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         }
     };
     if share_a_line(&capture.traces) {
-        return of_shared_line(&capture, &title, setup.as_ref(), arguments, output);
+        return of_shared_line((&capture, lost), &title, setup.as_ref(), arguments, output);
     }
     let options = Options {
         title: &title,
@@ -87,7 +90,10 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         return as_scenario(&capture, &options, arguments, output);
     }
     let judged = match judge(&capture, &options) {
-        Ok(judged) => judged,
+        Ok(judged) => Judged {
+            verdict: settled(judged.verdict, lost, output),
+            ..judged
+        },
         Err(error) => {
             output.complain(&format!("{}: {error}", path.display()));
             return Ok(Exit::Usage);
@@ -110,6 +116,15 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     output.result(&line)?;
     output.say(&details(&judged, &capture));
     Ok(Exit::of(&[judged.verdict], false))
+}
+
+/// A verdict on a capture of which bytes or frames may be missing: what differs does not accuse a drive.
+fn settled(verdict: Verdict, lost: bool, output: &mut Output) -> Verdict {
+    if verdict != Verdict::Failed || !lost {
+        return verdict;
+    }
+    output.say("  note: parts of it are lost, so what differs is no failure of a drive\n");
+    Verdict::Inconclusive
 }
 
 /// Reports what came of judging a shared line.
@@ -138,16 +153,20 @@ fn told(
 
 /// Judges what a shared line carried, or makes a scenario of it.
 fn of_shared_line(
-    capture: &Capture,
+    (capture, lost): (&Capture, bool),
     title: &str,
     setup: Option<&Source>,
     arguments: &ImportArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let path = arguments.file.display();
+    let path = title;
     if !arguments.scenario {
         return match buses::judge_shared(&capture.traces, setup) {
-            Ok(judged) => told(&judged, capture, title, output),
+            Ok(judged) => {
+                let verdict = settled(judged.verdict, lost, output);
+                let judged = JudgedFrames { verdict, ..judged };
+                told(&judged, capture, title, output)
+            }
             Err(error) => {
                 output.complain(&format!("{path}: {error}"));
                 Ok(Exit::Usage)
@@ -164,8 +183,8 @@ fn of_shared_line(
     }
 }
 
-/// Reads a capture, and says what was found and not read in it.
-fn read(path: &Path, reading: &ReadingArguments, output: &mut Output) -> Option<Capture> {
+/// Reads the files of a capture, and says what was found and not read in them.
+fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> Option<Imported> {
     let settings = ReadSettings {
         rate: reading.line,
         uart: match reading.uart {
@@ -175,15 +194,17 @@ fn read(path: &Path, reading: &ReadingArguments, output: &mut Output) -> Option<
         samples: reading.samples,
         links: reading.link.clone(),
     };
-    match read_file(path, &settings) {
+    match read_files(paths, &settings) {
         Ok(imported) => {
             for note in &imported.notes {
                 output.say(&format!("  note: {note}\n"));
             }
-            Some(imported.capture)
+            Some(imported)
         }
         Err(error) => {
-            output.complain(&format!("{}: {error}", path.display()));
+            let names = paths.iter().map(|own| own.display().to_string());
+            let names: Vec<_> = names.collect();
+            output.complain(&format!("{}: {error}", names.join(", ")));
             None
         }
     }
@@ -198,7 +219,7 @@ fn as_scenario(
     let text = match scenario(capture, options) {
         Ok(text) => text,
         Err(error) => {
-            output.complain(&format!("{}: {error}", arguments.file.display()));
+            output.complain(&format!("{}: {error}", options.title));
             return Ok(Exit::Usage);
         }
     };
@@ -324,7 +345,8 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
 /// A capture, or a scenario that is played.
 fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<Capture> {
     if is_capture(path) {
-        return read(path, &arguments.reading, output);
+        let read = read(&[path.to_owned()], &arguments.reading, output);
+        return read.map(|own| own.capture);
     }
     let sources = match sources(&[path.to_owned()]) {
         Ok(sources) => sources,

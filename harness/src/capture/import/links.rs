@@ -320,7 +320,10 @@ pub(super) fn settle(
             all.extend(senders.into_iter().zip(octets));
         }
         let capture = assemble(stations.into_iter(), all, octet);
-        return Ok(Imported { capture, notes });
+        return Ok(Imported {
+            notes,
+            ..capture.into()
+        });
     }
     let mut assembly = Assembly::default();
     for (target, octets) in lines {
@@ -335,5 +338,8 @@ pub(super) fn settle(
     }
     let rate = Rate::from_bits_per_second(uart.format.bits_per_second);
     let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
-    Ok(Imported { capture, notes })
+    Ok(Imported {
+        notes,
+        ..capture.into()
+    })
 }

@@ -44,12 +44,17 @@ pub struct Imported {
     pub capture: Capture,
     /// What was found and what was not read, in sentences.
     pub notes: Vec<String>,
+    /// Whether the program that wrote it has noted that something is missing.
+    pub lost: bool,
 }
 
 impl From<Capture> for Imported {
     fn from(capture: Capture) -> Self {
-        let notes = Vec::new();
-        Self { capture, notes }
+        Self {
+            capture,
+            notes: Vec::new(),
+            lost: false,
+        }
     }
 }
 
@@ -111,7 +116,7 @@ const FORMATS: [Format; 16] = [
     whole(
         "pcapng (Wireshark)",
         |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
-        |bytes, settings| Ok(pcapng::read(bytes, settings.rate, &settings.links)?.into()),
+        |bytes, settings| pcapng::read(bytes, settings.rate, &settings.links),
     ),
     whole(
         "pcap (tcpdump, Wireshark)",
@@ -176,6 +181,9 @@ const FORMATS: [Format; 16] = [
         |bytes, _| saleae::levels(bytes),
     ),
 ];
+
+/// The formats of which parts follow each other in one text: sections of pcapng, lines of a log.
+const JOINED: [&str; 2] = ["pcapng (Wireshark)", "log of candump"];
 
 /// Formats that are not read, by their first bytes, with what to do instead.
 const FOREIGN: [(&[u8], &str); 12] = [
@@ -250,6 +258,74 @@ pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Ca
             let (channels, notes) = read(bytes, settings)?;
             links::settle(channels, settings, notes)
         }
+    }
+}
+
+/// Reads the files of one capture, each with its name. Files of a format whose parts follow each other are one text; of files with channels, each
+/// gives its own, which may be called by the name of the file.
+///
+/// # Errors
+/// [`CaptureError`]; the files are of several formats, or of one whose parts cannot be joined.
+pub(super) fn read_files(
+    mut files: Vec<(String, Vec<u8>)>,
+    settings: &ReadSettings,
+) -> Result<Imported, CaptureError> {
+    if let [(_, bytes)] = files.as_slice() {
+        return read(bytes, settings);
+    }
+    let wrong = |what: String| CaptureError::Link {
+        place: "the files".to_owned(),
+        what,
+    };
+    let kinds = files.iter().map(|(name, bytes)| {
+        let kind = format(without_mark(bytes));
+        kind.ok_or_else(|| wrong(format!("{name} is no capture that can be read")))
+    });
+    let kinds: Vec<&Format> = kinds.collect::<Result<_, _>>()?;
+    let Some(first) = kinds.first() else {
+        return Err(wrong("none is given".to_owned()));
+    };
+    match first.reader {
+        Reader::Channels(_) => {
+            let (mut channels, mut notes) = (Vec::new(), Vec::new());
+            for ((name, bytes), kind) in files.iter().zip(&kinds) {
+                let Reader::Channels(read) = kind.reader else {
+                    return Err(wrong(format!(
+                        "{name} is of another kind than the first one"
+                    )));
+                };
+                let (own, said) = read(without_mark(bytes), settings)?;
+                let alone = own.len() == 1;
+                channels.extend(own.into_iter().map(|mut own| {
+                    if alone {
+                        own.names.insert(0, name.clone());
+                    }
+                    own
+                }));
+                notes.extend(said);
+            }
+            links::settle(channels, settings, notes)
+        }
+        Reader::Whole(read) if JOINED.contains(&first.name) => {
+            if let Some(other) = kinds.iter().find(|own| own.name != first.name) {
+                return Err(wrong(format!(
+                    "one is a {} and another a {}; files of one format expected",
+                    first.name, other.name
+                )));
+            }
+            let mut all = std::mem::take(&mut files[0].1);
+            for (_, bytes) in &files[1..] {
+                if !all.ends_with(b"\n") && first.name != JOINED[0] {
+                    all.push(b'\n');
+                }
+                all.extend_from_slice(without_mark(bytes));
+            }
+            read(&all, settings)
+        }
+        Reader::Whole(_) => Err(wrong(format!(
+            "several files of {} cannot be joined; one expected",
+            first.name
+        ))),
     }
 }
 

@@ -604,3 +604,29 @@ fn pcap() {
         assert!(read_with(&whole[..length], &settings(&["1->0"])).is_err());
     }
 }
+
+/// Parts of one capture follow each other; of files with a channel each, the name of the file is that of the channel.
+#[test]
+fn files_of_one_capture() {
+    let files = |all: &[(&str, &str)], links: &[&str]| {
+        let all = all
+            .iter()
+            .map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        read_files(all.collect(), &settings(links)).map(|own| shown(&own.capture))
+    };
+    let first = ("a", "(0.1) can0 201#3D4000");
+    let log = files(&[first, ("b", "(0.2) can0 202#\n")], &[]);
+    assert!(log.expect("a log").ends_with(": 201#3D4000 202#\n"));
+    let octets = "Time [s],Value,Parity Error,Framing Error\n0.001,0x88,,\n";
+    let taps = [("in", octets), ("out", octets)];
+    let both = files(&taps, &["1->0=in", "0->master=out"]).expect("links");
+    assert_eq!(both, "1->0: 88\n0->master: 88\n");
+    let other = files(&[first, taps[0]], &[]).expect_err("two formats");
+    assert!(
+        other.to_string().contains("files of one format expected"),
+        "{other}"
+    );
+    let json = ("c", "{}");
+    let alone = files(&[json, json], &[]).expect_err("no parts");
+    assert!(alone.to_string().contains("cannot be joined"), "{alone}");
+}

@@ -1,5 +1,6 @@
 //! Values of packets: times in any resolution, and comments.
 
+use crate::capture::recorder::AWAY;
 use crate::report::pcapng::NANOSECONDS;
 
 /// What the transmitter sent, where a comment says so: `sent 12`, `sent nothing`.
@@ -16,6 +17,25 @@ pub(super) fn sent(comment: &[u8]) -> Option<Option<u8>> {
         }
         _ => None,
     }
+}
+
+/// Events of a capture noted at most.
+const NOTED: usize = 10;
+
+/// What a capture says of itself beside bytes and frames, in sentences.
+pub(super) fn noted(events: Vec<String>) -> Vec<String> {
+    let more = events.len().saturating_sub(NOTED);
+    let mut notes: Vec<_> = events.into_iter().filter(|own| !own.is_empty()).collect();
+    notes.truncate(NOTED);
+    if more > 0 {
+        notes.push(format!("{more} more events"));
+    }
+    notes
+}
+
+/// Whether bytes or frames are missing behind an event: they were lost, or the adapter was away.
+pub(super) fn means_loss(event: &str) -> bool {
+    event.contains(" lost: ") || event == AWAY
 }
 
 /// A time in nanoseconds; `None` where it is out of all range. A resolution is a power of 10, or of 2 with its high bit set.

@@ -147,9 +147,9 @@ pub(crate) fn capture(arguments: &CaptureArguments, output: &mut Output) -> io::
 }
 
 /// Judges a part of a capture as `import` does.
-fn judge(path: &Path, line: Rate, part: NamedLink, output: &mut Output) -> io::Result<Exit> {
+fn judge(files: &[PathBuf], line: Rate, part: NamedLink, output: &mut Output) -> io::Result<Exit> {
     let arguments = ImportArguments {
-        file: path.to_owned(),
+        files: files.to_vec(),
         format: None,
         scenario: false,
         setup: None,

@@ -192,21 +192,23 @@ impl<'a> Session<'a> {
         }
         let paths: Vec<PathBuf> = self.files.paths().map(PathBuf::from).collect();
         let names: Vec<_> = paths.iter().map(|own| own.display().to_string()).collect();
-        let several = (paths.len() > 1).then_some("it is in several files");
+        // Older parts were removed.
+        let removed = self
+            .files
+            .removed()
+            .then_some("its first files were removed");
         let mut exits = Vec::new();
         for part in self.parts() {
             let of_ring = || (part.channel.is_none()).then(|| self.unjudged()).flatten();
-            let why = self.unheard(&part).or_else(of_ring).or(several);
-            match (why, paths.first()) {
-                (None, Some(path)) => {
-                    exits.push(judge(path, self.arguments.line, part, output)?);
-                }
-                (why, _) => {
+            let why = self.unheard(&part).or_else(of_ring).or(removed);
+            match why {
+                None => exits.push(judge(&paths, self.arguments.line, part, output)?),
+                Some(why) => {
                     output.say(&format!(
                         "  {} not judged: {}; `drivebench import` reads {}\n",
                         part.channel.as_deref().unwrap_or("ring"),
-                        why.unwrap_or_default(),
-                        names.join(", ")
+                        why,
+                        names.join(" ")
                     ));
                     exits.push(Exit::Incomplete);
                 }

@@ -4,7 +4,7 @@ use super::CaptureArguments;
 use super::place::{TapAt, TapPort};
 use crate::buses::{TelegramCutter, live_text, sender_of};
 use crate::capture::live::LiveText;
-use crate::capture::{Piece, RecordedPlace};
+use crate::capture::{AWAY, Piece, RecordedPlace};
 use crate::link::Line as _;
 use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink};
 use crate::medium;
@@ -260,8 +260,7 @@ impl Tap {
     fn leave(&mut self, now: u64, pieces: &mut Vec<Piece>) {
         self.ear = Ear::Away;
         self.looked = Instant::now();
-        let words = "the adapter was pulled out".to_owned();
-        pieces.push(Piece::Event(now, words));
+        pieces.push(Piece::Event(now, AWAY.to_owned()));
     }
 
     /// Takes a port up again when it has come back.
