@@ -173,6 +173,7 @@ fn on_simulated(
     bar.finish_and_clear();
     output.result(&tally.summary())?;
     let head = Head {
+        found: Vec::new(),
         title: "drivebench: scenarios on simulated drives",
         facts: Vec::new(),
     };

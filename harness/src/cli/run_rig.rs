@@ -127,6 +127,7 @@ pub(crate) fn reports(
 ) -> bool {
     let Some(folder) = folder else {
         let head = Head {
+            found: Vec::new(),
             title: "drivebench: scenarios on a rig",
             facts: vec![("Rig", rig.id().to_owned())],
         };

@@ -1,9 +1,10 @@
-//! Makes the reports of a folder again, from nothing but its record and its captures.
+//! Makes the reports of a folder again, from nothing but its record and its captures; that of a qualification shows the
+//! files in which it says what it found, which `verify` compares with the record.
 //!
 //! A run makes them in the same way when it ends, so making them again gives the same bytes. A record does not have the expected bytes: as
 //! in `verify`, each attempt is played again from what was received. If the result agrees with the record, the bytes that differ are shown.
 
-use super::files::{self, CAPTURES, SCENARIOS};
+use super::files::{self, CAPTURES, DEVIATIONS, PROFILE, SCENARIOS};
 use super::folder::EvidenceError;
 use super::junit::{JunitCase, junit};
 use super::record::RecordLine;
@@ -99,7 +100,7 @@ pub(super) fn derived(
         shown.push(show(shown_as, case, attempt, (&outcome, &traces)));
     }
     Ok(Derived {
-        html: run(&head(opened), shown),
+        html: run(&head(path, opened), shown),
         junit: junit(&suite(opened.rig.id()), &cases),
     })
 }
@@ -316,7 +317,20 @@ fn show(
     )
 }
 
-fn head(opened: &Opened) -> Head<'static> {
+/// What a qualification found, of its own files: what was compared, deviations, profile.
+fn found(path: &Path) -> Vec<(&'static str, String)> {
+    let files = [
+        ("Coverage and deviations", DEVIATIONS),
+        ("Profile", PROFILE),
+    ];
+    let found = files.into_iter().filter_map(|(heading, file)| {
+        let text = files::read_text(path, file).ok()?;
+        Some((heading, text))
+    });
+    found.collect()
+}
+
+fn head(path: &Path, opened: &Opened) -> Head<'static> {
     let mut facts = vec![("Rig", opened.rig.id().to_owned())];
     if let Some(RecordLine::Run {
         drivebench,
@@ -359,5 +373,6 @@ fn head(opened: &Opened) -> Head<'static> {
     Head {
         title: "drivebench: scenarios on a rig",
         facts,
+        found: found(path),
     }
 }

@@ -61,6 +61,7 @@ fn html((entry, outcome, traces): &(Entry, Outcome, Vec<Trace>)) -> String {
         again: "",
     };
     let head = Head {
+        found: Vec::new(),
         title: "Valves",
         facts: Vec::new(),
     };

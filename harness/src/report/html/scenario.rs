@@ -267,6 +267,10 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
         } else {
             String::new()
         };
+        let finding = played.outcome.finding.as_ref();
+        let difference = finding.and_then(|own| own.difference.as_ref());
+        let differs = difference.filter(|own| own.ring == ring);
+        let differs = differs.map(|own| own.byte);
         let mut html = Html::new();
         let title = format!("{}{which}", played.title);
         diagram(
@@ -274,7 +278,7 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
             &format!("{id}-{ring}"),
             &title,
             (ring, trace),
-            played.rate,
+            (played.rate, differs),
         );
         parts.push(FoldedPart {
             heading: format!("Space-time diagram{which}"),

@@ -53,8 +53,9 @@
       const [status, meaning, remark] = own.slice(5).map((number) => data.texts[number]);
       const at = ends[link][row];
       const time = at === undefined ? "" : ", " + (at / MS).toFixed(3) + " ms";
+      const differs = data.differs && data.differs[0] === link && data.differs[1] === row ? "The first byte that differs. " : "";
       const fault = own[4] < 0 ? "Fault. " : "";
-      return fault + data.links[link] + ", byte " + (data.first + row + 1) + time + ": " + status + "\n" + meaning +
+      return differs + fault + data.links[link] + ", byte " + (data.first + row + 1) + time + ": " + status + "\n" + meaning +
         (remark ? "\nthe drive: " + remark : "");
     };
 
@@ -173,9 +174,9 @@
       if (state.link >= 0) go(state.link, state.row);
     });
     toggle.setAttribute("aria-pressed", "false");
-    button("next fault", "Go to the next fault", () => fault());
+    button("next", "Go to the next fault, or to the byte that differs", () => fault());
     const help = make("span", tools, { class: "note", id: svg.getAttribute("aria-labelledby").split(" ")[0] + "h" },
-      "Keys: arrows, Page Up and Down, Home, End; f next fault, t times, + and \u2212 zoom, Escape.");
+      "Keys: arrows, Page Up and Down, Home, End; f next fault or byte that differs, t times, + and \u2212 zoom, Escape.");
     root.prepend(tools);
     const said = make("p", root, { class: "said", role: "status" });
     scroll.after(said);
@@ -200,6 +201,7 @@
     const fault = () => {
       const all = [];
       for (let at = 0; at < data.areas.length; at += 8) if (data.areas[at + 4] < 0) all.push([data.areas[at], data.areas[at + 2]]);
+      if (data.differs) all.push(data.differs);
       all.sort((a, b) => a[1] - b[1] || a[0] - b[0]);
       const next = all.find(([link, row]) => row > state.row || (row === state.row && link > state.link)) || all[0];
       if (next) go(next[0], next[1]);
@@ -248,6 +250,72 @@
       if (found) go(found[0], found[1]);
     });
   };
+
+  // A table of scenarios: a search in its words, and a button for each verdict.
+  const filter = (table) => {
+    const rows = [...table.tBodies[0].rows];
+    if (rows.length < 4) return;
+    const tools = make("div", document.body, { class: "tools", role: "group", "aria-label": "Which scenarios are shown" });
+    table.before(tools);
+    const find = make("input", tools, { class: "find", type: "search", placeholder: "search", "aria-label": "Search in the scenarios" });
+    const said = make("span", tools, { class: "note", role: "status" });
+    const chosen = new Set();
+    const apply = () => {
+      const words = find.value.toLowerCase().split(/\s+/).filter(Boolean);
+      let shown = 0;
+      for (const row of rows) {
+        const text = row.textContent.toLowerCase();
+        const fits = words.every((word) => text.includes(word)) && (chosen.size === 0 || chosen.has(row.cells[0].textContent));
+        row.hidden = !fits;
+        shown += fits;
+      }
+      said.textContent = shown === rows.length ? "" : shown + " of " + rows.length + " shown";
+    };
+    find.addEventListener("input", apply);
+    const verdicts = [...new Set(rows.map((row) => row.cells[0].textContent))];
+    if (verdicts.length > 1) {
+      for (const verdict of verdicts) {
+        const element = make("button", tools, { type: "button", "aria-pressed": "false" }, verdict);
+        element.addEventListener("click", () => {
+          if (!chosen.delete(verdict)) chosen.add(verdict);
+          element.setAttribute("aria-pressed", String(chosen.has(verdict)));
+          apply();
+        });
+      }
+    }
+    tools.append(said);
+  };
+  for (const table of document.querySelectorAll("table.rows")) filter(table);
+
+  // What is shown of a byte closes by Escape anywhere, by the wheel, and by pointing elsewhere.
+  const close = () => tip.setAttribute("hidden", "");
+  document.addEventListener("keydown", (event) => event.key === "Escape" && close());
+  document.addEventListener("wheel", close, { passive: true });
+  document.addEventListener("pointerdown", (event) => event.target.closest("svg") || close());
+
+  // A curve: a line at the sample next to the pointer, and its time and value.
+  const curve = (root) => {
+    const { points } = JSON.parse(root.querySelector("script").textContent);
+    const svg = root.querySelector("svg");
+    const line = make("path", svg, { class: "cursor", visibility: "hidden" });
+    svg.addEventListener("pointermove", (event) => {
+      const box = svg.getBoundingClientRect();
+      const x = ((event.clientX - box.left) * svg.viewBox.baseVal.width) / box.width;
+      const near = points.reduce((best, own) => (Math.abs(own[0] - x) < Math.abs(best[0] - x) ? own : best), points[0]);
+      if (!near) return;
+      line.setAttribute("d", "M" + near[0] + " 12V162M" + (near[0] - 3) + " " + near[1] + "h6");
+      line.setAttribute("visibility", "visible");
+      tip.textContent = near[2];
+      tip.removeAttribute("hidden");
+      tip.style.left = Math.min(event.clientX + 14, innerWidth - tip.offsetWidth - 8) + "px";
+      tip.style.top = event.clientY + 18 + "px";
+    });
+    svg.addEventListener("pointerleave", () => {
+      line.setAttribute("visibility", "hidden");
+      close();
+    });
+  };
+  for (const root of document.querySelectorAll(".plot")) curve(root);
 
   // A page of many scenarios opens at once: a diagram is made ready when it comes near.
   const watcher = new IntersectionObserver((seen) => {

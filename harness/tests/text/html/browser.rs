@@ -146,6 +146,35 @@ fn bytes_stand_at_their_times() {
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
+/// A telephone's width holds the page; `next` goes to the byte that differs; Escape closes what is shown of it; a search leaves the rows that fit.
+#[test]
+fn a_narrow_page_next_and_a_search() {
+    let own = folder("narrow");
+    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+        return;
+    };
+    let file = own.join("page.html");
+    let names = ["9.2-synco", "9.7-parity-error", "9.8-check-sequence"];
+    let others = names.map(|name| (name, text(name)));
+    let all = [&[("fails", FAILS.to_owned())], &others[..]].concat();
+    std::fs::write(&file, page(&all)).expect("a file");
+    let narrow = json!({"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": false});
+    browser.call("Emulation.setDeviceMetricsOverride", narrow);
+    ready(&mut browser, &file);
+    let width = browser.value("document.documentElement.scrollWidth");
+    assert!(width.as_u64() <= Some(390), "{width}");
+    browser.value("[...document.querySelector('.ring .tools').querySelectorAll('button')].find((own) => own.textContent === 'next').click()");
+    let said = browser.text(SAID);
+    assert!(said.starts_with("The first byte that differs. "), "{said}");
+    browser.until(&format!("({TIP}) !== ''"));
+    browser.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape' }))");
+    assert_eq!(browser.text(TIP), "");
+    browser.value("(() => { const find = document.querySelector('.find'); find.value = '9.7-parity'; find.dispatchEvent(new Event('input')); })()");
+    let rows = browser.value("[...document.querySelectorAll('table.rows tbody tr')].filter((own) => own.offsetHeight > 0).length");
+    assert_eq!(rows, json!(1));
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
 #[test]
 fn light_dark_print_and_without_scripts() {
     let own = folder("looks");

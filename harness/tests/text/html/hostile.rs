@@ -54,6 +54,7 @@ fn page() -> String {
     let facts = HOSTILE.map(|text| (text, text.to_owned())).to_vec();
     run(
         &Head {
+            found: Vec::new(),
             title: HOSTILE[0],
             facts,
         },
@@ -73,8 +74,8 @@ fn a_strict_reader_finds_nothing_but_text() {
     let html = page();
     let parsed = parse(&html);
     sound(&parsed);
-    // The page's script and the data of each ring, and no other.
-    assert_eq!(count(&parsed, "script"), 1 + HOSTILE.len());
+    // The page's script and the data of each ring and of each curve, and no other.
+    assert_eq!(count(&parsed, "script"), 1 + 2 * HOSTILE.len());
     let text = parsed.text();
     assert!(
         text.contains("<script>window.hacked = 1</script>"),

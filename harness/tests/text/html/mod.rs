@@ -76,6 +76,7 @@ fn page(scenarios: &[(&str, String)]) -> String {
         .map(|(number, (name, text))| shown(number + 1, name, text))
         .collect();
     let head = Head {
+        found: Vec::new(),
         title: "drivebench: a test",
         facts: Vec::new(),
     };

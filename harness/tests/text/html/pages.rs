@@ -2,6 +2,10 @@
 
 use super::parser::{outline, parse, sound};
 use super::{FAILS, page, text};
+use harness::report::html::{Head, ScenarioView, ShownScenario, run, section};
+use harness::scenario::run::Outcome;
+use harness::scenario::verdict::Verdict;
+use harness_proto::line::Rate;
 
 /// The whole outline, for a human reader; other tests check the pictures.
 fn snapshot(name: &str, scenarios: &[(&str, String)]) {
@@ -63,6 +67,69 @@ fn a_page_of_a_hundred_drives_is_small() {
     let html = page(&[("long", long)]);
     assert!(html.len() < 2_000_000, "{}", html.len());
     sound(&parse(&html));
+}
+
+/// The section of a built-in scenario with damaged bytes, as a rig shows it: without the text that damages them.
+fn found_on_a_rig(number: usize, verdict: Verdict, remark: &str) -> ShownScenario {
+    let (_, outcome, traces) = super::played("9.7-parity-error", &text("9.7-parity-error"));
+    let outcome = Outcome {
+        verdict,
+        remarks: vec![remark.to_owned()],
+        ..outcome
+    };
+    let own = ScenarioView {
+        name: "parity",
+        title: "a title",
+        sources: &[],
+        drives: "100",
+        text: "",
+        outcome: &outcome,
+        traces: if verdict == Verdict::Skipped {
+            &[]
+        } else {
+            &traces
+        },
+        report: None,
+        rate: Rate::Baud38400,
+        again: "drivebench trace it",
+    };
+    section(number, &own)
+}
+
+/// The verdict, the cable and the reason of a skip stand in front; damaged bytes have what was sent, and the drives at a fault are labelled.
+#[test]
+fn a_page_says_what_came_of_it() {
+    let failed = page(&[
+        ("fails", FAILS.to_owned()),
+        ("9.2-synco", text("9.2-synco")),
+    ]);
+    assert!(
+        failed.contains("1 of 2 scenarios failed: fails: "),
+        "{failed}"
+    );
+    assert!(failed.contains("\"differs\":[3,2]"), "{failed}");
+    assert!(failed.contains("the first byte that differs from what was expected"));
+    let head = Head {
+        found: Vec::new(),
+        title: "drivebench: a test",
+        facts: Vec::new(),
+    };
+    let rig = run(
+        &head,
+        vec![
+            found_on_a_rig(1, Verdict::Inconclusive, "a remark"),
+            found_on_a_rig(2, Verdict::Skipped, "the rig has no tap"),
+        ],
+    );
+    sound(&parse(&rig));
+    let sentence = "0 of 1 scenario passed, and none failed; 1 skipped. The cable between drives 98 and 97 damages bytes: 1 of 1 fault was located there.";
+    assert!(rig.contains(sentence), "{rig}");
+    assert!(rig.contains("the rig has no tap") && !rig.contains("id=\"s2\""));
+    assert!(rig.contains("Damaged bytes: what was sent, and what arrived"));
+    for drive in [98, 97] {
+        let label = format!(">{drive}</text>");
+        assert!(rig.contains(&label), "{drive}");
+    }
 }
 
 /// Two runs give the same page.

@@ -10,7 +10,7 @@ use crate::report::svg::cells::{Area, Columns, areas};
 use crate::report::svg::{MAX_AREAS, RowPlacing, class};
 use crate::report::walk::SenderState;
 use harness_proto::line::Rate;
-use harness_sim::record::Trace;
+use harness_sim::record::{Channel, LineByte, Trace};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -45,6 +45,8 @@ struct Data {
     /// How long a byte takes, in thirds of a nanosecond, as all times.
     byte: u64,
     links: Vec<String>,
+    /// The first byte that differs from what a scenario expects: its link and its row.
+    differs: Option<[usize; 2]>,
     /// Words that areas point into.
     texts: Vec<String>,
     /// Eight numbers an area: the first link and how many; the first row and how many; the state, and behind it as
@@ -54,13 +56,14 @@ struct Data {
     times: Vec<Vec<u64>>,
 }
 
-/// Writes the diagram of one ring. `id` names its parts.
+/// Writes the diagram of one ring. `id` names its parts; `differs` is the number of the first byte that the master received and that differs from
+/// what was expected, counted from 1.
 pub(crate) fn diagram(
     html: &mut Html,
     id: &str,
     title: &str,
     (ring, trace): (usize, &Trace),
-    rate: Rate,
+    (rate, differs): (Rate, Option<usize>),
 ) {
     let columns = Columns::read(trace, None);
     let all = areas(&columns, RowPlacing::Index);
@@ -68,13 +71,19 @@ pub(crate) fn diagram(
     let drawn = &all[..all.len().min(MAX_AREAS)];
     let column = (WIDE / trace.channels.len().max(1)).clamp(NARROW, 48);
     let rows = drawn.iter().map(|area| area.rows.end).max().unwrap_or(0);
-    let frame = Frame { column, rows };
+    let differs = differs.and_then(|byte| received(trace, byte));
+    let frame = Frame {
+        column,
+        rows,
+        differs: differs.filter(|own| own[1] < rows),
+    };
     let description = description(ring, trace, drawn, cut);
     html.element("div", &[("class", &"ring")], |html| {
         html.scroll(title, |html| {
             picture(html, id, title, &description, trace, drawn, &frame);
         });
-        legend(html, drawn);
+        legend(html, drawn, frame.differs.is_some());
+        damaged(html, ring, trace);
         if cut {
             html.line(
                 "p",
@@ -89,6 +98,65 @@ pub(crate) fn diagram(
 struct Frame {
     column: usize,
     rows: usize,
+    /// The link and the row of the byte that differs.
+    differs: Option<[usize; 2]>,
+}
+
+/// The link and the row of a byte that the master received, counted from 1; where it never came, of the last one that did.
+fn received(trace: &Trace, byte: usize) -> Option<[usize; 2]> {
+    let link = trace.channels.iter().position(|link| link.to.is_none())?;
+    let octets = trace.channels[link].octets().iter().enumerate();
+    let came = octets.filter(|(_, own)| own.received.is_some());
+    let (row, _) = came.take(byte).last()?;
+    Some([link, row])
+}
+
+/// Damaged bytes shown one by one at most.
+const DAMAGED: usize = 20;
+
+/// What arrived damaged, with what was sent.
+fn damaged(html: &mut Html, ring: usize, trace: &Trace) {
+    let bad = |own: &LineByte| own.sent != own.received || own.error.is_some();
+    let of_link = |link: &'_ Channel| {
+        let name = name(ring, link);
+        let octets = link.octets().iter().zip(1..).filter(move |own| bad(own.0));
+        let found = octets.map(move |(own, place)| (own.at, name.clone(), place, *own));
+        found.collect::<Vec<_>>()
+    };
+    let mut all: Vec<_> = trace.channels.iter().flat_map(of_link).collect();
+    if all.is_empty() {
+        return;
+    }
+    all.sort_by_key(|own| own.0);
+    html.element("table", &[], |html| {
+        html.line(
+            "caption",
+            &[],
+            "Damaged bytes: what was sent, and what arrived",
+        );
+        html.heads(&["Time", "Link", "Byte", "Sent", "Arrived"]);
+        for (at, link, place, own) in all.iter().take(DAMAGED) {
+            let hex =
+                |byte: Option<u8>| byte.map_or("nothing".to_owned(), |own| format!("{own:02X}"));
+            let error = own
+                .error
+                .map_or(String::new(), |error| format!(" ({error})"));
+            html.element("tr", &[], |html| {
+                html.line("td", &[("class", &"n")], at);
+                html.line("td", &[("class", &"n")], link);
+                html.line("td", &[("class", &"n")], place);
+                html.line("td", &[("class", &"n")], hex(own.sent));
+                html.line("td", &[("class", &"n bad")], hex(own.received) + &error);
+            });
+        }
+    });
+    if all.len() > DAMAGED {
+        html.line(
+            "p",
+            &[("class", &"note")],
+            format_args!("{} more are not shown.", all.len() - DAMAGED),
+        );
+    }
 }
 
 impl Frame {
@@ -116,7 +184,7 @@ fn picture(
     let title = format!("Space-time diagram: {title}");
     let id = format!("{id}-");
     html.picture(&id, (width, height), (&title, description), |html| {
-        heads(html, trace, frame.column);
+        heads(html, trace, areas, frame);
         html.element("g", &[("class", &"by-index")], |html| {
             numbers(html, frame.rows);
             shapes(html, areas, frame);
@@ -127,21 +195,44 @@ fn picture(
     });
 }
 
-/// The senders above their columns; not each where there are many.
-fn heads(html: &mut Html, trace: &Trace, column: usize) {
-    let mut free = 0;
-    for (place, link) in trace.channels.iter().enumerate() {
-        let x = LEFT + column * place + column / 2;
-        if x < free {
-            continue;
+/// The senders above their columns; where there is not room for all, those at faults and at the byte that differs first.
+fn heads(html: &mut Html, trace: &Trace, areas: &[Area], frame: &Frame) {
+    let all = 0..trace.channels.len();
+    let faults = areas.iter().filter(|area| area.fault);
+    let matters = faults.map(|area| area.links.start);
+    let matters = frame.differs.map(|own| own[0]).into_iter().chain(matters);
+    // A fault on a link is of its sender or of the receiver, whose column is the next one.
+    let matters = matters.flat_map(|place| [place, place + 1]);
+    let ends = [0, all.end.saturating_sub(1)];
+    // Neighbours that matter stand in two lines.
+    let mut placed: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    let mut place_one = |place: usize, lines: &[usize]| {
+        let x = LEFT + frame.column * place + frame.column / 2;
+        let room = |own: usize| if own == 0 { 22 } else { 10 };
+        let free = |y: &usize| {
+            let apart = |(other, own): (&usize, &(usize, usize))| {
+                own.1 != *y || own.0.abs_diff(x) >= room(*other) + room(place)
+            };
+            placed.iter().all(apart)
+        };
+        let line = lines.iter().find(|y| free(y)).copied();
+        if let Some(y) = line.filter(|_| all.contains(&place) && !placed.contains_key(&place)) {
+            placed.insert(place, (x, y));
         }
+    };
+    for place in matters.chain(ends) {
+        place_one(place, &[TOP - 9, TOP - 19]);
+    }
+    for place in all.clone() {
+        place_one(place, &[TOP - 9]);
+    }
+    for (place, (x, y)) in placed {
         let attributes: [(&str, &dyn std::fmt::Display); 3] =
-            [("class", &"m"), ("x", &x), ("y", &(TOP - 10))];
-        match link.from {
+            [("class", &"m"), ("x", &x), ("y", &y)];
+        match trace.channels[place].from {
             Some(drive) => html.line("text", &attributes, drive),
             None => html.line("text", &attributes, "master"),
         }
-        free = x + if place == 0 { 44 } else { 26 };
     }
 }
 
@@ -182,6 +273,17 @@ fn shapes(html: &mut Html, areas: &[Area], frame: &Frame) {
     for (class, path) in &paths {
         html.shape("path", &[("class", class), ("d", path)]);
     }
+    if let Some([link, row]) = frame.differs {
+        let (x, y) = (LEFT + frame.column * link, TOP + ROW * row);
+        let around = format!(
+            "M{} {}h{}v{ROW}h-{}z",
+            x - 1,
+            y - 1,
+            frame.column,
+            frame.column
+        );
+        html.shape("path", &[("class", &"w"), ("d", &around)]);
+    }
 }
 
 /// A text a row, in which each letter has its place: much shorter than a text a byte.
@@ -203,7 +305,7 @@ fn letters(html: &mut Html, areas: &[Area], frame: &Frame) {
 }
 
 /// The colours in words, of the states that occur.
-fn legend(html: &mut Html, areas: &[Area]) {
+fn legend(html: &mut Html, areas: &[Area], differs: bool) {
     html.element(
         "ul",
         &[
@@ -223,11 +325,27 @@ fn legend(html: &mut Html, areas: &[Area]) {
                     });
                 }
             }
-            if areas.iter().any(|area| area.fault) {
+            let faults = areas.iter().any(|area| area.fault);
+            let mark = |html: &mut Html, class: &str, text: &str| {
                 html.element("li", &[], |html| {
-                    html.line("i", &[("class", &"x"), ("aria-hidden", &"true")], "");
-                    html.text("fault: damaged on the line, or the drive that detected it");
+                    html.line("i", &[("class", &class), ("aria-hidden", &"true")], "");
+                    html.text(text);
                 });
+            };
+            if faults {
+                mark(
+                    html,
+                    "x",
+                    "fault: damaged on the line, or the drive that detected it",
+                );
+                mark(html, "y", "a row with a fault");
+            }
+            if differs {
+                mark(
+                    html,
+                    "w",
+                    "the first byte that differs from what was expected",
+                );
             }
         },
     );
@@ -322,6 +440,7 @@ fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -
         rows: frame.rows,
         byte,
         links: trace.channels.iter().map(|link| name(ring, link)).collect(),
+        differs: frame.differs,
         texts: texts.all,
         areas: flat,
         times: times.collect(),

@@ -33,7 +33,11 @@ const CHECK: &str = "check sequence";
 /// Suffix of an answer whose checking byte is wrong (9.6).
 const MISFIT: &str = " (checking byte does not fit)";
 
+/// Room for times.
+const TIMES: usize = 90;
 const COLUMN: usize = 110;
+/// The width of a letter, rounded up.
+const LETTER: usize = 7;
 const ROW: usize = 26;
 const TOP: usize = 30;
 
@@ -395,9 +399,11 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
             .iter()
             .position(|own| *own == one)
             .unwrap_or(who.len() - 1);
-        20 + COLUMN / 2 + COLUMN * place
+        TIMES + COLUMN / 2 + COLUMN * place
     };
-    let width = 20 + COLUMN * who.len() + 560;
+    let words_at = TIMES + COLUMN * who.len() + 10;
+    let letters = drawn.iter().map(|own| text(own).chars().count());
+    let width = words_at + letters.max().unwrap_or(0) * LETTER + 10;
     let height = TOP + ROW * drawn.len() + 16;
     let words = "A line downwards for the master, for each drive that had a part, and for the ring; an arrow for each event. \
                  The table below says the same.";
@@ -429,7 +435,7 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
                         event,
                         (x(event.from), x(event.to)),
                         TOP + ROW * row + 16,
-                        width - 550,
+                        words_at,
                     );
                 }
             },
@@ -455,17 +461,23 @@ fn arrow(html: &mut Html, event: &Event, (from, to): (usize, usize), y: usize, w
         format!("M{from} {y}H{}M{to} {y}l8 -4v8z", to + 4)
     };
     html.shape("path", &[("class", &class), ("d", &d)]);
+    for (class, x, said) in [
+        ("e", TIMES - 10, event.at.to_string()),
+        ("s", words, text(event)),
+    ] {
+        html.line(
+            "text",
+            &[("class", &class), ("x", &x), ("y", &(y + 4))],
+            said,
+        );
+    }
+}
+
+/// What an event is, with its bytes.
+fn text(event: &Event) -> String {
     let bytes = hex(event);
     let gap = if bytes.is_empty() { "" } else { ": " };
-    let text: String = format!("{}{gap}{bytes}", event.what)
-        .chars()
-        .take(80)
-        .collect();
-    html.line(
-        "text",
-        &[("class", &"s"), ("x", &words), ("y", &(y + 4))],
-        text,
-    );
+    format!("{}{gap}{bytes}", event.what)
 }
 
 fn table(html: &mut Html, events: &[Event]) {
