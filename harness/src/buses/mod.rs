@@ -49,7 +49,7 @@ use crate::capture::live::LiveText;
 use crate::capture::{Carries, RecordedPlace, ends};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
-use crate::cli::fuzz::{FuzzRunArguments, verify};
+use crate::cli::fuzz::{LineFuzz, verify};
 use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
 use crate::cli::rig_failure::find_any_rig;
@@ -415,16 +415,10 @@ pub(crate) fn check_rig(
     }
 }
 
-/// Explores the drives of a rig with `[port.1]`.
-pub(crate) fn fuzz_port(
-    rig: &Rig,
-    arguments: &FuzzRunArguments,
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    match rig.port() {
-        Some(port) => (port.bus.row().fuzz)(rig, arguments, output),
-        None => Ok(Exit::Usage),
-    }
+/// How drives of a shared line are explored; `None` for rings.
+pub(crate) fn line_fuzz(bus: Bus) -> Option<&'static LineFuzz> {
+    let own = PortBus::ALL.into_iter().find(|own| own.bus() == bus)?;
+    Some(&own.row().fuzz)
 }
 
 /// Judges the findings of a run on drives of a shared line again; `None` if the folder has no such run.
@@ -438,23 +432,6 @@ pub(crate) fn verify_shared(
     }
     let (kept, _) = read_as::<nordac::explore::TelegramTalk>(folder).ok()?;
     Some(verify(folder, &kept, signer, output))
-}
-
-/// Makes a finding on drives of a shared line small.
-pub(crate) fn shrink_shared(
-    bus: Bus,
-    finding: &Path,
-    most: u32,
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    match bus {
-        Bus::Unitek => unitek::cli::fuzz::shrink(finding, most, output),
-        Bus::Nordac => nordac::cli::fuzz::shrink(finding, most, output),
-        Bus::Novobus => {
-            output.complain("the finding is of a ring, and names another bus");
-            Ok(Exit::Usage)
-        }
-    }
 }
 
 /// Reports the error of a command.

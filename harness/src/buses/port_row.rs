@@ -4,7 +4,7 @@ use super::commands::DriveCommand;
 use super::{Bus, PortBus};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
-use crate::cli::fuzz::FuzzRunArguments;
+use crate::cli::fuzz::LineFuzz;
 use crate::cli::output::Output;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
@@ -51,7 +51,7 @@ pub(crate) struct PortRow {
     /// Runs `rig check`, as text or for tools.
     pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
     /// Explores its drives.
-    pub(crate) fuzz: fn(&Rig, &FuzzRunArguments, &mut Output) -> std::io::Result<Exit>,
+    pub(crate) fuzz: LineFuzz,
 }
 
 impl PortBus {

@@ -3,8 +3,9 @@
 use super::exit::Exit;
 use super::fuzz::tell;
 use super::output::Output;
-use crate::explore::promote::{Naming, checkout, promote as keep};
-use crate::explore::{ExploreError, Finding};
+use crate::buses::line_fuzz;
+use crate::explore::promote::{Naming, Promoted, Promotes, checkout, promote as write};
+use crate::explore::{Case, ExploreError, Finding, bus_of};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -27,10 +28,20 @@ pub struct PromoteArguments {
     pub checkout: Option<PathBuf>,
 }
 
-/// Writes the files.
+/// Keeps a finding, whatever its bus.
 pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let promoted = promoted(arguments);
-    let promoted = match promoted {
+    match bus_of(&arguments.finding).and_then(line_fuzz) {
+        Some(own) => (own.promote)(arguments, output),
+        None => keep::<Case>(arguments, output),
+    }
+}
+
+/// Writes the files.
+pub(crate) fn keep<C: Promotes>(
+    arguments: &PromoteArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let promoted = match promoted::<C>(arguments) {
         Ok(promoted) => promoted,
         Err(error) => return Ok(tell(&error, output)),
     };
@@ -41,9 +52,9 @@ pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std:
     output.result(&names.collect::<String>())?;
     output.say("the model passes it");
     output.say(match promoted.fails_on_deviating {
-        Some(true) => ", and the ring with the finding fails it\n",
+        Some(true) => ", and the drives with the finding fail it\n",
         Some(false) => {
-            ", and so does the ring with the finding: the difference does not reach the master\n"
+            ", and so do the drives with the finding: the difference does not reach the master\n"
         }
         None => "\n",
     });
@@ -51,10 +62,8 @@ pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std:
     Ok(Exit::Passed)
 }
 
-fn promoted(
-    arguments: &PromoteArguments,
-) -> Result<crate::explore::promote::Promoted, ExploreError> {
-    let (finding, _) = Finding::read(&arguments.finding)?;
+fn promoted<C: Promotes>(arguments: &PromoteArguments) -> Result<Promoted, ExploreError> {
+    let (finding, _) = Finding::<C>::read_as(&arguments.finding)?;
     let here = PathBuf::from(".");
     let from = arguments.checkout.as_ref().unwrap_or(&here);
     let from = from
@@ -65,5 +74,5 @@ fn promoted(
         title: arguments.title.clone(),
         source: arguments.source.clone(),
     };
-    keep(&finding, &naming, &checkout(&from)?)
+    write(&finding, &naming, &checkout(&from)?)
 }

@@ -4,7 +4,7 @@ use super::args::duration;
 use super::exit::Exit;
 use super::fuzz::tell;
 use super::output::Output;
-use crate::buses::{shrink_rings, shrink_shared};
+use crate::buses::{line_fuzz, shrink_rings};
 use crate::counted::counted;
 use crate::explore::{ExploreError, Finding, FuzzCase, bus_of};
 use clap::Args;
@@ -22,10 +22,10 @@ pub(crate) const RUNS_ON_RIG: u32 = 40;
 pub struct ShrinkArguments {
     /// A finding of `fuzz run`: its `.json` or `.scn` file.
     pub finding: PathBuf,
-    /// The rig with ports on which the finding was made; a finding of a simulated ring needs none.
+    /// The rig with ports on which the finding was made; a finding of simulated drives needs none.
     #[arg(long, value_name = "RIG")]
     pub rig: Option<String>,
-    /// Maximum number of runs; by default 300 on simulated rings, 40 on a rig with ports.
+    /// Maximum number of runs; by default 300 on simulated drives, 40 on a rig with ports.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub runs: Option<u32>,
     /// Let motors turn; the rig's file must allow it too.
@@ -38,11 +38,10 @@ pub struct ShrinkArguments {
 
 /// Makes a finding small, and writes what came of it beside it.
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
-    if let Some(bus) = bus_of(&arguments.finding) {
-        let most = arguments.runs.unwrap_or(RUNS);
-        return shrink_shared(bus, &arguments.finding, most, output);
+    match bus_of(&arguments.finding).and_then(line_fuzz) {
+        Some(own) => (own.shrink)(arguments, output),
+        None => shrink_rings(arguments, output),
     }
-    shrink_rings(arguments, output)
 }
 
 /// Writes a finding that was made small beside the old one, and shows it.

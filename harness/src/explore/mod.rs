@@ -13,7 +13,8 @@ pub(crate) mod files;
 mod finding;
 mod fuzz_case;
 pub mod line;
-mod pool;
+pub(crate) mod pool;
+pub mod promote;
 mod record;
 pub(crate) mod search;
 pub(crate) mod smaller;
@@ -27,7 +28,7 @@ pub use dice::Dice;
 pub use error::ExploreError;
 pub use finding::{Finding, bus_of};
 pub use fuzz_case::{Differing, FuzzCase, JudgedAgain, Spiced};
-pub use pool::{MOST_KEPT, Pool};
+pub use pool::{MOST_KEPT, Pool, by_novelty};
 pub use record::{
     FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as, rig_of,
 };
@@ -39,6 +40,5 @@ pub use crate::buses::rings::explore::{
     Act, ActKind, AttemptRecord, Case, CaseScope, Command, CommandSent, Damage, Difference,
     Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
     RingScope, RingSetup, Spice, Spoil, Talk, To, against_model, against_reference,
-    against_witnesses, beside, by_novelty, features, judged_again, mutate, page, play, promote,
-    shrink, text,
+    against_witnesses, beside, features, judged_again, mutate, page, play, shrink, text,
 };

@@ -72,8 +72,8 @@ struct Shrinker<'t, C: FuzzCase> {
 }
 
 impl<C: Acts> Shrinker<'_, C> {
-    const fn is_spent(&self) -> bool {
-        self.runs >= self.most
+    fn is_spent(&mut self) -> bool {
+        self.runs >= self.most || self.target.over().is_some()
     }
 
     /// Takes a smaller case if it shows the same kind of difference.
@@ -81,8 +81,12 @@ impl<C: Acts> Shrinker<'_, C> {
         if case.measure() >= self.best.measure() || self.is_spent() {
             return Ok(false);
         }
-        self.runs += 1;
         let rehearsal = self.target.rehearse(&case)?;
+        if rehearsal.denied.is_some() {
+            return Ok(false);
+        }
+        self.runs += 1;
+        self.target.begin();
         let tried = self.target.attempt(&case, &rehearsal)?;
         let same = tried.difference.filter(|own| own.is_like(&self.difference));
         let Some(difference) = same else {

@@ -18,13 +18,21 @@ struct Desk {
 impl Desk {
     /// A rig at one of the ways in, with more in its port.
     fn new(way: &str, more: &str) -> Self {
+        Self::of(way, more, "slave 8\nslave 8 parameter 1621 = 2\n")
+    }
+
+    /// The same with a slave of these header lines.
+    fn of(way: &str, more: &str, setup: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let terminal = folder.path().join("terminal");
         let place = match way {
             "pty" => ["--pty", terminal.to_str().expect("text")],
             _ => ["--tcp", "127.0.0.1:0"],
         };
-        let served = ["--bus", "nordac", "--slaves", "8"];
+        let header = folder.path().join("setup.scn");
+        std::fs::write(&header, setup).expect("room");
+        let header = header.to_str().expect("text");
+        let served = ["--bus", "nordac", "--setup", header];
         let mut sim = Sim::start(&[&served[..], &place].concat());
         let address = sim.address();
         let port = match way {
@@ -118,4 +126,33 @@ fn a_wrong_echo_is_told_with_its_remedy() {
     ended(&heard.run("rig check desk.toml"), 3, "set `echo = true`");
     let deaf = Desk::new("tcp", "echo = true\n");
     ended(&deaf.run("rig check desk.toml"), 3, "set `echo = false`");
+}
+
+/// Inverters behind an adapter are explored: a right one is not accused, and a finding is made small on the line where it was made.
+#[test]
+fn inverters_behind_an_adapter_are_explored() {
+    let run = |desk: &Desk, time: &str| {
+        let more = "--findings 1 --allow-motion --rig desk.toml --out run";
+        desk.run(&format!("fuzz run --wire-time {time} {more}"))
+    };
+    for way in ["tcp", "pty"] {
+        let desk = Desk::new(way, "");
+        let right = run(&desk, "5s");
+        ended(&right, 0, "0 found, 0 flaky");
+        assert!(said(&right).contains(SAFE), "{}", said(&right));
+    }
+    let wrong = "slave 8\nslave 8 parameter 1621 = 2\nslave 8 deviates answers-broadcasts\n";
+    let desk = Desk::of("tcp", "", wrong);
+    let found = run(&desk, "60s");
+    ended(&found, 1, "1 found, 0 flaky");
+    let text = said(&found);
+    let line = text
+        .lines()
+        .find_map(|own| own.split_once("drivebench shrink "));
+    let (_, finding) = line.expect("a finding");
+    let small = desk.run(&format!(
+        "shrink {finding} --rig desk.toml --allow-motion --runs 5"
+    ));
+    ended(&small, 0, "became");
+    assert!(said(&small).contains(SAFE), "{}", said(&small));
 }

@@ -1,5 +1,6 @@
 //! `drivebench fuzz`: generated conversations, and what the kept inputs of the fuzz targets reach.
 
+mod line;
 mod replay;
 pub(crate) mod rig;
 mod run;
@@ -10,8 +11,8 @@ use super::exit::Exit;
 use super::output::Output;
 use clap::Subcommand;
 
+pub(crate) use line::LineFuzz;
 pub(crate) use rig::{Use, on_ports, scope, sizes, tell};
-pub(crate) use run::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore};
 pub(crate) use verify::verify;
 
 /// The commands of `fuzz`.

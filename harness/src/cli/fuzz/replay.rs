@@ -2,14 +2,15 @@
 
 use super::rig::{Use, on_ports, rings, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
+use crate::buses::line_fuzz;
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::find_rig;
+use crate::cli::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::explore::{
-    Act, ActKind, Bounds, Case, ExploreError, FuzzRun, FuzzSettings, LogLine, MOST_BYTES, OnRig,
-    OnSim, RingSetup, Target, by_novelty, read,
+    Act, ActKind, Bounds, Case, ExploreError, FuzzCase, FuzzRun, FuzzSettings, LogLine, MOST_BYTES,
+    OnRig, OnSim, RingSetup, Target, by_novelty, read_as,
 };
 use crate::guard::Limits;
 use crate::regular::{self, Links};
@@ -45,9 +46,12 @@ pub struct ReplayArguments {
 
 /// Replays.
 pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let Some(rig) = find_rig(&arguments.rig, output) else {
+    let Some(rig) = find_any_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
+    if let Some(own) = rig.port().and_then(|port| line_fuzz(port.bus.bus())) {
+        return (own.replay)(&rig, arguments, output);
+    }
     let cases = match cases(&arguments.folder, &rig) {
         Ok(cases) => cases,
         Err(error) => return Ok(tell(&error, output)),
@@ -113,11 +117,12 @@ fn campaign(
     FuzzRun::new(about, scope)
 }
 
-fn play(
+/// Plays cases, the most telling first.
+pub(super) fn play<C: FuzzCase>(
     arguments: &ReplayArguments,
-    mut campaign: FuzzRun,
-    cases: Vec<Case>,
-    target: &mut dyn Target,
+    mut campaign: FuzzRun<C>,
+    cases: Vec<C>,
+    target: &mut dyn Target<C>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let count = cases.len();
@@ -167,17 +172,22 @@ fn play(
     })
 }
 
+/// The cases that a run has kept in its folder.
+pub(super) fn kept<C: FuzzCase>(folder: &Path) -> Result<Vec<C>, ExploreError> {
+    let lines = read_as::<C>(folder)?.0.lines.into_iter();
+    let kept = lines.filter_map(|line| match line {
+        LogLine::Kept { case, .. } => Some(case),
+        _ => None,
+    });
+    Ok(kept.take(MOST_CASES).collect())
+}
+
 /// The cases of a folder, each on every ring of the rig that has as many drives.
 fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
     let (first, second) = rings(rig, |_, _| true);
     let places: Vec<_> = std::iter::once(first).chain(second).collect();
     if folder.join(crate::explore::RECORD).exists() {
-        let (kept, _) = read(folder)?;
-        let kept = kept.lines.into_iter().filter_map(|line| match line {
-            LogLine::Kept { case, .. } => Some(case),
-            _ => None,
-        });
-        let placed = kept.flat_map(|case| {
+        let placed = kept::<Case>(folder)?.into_iter().flat_map(|case| {
             let fit = places.iter().filter(move |own| own.drives == case.drives);
             fit.map(move |own| own.case(case.acts.clone()))
         });

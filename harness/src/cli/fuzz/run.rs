@@ -2,7 +2,7 @@
 
 use super::rig::{Use, on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
-use crate::buses::{Bus, deviations, fuzz_port};
+use crate::buses::{Bus, deviations, line_fuzz};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -145,8 +145,8 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     let Some(rig) = find_any_rig(&name, output) else {
         return Ok(Exit::Usage);
     };
-    match rig.port() {
-        Some(_) => fuzz_port(&rig, arguments, output),
+    match rig.port().and_then(|port| line_fuzz(port.bus.bus())) {
+        Some(own) => (own.run)(&rig, arguments, output),
         None => on_rings(rig, arguments, output),
     }
 }

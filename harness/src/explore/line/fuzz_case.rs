@@ -3,6 +3,8 @@
 use super::generate::Maker;
 use super::text::text;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
+use crate::buses::Bus;
+use crate::explore::promote::Promotes;
 use crate::explore::smaller::Acts;
 use crate::explore::{
     Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
@@ -25,7 +27,9 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
     type Act = LineAct<B::What>;
 
     fn swarm(seed: u64, round: u64, scope: &LineScope<B>) -> Swarm<B::Spice> {
-        Swarm::drawn(seed, round, &scope.spices, (B::NEEDED, B::NEEDED[0]))
+        let has = |own: &&B::Spice| scope.spices.contains(own);
+        let least = B::NEEDED.iter().find(has).unwrap_or(&B::NEEDED[0]);
+        Swarm::drawn(seed, round, &scope.spices, (B::NEEDED, *least))
     }
 
     fn tour(_: &LineScope<B>, _: &FuzzSettings<Self>) -> Vec<Self> {
@@ -54,7 +58,7 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
 
     fn text(finding: &Finding<Self>) -> Result<String, ExploreError> {
         let title = format!("Found by fuzzing: {}", finding.difference.signature());
-        text(finding, &title)
+        text(finding, (&title, None), false)
     }
 
     fn again(
@@ -95,6 +99,30 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
     }
 }
 
+impl<B: LineBus> Promotes for LineTalk<B> {
+    fn bus() -> Bus {
+        B::BUS
+    }
+
+    fn scenario(
+        finding: &Finding<Self>,
+        title: &str,
+        source: Option<&str>,
+    ) -> Result<String, ExploreError> {
+        text(finding, (title, source), false)
+    }
+
+    fn on_deviating(finding: &Finding<Self>) -> Result<Option<String>, ExploreError> {
+        let planted = !finding.setup.deviates.is_empty();
+        let under_test = || text(finding, ("the drives under test", None), true);
+        planted.then(under_test).transpose()
+    }
+
+    fn input(_: &Finding<Self>, _: &str) -> Option<(&'static str, String)> {
+        None
+    }
+}
+
 impl<B: LineBus> Acts for LineTalk<B> {
     fn acts(&mut self) -> &mut Vec<Self::Act> {
         &mut self.acts
@@ -120,12 +148,4 @@ impl<B: LineBus> Acts for LineTalk<B> {
     fn measure(&self) -> (usize, u64, u64) {
         Self::measure(self)
     }
-}
-
-/// FNV-1a: a number for a feature.
-pub(crate) fn hash(words: &[u32]) -> u32 {
-    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
-    bytes.fold(0x811C_9DC5, |hash: u32, byte| {
-        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    })
 }

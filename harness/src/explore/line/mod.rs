@@ -8,6 +8,7 @@ mod fuzz_case;
 mod generate;
 mod on_sim;
 mod oracle;
+mod rig;
 mod setup;
 mod talk;
 mod text;
@@ -15,9 +16,10 @@ mod text;
 pub(crate) mod trial;
 
 pub use fuzz_case::NoAttempt;
-pub(crate) use fuzz_case::hash;
 pub use generate::LineScope;
 pub use on_sim::OnLine;
+pub(crate) use rig::pass;
+pub use rig::{LineRig, OnAdapter, SessionOf};
 pub use setup::{LineSetup, PlantedDrive};
 pub use talk::{ActBounds, LineAct, LineSeen, LineTalk, Seen};
 
@@ -100,8 +102,8 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     /// Changes a part of an act.
     fn change(what: &mut Self::What, dice: &mut Dice);
 
-    /// Header lines of the drives of a rig.
-    fn header(rig: &Rig) -> Vec<String>;
+    /// Header lines of the drives of a rig, which conversations address so.
+    fn header(rig: &Rig, stations: &[Self::Station]) -> Vec<String>;
     /// The simulated drives of header lines.
     ///
     /// # Errors

@@ -69,8 +69,8 @@ impl LineSetup {
 
     /// The line of a rig, with more deviations than its file plants.
     #[must_use]
-    pub fn of_rig<B: LineBus>(rig: &Rig, more: Vec<PlantedDrive>) -> Self {
-        let lines = B::header(rig).into_iter().chain(setup_lines(rig));
+    pub fn of_rig<B: LineBus>(rig: &Rig, stations: &[B::Station], more: Vec<PlantedDrive>) -> Self {
+        let lines = B::header(rig, stations).into_iter().chain(setup_lines(rig));
         Self::new::<B>(lines.collect(), more)
     }
 

@@ -1,17 +1,22 @@
 //! Trials of the engine on a bus, for the tests of its rooms: right drives are never accused, wrong ones are found, shrunk and kept as
 //! scenarios.
 
-use super::{LineBus, LineScope, LineSetup, LineTalk, OnLine, PlantedDrive};
+use super::{
+    LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
+};
 use crate::explore::smaller::smaller;
 use crate::explore::{
     Bounds, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd, Spiced, Swarm,
     Watcher,
 };
 use crate::library::Entry;
+use crate::rig::{Options, find};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use std::path::Path;
+use std::time::Duration;
 
 struct Found<B: LineBus>(Vec<Finding<LineTalk<B>>>);
 
@@ -56,24 +61,8 @@ impl<B: LineBus> EngineTrial<B> {
             drives: vec![self.station],
             spices: B::Spice::ALL.iter().map(|(_, own)| *own).collect(),
         };
-        let about = FuzzSettings {
-            schema: 1,
-            rig: "sim".to_owned(),
-            drives: 1,
-            second: None,
-            ports: false,
-            seed,
-            confirm: 2,
-            of: 3,
-            setup,
-            spices: B::Spice::ALL.iter().map(|own| own.0.to_owned()).collect(),
-        };
-        let bounds = Bounds {
-            cases: u64::MAX,
-            wire: Some(Span::from_millis(1_000 * seconds)),
-            findings,
-            every: u64::MAX,
-        };
+        let about = settings::<B>(setup, seed);
+        let bounds = bounds(seconds, findings);
         let mut found = Found(Vec::new());
         let mut run = FuzzRun::new(about, scope);
         let end = run.run(&mut target, None, &bounds, &mut found);
@@ -86,6 +75,50 @@ impl<B: LineBus> EngineTrial<B> {
         let about: Vec<_> = found.iter().map(|own| &own.difference).collect();
         assert_eq!((about, end), (Vec::new(), RunEnd::Wire), "{line:?}");
         assert_eq!(undecided, 0, "{line:?}");
+    }
+
+    /// Explores right drives of a simulated rig with this header line like drives behind an adapter: nothing is found, and something is
+    /// played.
+    pub(crate) fn accuses_nobody_behind_a_port(rig: &str, line: &[String], seconds: u64)
+    where
+        B: LineRig,
+    {
+        let mut rig = find(rig, Path::new("")).expect("a rig");
+        let sim = rig.file.sim.as_mut().expect("a simulated rig");
+        sim.setup.extend_from_slice(line);
+        // The slowest right drive replies after 137 ms.
+        let port = rig.file.port.as_mut().expect("a port");
+        port.first.patience.0 = Duration::from_millis(200);
+        let options = Options {
+            allow_motion: true,
+            ..Options::default()
+        };
+        let mut session = SessionOf::<B>::open(&rig, &options).expect("drives");
+        let drives = B::stations(&rig, Some(&session));
+        let all = B::Spice::ALL.iter().map(|(_, own)| *own);
+        let spices = all.filter(|own| B::possible(&rig, true, *own)).collect();
+        let setup = LineSetup::of_rig::<B>(&rig, &drives, Vec::new());
+        let model = setup.under_test::<B>().expect("a header");
+        let mut target = OnAdapter::<B>::new(&mut session, model).expect("drives");
+        let scope = LineScope { drives, spices };
+        let mut found = Found(Vec::new());
+        let about = settings::<B>(setup, 1);
+        let mut run = FuzzRun::new(about, scope);
+        let bounds = bounds(seconds, 1);
+        let end = run.run(&mut target, None, &bounds, &mut found);
+        let about: Vec<_> = found.0.iter().map(|own| &own.difference).collect();
+        assert_eq!(
+            (about, end.expect("a rig")),
+            (Vec::new(), RunEnd::Wire),
+            "{line:?}"
+        );
+        let progress = run.progress();
+        assert!(
+            progress.cases > 2 * progress.not_sent,
+            "{line:?}: {progress:?}"
+        );
+        drop(target);
+        assert!(!session.close(false).is_unsafe(), "{line:?}");
     }
 
     /// Explores drives with these deviations for ten minutes of bus time: those that were not found. What is found is made small and is a
@@ -114,6 +147,30 @@ impl<B: LineBus> EngineTrial<B> {
             assert_eq!(wrong, Verdict::Failed, "{name}: {why}\n{text}");
         }
         missed
+    }
+}
+
+fn settings<B: LineBus>(setup: LineSetup, seed: u64) -> FuzzSettings<LineTalk<B>> {
+    FuzzSettings {
+        schema: 1,
+        rig: "sim".to_owned(),
+        drives: 1,
+        second: None,
+        ports: false,
+        seed,
+        confirm: 2,
+        of: 3,
+        setup,
+        spices: B::Spice::ALL.iter().map(|own| own.0.to_owned()).collect(),
+    }
+}
+
+fn bounds(seconds: u64, findings: usize) -> Bounds {
+    Bounds {
+        cases: u64::MAX,
+        wire: Some(Span::from_millis(1_000 * seconds)),
+        findings,
+        every: u64::MAX,
     }
 }
 

@@ -100,7 +100,7 @@ fn from_a_seed_to_a_scenario() {
     ended(
         &drivebench(&promote),
         0,
-        "the ring with the finding fails it",
+        "the drives with the finding fail it",
     );
     ended(&drivebench(&promote), 2, "is there already");
     let scenario = top.join("corpora/scenarios/novobus/10.3-and.scn");

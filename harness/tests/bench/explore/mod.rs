@@ -3,6 +3,7 @@
 mod command;
 mod findings;
 mod frames;
+mod lines;
 mod masters;
 mod rings;
 mod runs;

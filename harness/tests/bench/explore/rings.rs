@@ -208,7 +208,7 @@ fn the_commands_on_two_rings() {
         ended(
             &drivebench(&promote),
             0,
-            "the ring with the finding fails it",
+            "the drives with the finding fail it",
         );
         let kept = top.join(format!("corpora/scenarios/novobus/{own}.scn"));
         ended(&drivebench(&["run", name(&kept)]), 0, "1 passed");

@@ -5,7 +5,6 @@ mod bench;
 pub(crate) mod cells;
 mod check;
 mod control;
-pub(crate) mod fuzz;
 mod info;
 mod params;
 mod read;

@@ -11,10 +11,11 @@ use crate::buses::nordac::judge::Symptom;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::manual::MANUAL;
 use crate::buses::nordac::report::Said;
-use crate::buses::nordac::rig::{rate, slaves};
+use crate::buses::nordac::rig::rate;
 use crate::buses::nordac::serve;
 use crate::buses::nordac::simulate::Setup;
-use crate::explore::line::{ActBounds, LineBus, hash};
+use crate::explore::line::{ActBounds, LineBus};
+use crate::explore::pool::hash;
 use crate::explore::{Dice, Differing};
 use crate::manual::Manual;
 use crate::rig::Rig;
@@ -158,13 +159,10 @@ impl LineBus for Nordac {
         generate::change(what, dice);
     }
 
-    fn header(rig: &Rig) -> Vec<String> {
-        let port = rig.port();
-        let rate = port.map(|port| format!("rate {}", rate(port).name()));
-        let own = port.map(slaves).unwrap_or_default();
-        let own = own.iter().flat_map(|own| {
-            let (address, ppo) = (own.address, own.ppo.unwrap_or_default().number());
-            let there = format!("slave {address} ppo {ppo}");
+    fn header(rig: &Rig, stations: &[Station]) -> Vec<String> {
+        let rate = rig.port().map(|port| format!("rate {}", rate(port).name()));
+        let own = stations.iter().flat_map(|(address, ppo)| {
+            let there = format!("slave {address} ppo {}", ppo.number());
             [there, format!("slave {address} parameter 1621 = 2")]
         });
         rate.into_iter().chain(own).collect()

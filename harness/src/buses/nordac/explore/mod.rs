@@ -5,6 +5,7 @@ mod bus;
 mod generate;
 mod hex;
 mod idiom;
+mod on_adapter;
 pub mod oracle;
 mod play;
 mod tasks;

@@ -74,6 +74,14 @@ fn no_right_slave_is_accused_in_a_minute() {
     right_slaves(60);
 }
 
+/// Judged by what comes alone, in virtual time.
+#[test]
+fn no_right_slave_behind_an_adapter_is_accused() {
+    for line in open_points() {
+        EngineTrial::<Nordac>::accuses_nobody_behind_a_port("sim:nordac:1", &line, 15);
+    }
+}
+
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_slaves_are_found_and_their_findings_are_scenarios() {

@@ -16,6 +16,9 @@ use std::collections::BTreeMap;
 /// Differences that are kept at most.
 const MOST_BREACHES: usize = 50;
 
+/// What a reply to no request is about.
+const NO_REQUEST: &str = "octets that are no request";
+
 /// Something that a slave does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Breach {
@@ -25,6 +28,8 @@ pub struct Breach {
     pub telegram: usize,
     /// The slave.
     pub slave: u8,
+    /// The service, or what it was that asked for the reply.
+    pub part: String,
     /// The section, such as `EN 2` or `3.4.1`.
     pub section: &'static str,
     /// What was expected and what has come.
@@ -97,8 +102,15 @@ struct Asked {
 /// Judges what the slaves of a line sent.
 #[must_use]
 pub fn judge(trace: &Trace) -> JudgedSlaves {
+    judge_runs(runs(trace))
+}
+
+/// The same of octets that stations sent without a pause.
+pub(in crate::buses::nordac) fn judge_runs(
+    runs: impl IntoIterator<Item = TelegramRun>,
+) -> JudgedSlaves {
     let mut judge = Judge::default();
-    for (number, run) in (1..).zip(runs(trace)) {
+    for (number, run) in (1..).zip(runs) {
         match run.from {
             None => judge.asks(number, &run),
             Some(_) => judge.replies(number, &run),
@@ -126,13 +138,14 @@ impl Judge {
         &mut self,
         (telegram, slave): (usize, u8),
         (what, section): (Symptom, &'static str),
-        about: String,
+        (part, about): (&str, String),
     ) {
         if self.judged.breaches.len() < MOST_BREACHES {
             self.judged.breaches.push(Breach {
                 what,
                 telegram,
                 slave,
+                part: part.to_owned(),
                 section,
                 about,
             });
@@ -257,7 +270,7 @@ impl Judge {
         let from = said.from.unwrap_or(0);
         let Some(asked) = asked else {
             let about = "it sends again without a request in between".to_owned();
-            return self.breach((number, from), (Unasked, "EN 1"), about);
+            return self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
         };
         if damaged {
             // On the way to the master: nothing is known of it.
@@ -273,7 +286,7 @@ impl Judge {
                     "it replies to telegram {}, which is no request",
                     asked.number
                 );
-                self.breach((number, from), (Unasked, "EN 1"), about);
+                self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
             }
             return;
         };
@@ -285,11 +298,12 @@ impl Judge {
         let shown = self.follower(address).shown();
         if let Some((earlier, what)) = shown {
             let about = format!("{what} is not answered, and the slave goes on exchanging");
-            self.breach((earlier, address), (Missing, "EN 1"), about);
+            self.breach((earlier, address), (Missing, "EN 1"), (&what, about));
         }
         if let Some((what, section, why)) = found {
             let place = Place::of(Some(&Telegram::Pdu(request))).part;
-            self.breach((number, from), (what, section), format!("{place}: {why}"));
+            let about = format!("{place}: {why}");
+            self.breach((number, from), (what, section), (&place, about));
         }
     }
 }

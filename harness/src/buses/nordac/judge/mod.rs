@@ -11,5 +11,6 @@ mod symptom;
 #[cfg(test)]
 mod tests;
 
+pub(in crate::buses::nordac) use follower::judge_runs;
 pub use follower::{Breach, JudgedSlaves, judge};
 pub use symptom::{Place, Symptom};

@@ -11,8 +11,9 @@ pub mod table;
 mod telegrams;
 mod words;
 
+pub use telegrams::TelegramRun;
 pub use telegrams::{Said, said};
-pub(super) use telegrams::{TelegramRun, octets, runs};
+pub(super) use telegrams::{octets, runs};
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 

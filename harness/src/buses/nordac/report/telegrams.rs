@@ -44,11 +44,11 @@ pub(in crate::buses::nordac) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineBy
 
 /// What a station sent without a pause: the octets that arrived, and those that did not.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in crate::buses::nordac) struct TelegramRun {
+pub struct TelegramRun {
     /// The slave that sent them; `None` for the master.
-    pub(in crate::buses::nordac) from: Option<u8>,
+    pub from: Option<u8>,
     /// One or more octets.
-    pub(in crate::buses::nordac) octets: Vec<LineByte>,
+    pub octets: Vec<LineByte>,
 }
 
 impl TelegramRun {

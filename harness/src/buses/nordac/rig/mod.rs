@@ -18,6 +18,7 @@ use super::language::Nordac;
 use super::simulate::Setup;
 use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
+use crate::cli::fuzz::LineFuzz;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::{Part, read};
@@ -70,7 +71,7 @@ pub(crate) const PORT: PortRow = PortRow {
     }),
     command: super::cli::drive,
     check: super::cli::check,
-    fuzz: super::cli::fuzz::run,
+    fuzz: LineFuzz::of::<Nordac>(),
 };
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.

@@ -19,7 +19,7 @@ mod oracle;
 mod order;
 mod page;
 mod play;
-pub mod promote;
+mod promote;
 mod setup;
 pub mod shrink;
 mod spice;
@@ -32,7 +32,7 @@ pub use case::{
 pub use confirm::judged_again;
 pub use generate::{CaseScope, Generator, RingScope};
 pub use mutate::mutate;
-pub use novelty::{by_novelty, features};
+pub use novelty::features;
 pub use on_record::AttemptRecord;
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;

@@ -5,6 +5,7 @@
 
 use crate::explore::Case;
 use crate::explore::MasterView;
+use crate::explore::pool::hash;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_sim::novobus::mark::Mark as _;
@@ -92,34 +93,4 @@ fn number(role: Role) -> u32 {
             50 + u32::from(length) + 8 * width
         }
     }
-}
-
-/// FNV-1a.
-fn hash(words: &[u32]) -> u32 {
-    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
-    bytes.fold(0x811C_9DC5, |hash: u32, byte| {
-        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    })
-}
-
-/// Cases in an order in which each shows as much new as any could, as long as one shows something.
-#[must_use]
-pub fn by_novelty(cases: Vec<(Case, BTreeSet<u32>)>) -> Vec<Case> {
-    let mut rest = cases;
-    let mut shown: BTreeSet<u32> = BTreeSet::new();
-    let mut ordered = Vec::new();
-    while !rest.is_empty() {
-        let new = |features: &BTreeSet<u32>| features.difference(&shown).count();
-        // The first of the best, so that the order is one.
-        let counts: Vec<_> = rest.iter().map(|(_, features)| new(features)).collect();
-        let best = counts.iter().copied().max().unwrap_or(0);
-        let at = counts.iter().position(|count| *count == best).unwrap_or(0);
-        let (case, features) = rest.remove(at);
-        if best == 0 {
-            break;
-        }
-        shown.extend(features);
-        ordered.push(case);
-    }
-    ordered
 }

@@ -5,7 +5,6 @@ pub(crate) mod cells;
 mod check;
 mod control;
 pub(crate) mod deviations;
-pub(crate) mod fuzz;
 mod info;
 mod params;
 mod position;

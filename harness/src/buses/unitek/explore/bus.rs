@@ -13,7 +13,8 @@ use crate::buses::unitek::manual::MANUAL;
 use crate::buses::unitek::rig::axes;
 use crate::buses::unitek::serve;
 use crate::buses::unitek::simulate::Setup;
-use crate::explore::line::{ActBounds, LineBus, hash};
+use crate::explore::line::{ActBounds, LineBus};
+use crate::explore::pool::hash;
 use crate::explore::{Dice, Differing};
 use crate::manual::Manual;
 use crate::rig::Rig;
@@ -158,7 +159,7 @@ impl LineBus for Unitek {
         generate::change(what, dice);
     }
 
-    fn header(rig: &Rig) -> Vec<String> {
+    fn header(rig: &Rig, _: &[(u8, u16)]) -> Vec<String> {
         let port = rig.port();
         let rate = port.map(|port| format!("rate {}", port.rate));
         let drives = port.map(axes).unwrap_or_default().into_iter();

@@ -13,6 +13,6 @@ mod text;
 
 pub use act::{FrameAct, FrameActKind, FrameTalk};
 pub use generate::FrameSpice;
-pub use on_adapter::OnAdapter;
+pub use on_adapter::Left;
 pub use oracle::FrameDifference;
 pub use play::{FramesSeen, play};

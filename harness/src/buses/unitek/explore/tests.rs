@@ -47,6 +47,14 @@ fn no_right_drive_is_accused() {
     }
 }
 
+/// Judged by what comes alone, in virtual time.
+#[test]
+fn no_right_drive_behind_an_adapter_is_accused() {
+    for header in right_drives() {
+        EngineTrial::<Unitek>::accuses_nobody_behind_a_port("sim:unitek:1", &header, 15);
+    }
+}
+
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_drives_are_found_and_their_findings_are_scenarios() {

@@ -15,10 +15,12 @@ use permitted::special_register;
 use player::Player;
 pub use session::{Session, UnitekDrives};
 
+use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
 use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
+use crate::cli::fuzz::LineFuzz;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -55,7 +57,7 @@ pub(crate) const PORT: PortRow = PortRow {
     }),
     command: super::cli::drive,
     check: super::cli::check,
-    fuzz: super::cli::fuzz::run,
+    fuzz: LineFuzz::of::<Unitek>(),
 };
 
 fn simulated(drives: u8) -> (String, String) {

@@ -1,0 +1,191 @@
+//! A finding that is kept: a scenario, the table that it leaves, and where the bus has one an input of its fuzz targets, in a checkout of the
+//! repository.
+
+use super::files::write_whole;
+use super::{Differing as _, ExploreError, Finding, FuzzCase};
+use crate::buses::{Bus, MANUALS};
+use crate::library::Entry;
+use crate::report::page::page;
+use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use std::path::{Path, PathBuf};
+
+/// The folders of a checkout that the files go into; behind them stands the name of the bus.
+const SCENARIOS: &str = "corpora/scenarios";
+const SNAPSHOTS: &str = "snapshots/scenarios";
+
+/// What a promoted finding is called.
+#[derive(Clone, Debug)]
+pub struct Naming {
+    /// The name of its files.
+    pub name: String,
+    /// Its title; by default that of the finding.
+    pub title: Option<String>,
+    /// The table of the manual that it covers; by default that of the finding.
+    pub source: Option<String>,
+}
+
+/// What promoting wrote, and what it saw.
+#[derive(Clone, Debug)]
+pub struct Promoted {
+    /// The scenario, the input where there is one, and the snapshot.
+    pub files: Vec<PathBuf>,
+    /// The scenario's text.
+    pub text: String,
+    /// Whether the drives with the planted deviations fail the scenario; `None` where none was planted.
+    pub fails_on_deviating: Option<bool>,
+}
+
+/// A case whose findings can be kept as scenarios.
+pub trait Promotes: FuzzCase {
+    /// Its bus.
+    fn bus() -> Bus;
+
+    /// How the drives of a finding differ, in words for a title.
+    fn kind(finding: &Finding<Self>) -> String {
+        finding.difference.signature()
+    }
+
+    /// The scenario of a finding, with a title and a table of the manual of its own, or those of the finding.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    fn scenario(
+        finding: &Finding<Self>,
+        title: &str,
+        source: Option<&str>,
+    ) -> Result<String, ExploreError>;
+
+    /// The same for the drives with the planted deviations; `None` where none was planted.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    fn on_deviating(finding: &Finding<Self>) -> Result<Option<String>, ExploreError>;
+
+    /// The folder and the text of an input of the fuzz targets.
+    fn input(finding: &Finding<Self>, title: &str) -> Option<(&'static str, String)>;
+}
+
+/// The top folder of the checkout that contains `from`.
+///
+/// # Errors
+/// It is not in a checkout.
+pub fn checkout(from: &Path) -> Result<PathBuf, ExploreError> {
+    let is_top =
+        |folder: &&Path| folder.join(SCENARIOS).is_dir() && folder.join(SNAPSHOTS).is_dir();
+    from.ancestors()
+        .find(is_top)
+        .map(Path::to_owned)
+        .ok_or_else(|| {
+            ExploreError::Usage(format!(
+                "{} is in no checkout of the repository: {SCENARIOS} and {SNAPSHOTS} must be there",
+                from.display()
+            ))
+        })
+}
+
+/// Turns a finding into a scenario and a snapshot, and an input where its bus has them. Nothing is written where anything is amiss, or where
+/// one of the files is there.
+///
+/// # Errors
+/// A name or a table that cannot be, files that are there, a scenario that does not pass on the model.
+pub fn promote<C: Promotes>(
+    finding: &Finding<C>,
+    naming: &Naming,
+    top: &Path,
+) -> Result<Promoted, ExploreError> {
+    let (name, bus) = (&naming.name, C::bus());
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.';
+    if name.is_empty() || name.len() > 80 || !name.chars().all(plain) || name.starts_with('.') {
+        return Err(ExploreError::Usage(format!(
+            "`{name}` is not a name: small letters, digits, `-` and `.`, such as 9.6-checksum-of-a-read"
+        )));
+    }
+    if let Some(source) = &naming.source {
+        known(bus, source)?;
+    }
+    let title = match &naming.title {
+        Some(title) => title.clone(),
+        None => format!("Found by fuzzing: {}", C::kind(finding)),
+    };
+    let text = C::scenario(finding, &title, naming.source.as_deref())?;
+    let table = snapshot(name, &text)?;
+    let file = |folder: &str, ending: &str| {
+        let folder = top.join(folder).join(bus.name());
+        folder.join(format!("{name}.{ending}"))
+    };
+    let mut files = vec![(file(SCENARIOS, "scn"), text.clone())];
+    if let Some((folder, input)) = C::input(finding, &title) {
+        files.push((top.join(folder).join(format!("{name}.hex")), input));
+    }
+    files.push((file(SNAPSHOTS, "snap"), table));
+    if let Some((there, _)) = files.iter().find(|(file, _)| file.exists()) {
+        return Err(ExploreError::Usage(format!(
+            "{} is there already; choose another --name",
+            there.display()
+        )));
+    }
+    let deviating = C::on_deviating(finding)?;
+    let deviating = deviating.map(|text| played("the drives under test", &text));
+    let fails_on_deviating = deviating.transpose()?.map(|own| own.0 == Verdict::Failed);
+    for (file, text) in &files {
+        if let Err(error) = write_whole(file, text) {
+            // All of them or none: none was there before.
+            for (written, _) in &files {
+                let _gone = std::fs::remove_file(written);
+            }
+            return Err(error);
+        }
+    }
+    Ok(Promoted {
+        files: files.into_iter().map(|(file, _)| file).collect(),
+        text,
+        fails_on_deviating,
+    })
+}
+
+/// Refuses a table that the catalogue of a bus does not have.
+fn known(bus: Bus, source: &str) -> Result<(), ExploreError> {
+    let own = MANUALS.iter().find(|manual| manual.bus == bus);
+    let tables = own.and_then(|own| own.tables().ok()).unwrap_or_default();
+    match tables.iter().any(|table| table.id == source) {
+        true => Ok(()),
+        false => Err(ExploreError::Usage(format!(
+            "the catalogue has no `{source}`; `drivebench manual --filter {}` shows what there is",
+            bus.name()
+        ))),
+    }
+}
+
+/// What comes of a scenario on simulated drives, why, and its page.
+fn played(name: &str, text: &str) -> Result<(Verdict, String, String), ExploreError> {
+    let source = Source {
+        name: name.to_owned(),
+        text: text.to_owned().into(),
+    };
+    let entry = Entry::new(source, None)?;
+    let Some(plan) = entry.settled() else {
+        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
+    };
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, AtMismatch::Stop);
+    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
+    let page = page(&entry, &outcome, &traces);
+    let why = outcome.finding.map(|finding| finding.message);
+    Ok((outcome.verdict, why.unwrap_or_default(), page))
+}
+
+/// The snapshot of a scenario, as `cargo test --test files scenarios` compares it; the model must pass the scenario.
+fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
+    let (verdict, why, page) = played(name, text)?;
+    if verdict != Verdict::Passed {
+        return Err(ExploreError::Usage(format!(
+            "the model itself does not pass this scenario ({verdict}: {why}); nothing was written"
+        )));
+    }
+    Ok(format!(
+        "---\nsource: harness/tests/files/scenarios.rs\n---\n{}\n",
+        page.trim_end_matches('\n')
+    ))
+}
