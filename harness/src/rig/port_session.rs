@@ -209,6 +209,15 @@ impl<D: PortDrives> PortSession<D> {
         self.drives.safe_state(&mut self.link, &wanted)
     }
 
+    /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.
+    pub(crate) fn resume(&mut self) {
+        self.link.set_watch(None);
+        if let Some(ports) = self.link.inner_mut().ports_mut() {
+            ports.resume();
+        }
+        self.link.reset_after_denial();
+    }
+
     /// Lets a thread watch that the program lives.
     fn watched(&mut self, alarm: Alarm) -> Result<Option<Watchdog>, SessionError> {
         if self.listen_only {
@@ -244,11 +253,7 @@ impl<D: PortDrives> PortSession<D> {
         };
         let wanted = self.rig.file.safe_state.clone();
         if !std::mem::replace(&mut self.ended, true) {
-            self.link.set_watch(None);
-            if let Some(ports) = self.link.inner_mut().ports_mut() {
-                ports.resume();
-            }
-            self.link.reset_after_denial();
+            self.resume();
             let standing = standing(&wanted);
             if !standing.order.is_empty() {
                 end.safe = Some(self.drives.safe_state(&mut self.link, &standing));

@@ -2,10 +2,11 @@
 
 use crate::program::{ended, said};
 use crate::serve::Sim;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 const SAFE: &str = "safe state: the output of every inverter is off";
 
@@ -52,14 +53,45 @@ impl Desk {
         self.folder.path().join(name)
     }
 
-    fn run(&self, line: &str) -> Output {
+    fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
         command
             .args(line.split(' '))
             .current_dir(self.folder.path())
             .env("DRIVEBENCH_STATE", self.path("state"))
             .stdin(Stdio::null());
-        command.output().expect("the program")
+        command
+    }
+
+    fn run(&self, line: &str) -> Output {
+        self.command(line).output().expect("the program")
+    }
+
+    /// Turns the motor, and goes on until it is ended. Returns when it turns.
+    fn hold(&self) -> (Child, BufReader<std::process::ChildStderr>) {
+        let line = "exchange 8 STW=047E then STW=047F HSW=20% --hold --move --rig desk.toml";
+        let mut command = self.command(line);
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program");
+        let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+        let mut said = String::new();
+        while !said.contains("held:") {
+            let count = err.read_line(&mut said).expect("a line");
+            assert_ne!(count, 0, "{said}");
+        }
+        (child, err)
+    }
+
+    /// Asks until an answer holds a text.
+    fn shows(&self, line: &str, text: &str) {
+        let end = Instant::now() + Duration::from_secs(60);
+        loop {
+            let output = self.run(line);
+            if String::from_utf8_lossy(&output.stdout).contains(text) {
+                return;
+            }
+            assert!(Instant::now() < end, "{text}: {}", said(&output));
+        }
     }
 }
 
@@ -101,13 +133,13 @@ fn hears_itself(line: String) -> String {
 fn scenarios_over_every_way_in() {
     for (way, more) in [("tcp", ""), ("pty", ""), ("echo", "echo = true\n")] {
         let desk = Desk::new(way, more);
-        let played = desk.run("run --filter nordac-en-1-s --rig desk.toml --evidence kept");
+        let played = desk.run("run --filter nordac-en-1-sd --rig desk.toml --evidence kept");
         let code = played.status.code();
         assert!(matches!(code, Some(0 | 5)), "{way}: {}", said(&played));
         assert!(said(&played).contains(SAFE), "{way}: {}", said(&played));
         let text = String::from_utf8_lossy(&played.stdout).into_owned();
         let passed = text.lines().filter(|own| own.starts_with("passed "));
-        assert!(passed.count() >= 3, "{way}: {}", said(&played));
+        assert!(passed.count() >= 2, "{way}: {}", said(&played));
         ended(&desk.run("verify kept"), 0, " 0 things wrong");
         let record = desk.path("kept/run.jsonl");
         let text = std::fs::read_to_string(&record).expect("a record");
@@ -155,4 +187,119 @@ fn inverters_behind_an_adapter_are_explored() {
     ));
     ended(&small, 0, "became");
     assert!(said(&small).contains(SAFE), "{}", said(&small));
+}
+
+const SUPERVISED: &str = "slave 8\nslave 8 parameter 1621 = 2\nslave 8 parameter 1625 = 2s\n";
+
+/// Words are held until Ctrl-C, which stops the motor. Meanwhile another bench is refused, and told who holds the rig. Where the program dies,
+/// the bus time-out (1625) stops the motor.
+#[test]
+fn held_words_end_with_the_program() {
+    let desk = Desk::of("tcp", "", SUPERVISED);
+    let (mut child, mut err) = desk.hold();
+    ended(&desk.run("info --rig desk.toml"), 75, "held by");
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status();
+    assert!(sent.expect("kill").success());
+    let mut said = String::new();
+    err.read_to_string(&mut said).expect("text");
+    let code = child.wait().expect("its end").code();
+    assert!(code == Some(130) && said.contains(SAFE), "{code:?}: {said}");
+    desk.shows("read 8 ZSW --rig desk.toml", "start-disable");
+    let (mut child, _err) = desk.hold();
+    child.kill().expect("a process");
+    child.wait().expect("its end");
+    desk.shows("read 8 1800 --rig desk.toml", "time-out");
+}
+
+/// The watchdog ends a program that hangs, and the motor does not go on turning (its output is not read, as when a terminal is held).
+#[test]
+fn a_program_that_hangs_is_watched() {
+    let desk = Desk::of("pty", "", SUPERVISED);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig") + "[safe_state]\nwatchdog = \"2s\"\n";
+    std::fs::write(&path, text).expect("room");
+    let mut line = "exchange 8 STW=047E".to_owned();
+    line.push_str(&" then STW=047F HSW=20%".repeat(200));
+    let mut command = desk.command(&(line + " --move --rig desk.toml"));
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    let pipe = child.stdout.as_ref().expect("its output");
+    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
+    let mut said = String::new();
+    let mut err = child.stderr.take().expect("a pipe");
+    err.read_to_string(&mut said).expect("text");
+    assert_eq!(child.wait().expect("its end").code(), Some(7), "{said}");
+    assert!(said.contains("no sign of life"), "{said}");
+    // The DP watchdog of the slave (1 s) was faster: it takes no words any more, and the bus time-out (1625) has stopped the motor.
+    desk.shows("read 8 ZSW --rig desk.toml", "fault");
+}
+
+/// A served inverter is qualified: it is not blamed, the value of an open point is found, and the record bears both out.
+#[test]
+fn a_served_inverter_is_qualified() {
+    let desk = Desk::of("tcp", "", "slave 8\nslave 8 property spm = error\n");
+    let output = desk.run("qualify --filter nordac-en-1-start --rig desk.toml --evidence kept");
+    assert!(
+        matches!(output.status.code(), Some(0 | 5)),
+        "{}",
+        said(&output)
+    );
+    let kept = |file: &str| std::fs::read_to_string(desk.path("kept").join(file)).expect("a file");
+    let (profile, deviations) = (kept("profile.toml"), kept("deviations.txt"));
+    assert!(
+        profile.contains("slave 8 property spm = error"),
+        "{profile}"
+    );
+    assert!(deviations.starts_with("deviations: no"), "{deviations}");
+    ended(&desk.run("verify kept"), 0, " 0 things wrong");
+}
+
+/// Settings of the bus that were switched for a scenario are set back, also after a signal.
+#[test]
+fn switched_settings_are_set_back_after_a_signal() {
+    let desk = Desk::of("tcp", "", "slave 8\nslave 8 parameter 1621 = 2\n");
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let more = "allow_eeprom = true\nallow_bus_settings = true\n";
+    std::fs::write(&path, text + more).expect("room");
+    let local =
+        "title Local\nsource nordac 2.5.1\nbus nordac\nslave 8\nstart 8\nexchange 8 -> ZSW=09xx\n";
+    std::fs::write(desk.path("local.scn"), local).expect("room");
+    ended(
+        &desk.run("run local.scn --rig desk.toml --allow-motion"),
+        0,
+        "1 passed",
+    );
+    desk.shows("read 8 1621 --rig desk.toml", "  2 ");
+    std::fs::write(desk.path("local.scn"), local.to_owned() + "wait 100s\n").expect("room");
+    let mut command = desk.command("run local.scn --rig desk.toml --allow-motion --evidence kept");
+    let child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    let end = Instant::now() + Duration::from_secs(60);
+    // The wait has begun when the record has the reply of the scenario.
+    while !std::fs::read_to_string(desk.path("kept/run.jsonl"))
+        .is_ok_and(|own| own.contains("0970"))
+    {
+        assert!(Instant::now() < end, "the scenario does not begin");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .expect("kill")
+            .success()
+    );
+    let output = child.wait_with_output().expect("its end");
+    assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+    assert!(said(&output).contains(SAFE), "{}", said(&output));
+    desk.shows("read 8 1621 --rig desk.toml", "  2 ");
 }

@@ -90,6 +90,33 @@ fn exchange_and_its_permission() {
     );
 }
 
+/// The JSON of `start` and `exchange`: words as numbers, and what they mean.
+#[test]
+fn words_for_tools() {
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        serde_json::from_str(&done(arguments)).expect("JSON")
+    };
+    let started = json(&["start", "8", "--format", "json"]);
+    assert_eq!(started["slaves"][0]["ppo"], 1);
+    assert_eq!(started["slaves"][0]["diagnosis"], "00 0C 00 02 75 31");
+    assert_eq!(started["slaves"][0]["reply"]["zsw"], 0x0B70);
+    let steps = ["exchange", "8", "STW=047E", "then", "STW=047F", "HSW=2000"];
+    let more = ["--for", "3s", "--move", "--format", "json"];
+    let exchanged = json(&[&steps[..], &more].concat());
+    let [first, last] = [0, 1].map(|place| &exchanged["exchanges"][place]);
+    assert_eq!(
+        (&first["stw"], &first["reply"]["zsw"]),
+        (&0x047E.into(), &0x0B31.into())
+    );
+    assert_eq!(
+        (&last["hsw"], &last["reply"]["hiw"]),
+        (&0x2000.into(), &0x2000.into())
+    );
+    assert_eq!(last["reply"]["actual"], "50.0 %");
+    let (code, complaint) = fails(&[&steps[..], &["--hold", "--for", "1s", "--move"]].concat());
+    assert!(code == 2 && complaint.contains("--hold"), "{complaint}");
+}
+
 /// 3.3: on by 047E and 047F, for a time, and off on the ramp.
 #[test]
 fn on_and_the_ways_to_stop() {

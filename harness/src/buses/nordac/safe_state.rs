@@ -134,10 +134,18 @@ fn make_safe(
         standing,
     };
     let stops = standing.order.contains(&SafeStep::Stop);
-    if diagnosis.has_mode(Diagnosis::SYNC) || diagnosis.has_mode(Diagnosis::FREEZE) {
+    let modes = [
+        (Diagnosis::SYNC, GlobalControl::UNSYNC),
+        (Diagnosis::FREEZE, GlobalControl::UNFREEZE),
+    ];
+    // Unsync may let a motor start, and needs permission: it is sent only where it is needed.
+    let on = modes
+        .into_iter()
+        .filter(|(mode, _)| diagnosis.has_mode(*mode));
+    let command = on.fold(0, |command, (_, own)| command | own);
+    if command != 0 {
         // What waits for Sync is then the word that stops; a frozen status word shows nothing.
         off.exchange(if stops { stw::QUICK_STOP } else { stw::SAFE })?;
-        let command = GlobalControl::UNSYNC | GlobalControl::UNFREEZE;
         off.talk.command(address, command).map_err(text)?;
     }
     if stops {

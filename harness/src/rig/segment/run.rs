@@ -75,6 +75,8 @@ pub(crate) struct PortRun<P: PortPlayer> {
     notes: Vec<String>,
     /// Why nothing more is played.
     over: Option<String>,
+    /// A scenario behind which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
+    unfinished: Option<Arc<P::Own>>,
 }
 
 impl<P: PortPlayer> PortRun<P> {
@@ -94,6 +96,7 @@ impl<P: PortPlayer> PortRun<P> {
             again: Again::new(!rig.is_simulated()),
             notes: Vec::new(),
             over: None,
+            unfinished: None,
         })
     }
 
@@ -120,7 +123,10 @@ impl<P: PortPlayer> PortRun<P> {
                     let notes = self.player.set_back(own, &mut self.session);
                     self.notes.extend(notes);
                 }
-                false => self.over = Some(format!("after the scenario: {safe}")),
+                false => {
+                    self.unfinished = Some(Arc::clone(own));
+                    self.over = Some(format!("after the scenario: {safe}"));
+                }
             }
         }
         Attempt {
@@ -192,8 +198,17 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
         self.session.guarded().trouble().cloned()
     }
 
-    fn close(self: Box<Self>, error: bool) -> End {
-        self.session.close(error)
+    fn close(mut self: Box<Self>, error: bool) -> End {
+        let mut notes = Vec::new();
+        if let Some(own) = self.unfinished.take() {
+            self.session.resume();
+            if self.session.make_safe().confirmed {
+                notes = self.player.set_back(&own, &mut self.session);
+            }
+        }
+        let mut end = self.session.close(error);
+        end.remarks.extend(notes);
+        end
     }
 }
 

@@ -1,7 +1,7 @@
 //! The arguments of the commands that only this bus has.
 
 use super::super::value;
-use crate::buses::commands::{Axes, RigArguments, SelectArguments};
+use crate::buses::commands::{Axes, OutputForm, RigArguments, SelectArguments};
 use crate::scenario::argument::duration;
 use clap::{Args, Subcommand};
 use harness_proto::time::Span;
@@ -10,7 +10,14 @@ const EXCHANGE_HELP: &str = "\
 WORDS are STW=047F, HSW=50% or HSW=20Hz or HSW=2000, PZD3=0000 and PZD4=0000; `then` begins the next step, and what a step does
 not name stays. After each step the reply is shown that can show its effect: the second one behind it (NORDAC 3.3).
 
-  drivebench exchange 8 STW=047E then STW=047F HSW=50% --for 2s --move --rig sim:nordac";
+  drivebench exchange 8 STW=047E then STW=047F HSW=50% --for 2s --move --rig sim:nordac
+
+With --format json: {\"schema\": 1, \"slave\": n, \"exchanges\": [...]}, each with the words that were sent (`stw`, `hsw`, `pzd3`, `pzd4`)
+and the `reply`: `zsw`, `state`, `hiw`, `actual`, `pzd3`, `pzd4`. Words are numbers, `state` and `actual` their meaning.";
+
+const START_HELP: &str = "\
+With --format json: {\"schema\": 1, \"slaves\": [...]}, each with `slave`, `ppo`, `octets`, `diagnosis`, `master`, and the `reply` as
+`exchange` shows it.";
 
 /// Commands on slaves of a bus with a cyclic master. DRIVE is an address: 8, 8..10, all.
 #[derive(Debug, Subcommand)]
@@ -18,7 +25,8 @@ pub enum CyclicCommand {
     /// Bring slaves into the exchange and show what they are (NORDAC 3, PROFIBUS DP).
     ///
     /// The process words stay 0, so they change nothing. The exchange ends with the command.
-    Start(SelectArguments),
+    #[command(after_help = START_HELP)]
+    Start(StartArguments),
     /// Exchange process words with a slave and show its replies (NORDAC 3.2).
     #[command(after_help = EXCHANGE_HELP)]
     Exchange(ExchangeArguments),
@@ -42,12 +50,36 @@ impl CyclicCommand {
     /// The bench of a command.
     pub(crate) const fn rig(&self) -> &RigArguments {
         match self {
-            Self::Start(own) | Self::Off(own) | Self::QuickStop(own) => &own.rig,
+            Self::Start(own) => &own.select.rig,
+            Self::Off(own) | Self::QuickStop(own) => &own.rig,
             Self::Exchange(own) => &own.rig,
             Self::On(own) => &own.select.rig,
             Self::Acknowledge(own) => &own.select.rig,
         }
     }
+}
+
+/// For `start`.
+#[derive(Debug, Args)]
+pub struct StartArguments {
+    /// The slaves.
+    #[command(flatten)]
+    pub select: SelectArguments,
+    /// Output format.
+    #[arg(long, value_enum, value_name = "FORM", default_value_t = OutputForm::Text)]
+    pub format: OutputForm,
+}
+
+/// For commands that leave a motor on for a time.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct StayArguments {
+    /// How long the last words are exchanged before the reply is shown and the command ends.
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "0ms")]
+    pub length: Span,
+    /// Go on exchanging the last words until Ctrl-C, which takes the rig to its safe state. Words of a simulated bench end with the
+    /// command.
+    #[arg(long, conflicts_with = "length")]
+    pub hold: bool,
 }
 
 /// For `exchange`.
@@ -59,9 +91,12 @@ pub struct ExchangeArguments {
     /// The process words of each step.
     #[arg(value_name = "WORDS", required = true)]
     pub words: Vec<String>,
-    /// How long the words of the last step are exchanged before the reply is shown.
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "0ms")]
-    pub length: Span,
+    /// How long.
+    #[command(flatten)]
+    pub stay: StayArguments,
+    /// Output format.
+    #[arg(long, value_enum, value_name = "FORM", default_value_t = OutputForm::Text)]
+    pub format: OutputForm,
     /// Send words even if a motor may turn.
     #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
@@ -79,9 +114,9 @@ pub struct OnArguments {
     /// The setpoint: 50%, 20Hz, or four hexadecimal digits (4000 is the maximum frequency, 1205).
     #[arg(long, value_name = "SPEED", default_value = "0%", value_parser = value::setpoint, allow_hyphen_values = true)]
     pub setpoint: value::Setpoint,
-    /// How long the motors stay on.
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "0ms")]
-    pub length: Span,
+    /// How long.
+    #[command(flatten)]
+    pub stay: StayArguments,
     /// Let the motors turn.
     #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,

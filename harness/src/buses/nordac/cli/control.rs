@@ -1,9 +1,11 @@
 //! `drivebench start`, `exchange`, `on`, `off`, `quick-stop` and `acknowledge` on NORDAC inverters, and their names on other buses: `go`,
 //! `stop`, `block` and `delete-error`.
 
-use super::args::{AcknowledgeArguments, ExchangeArguments, OnArguments};
+use super::args::{
+    AcknowledgeArguments, ExchangeArguments, OnArguments, StartArguments, StayArguments,
+};
 use super::bench::driver;
-use crate::buses::commands::{SelectArguments, Use};
+use crate::buses::commands::{OutputForm, SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
 use crate::buses::nordac::rig::{Inverters, Session};
 use crate::buses::nordac::value::{Setpoint, Step, percentage, status, steps};
@@ -15,31 +17,45 @@ use crate::rig::Rig;
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
+use harness_proto::time::Span;
+use serde_json::{Value, json};
 
 /// The maximum frequency of set 1, and the bus time-out.
 const MAXIMUM: &str = "1205";
 const TIME_OUT: &str = "1625";
 
+/// As long as a rig without `max_run` may be held, in seconds.
+const YEAR: u64 = 365 * 24 * 3_600;
+
 /// Brings slaves into the exchange.
 pub(super) fn start(
     rig: &Rig,
-    arguments: &SelectArguments,
+    arguments: &StartArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let as_what = Use::look("start");
-    with(rig, &arguments.rig, as_what, output, |session, output| {
-        each(session, &arguments.drives, output, |driver, slave| {
+    let select = &arguments.select;
+    with(rig, &select.rig, as_what, output, |session, output| {
+        let mut objects = Vec::new();
+        let exit = each(session, &select.drives, output, |driver, slave| {
             let started = driver.start(slave, None)?;
             let diagnosis = started.diagnosis.map(|own| own.encode().to_string());
+            let diagnosis = diagnosis.unwrap_or_default();
+            let (ppo, octets) = (started.ppo, started.ppo.octets());
             let image = started.inputs;
-            Ok(format!(
-                "{} ({} octets), diagnosis {}, master {MASTER}, {}",
-                started.ppo,
-                started.ppo.octets(),
-                diagnosis.unwrap_or_default(),
+            objects.push(json!({
+                "slave": slave, "ppo": ppo.number(), "octets": octets, "diagnosis": diagnosis, "master": MASTER, "reply": object(&image),
+            }));
+            let text = format!(
+                "{ppo} ({octets} octets), diagnosis {diagnosis}, master {MASTER}, {}",
                 reply(&image)
-            ))
-        })
+            );
+            Ok((arguments.format == OutputForm::Text).then_some(text))
+        })?;
+        if arguments.format == OutputForm::Json {
+            output.result(&format!("{}\n", json!({"schema": 1, "slaves": objects})))?;
+        }
+        Ok(exit)
     })
 }
 
@@ -57,6 +73,7 @@ pub(super) fn exchange(
     };
     with(rig, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
+        let longest = longest_hold(session);
         let mut driver = driver(session);
         driver.start(slave, None)?;
         let hertz = |own: &Step| matches!(own.setpoint, Some(Setpoint::Tenths(_)));
@@ -72,21 +89,59 @@ pub(super) fn exchange(
             refuse_motion(arguments.leave, "exchange", &[slave])?;
         }
         let last = all.len() - 1;
+        let mut objects = Vec::new();
         for (place, words) in all.into_iter().enumerate() {
             let mut image = driver.exchange(slave, words)?;
-            if place == last && arguments.length.units() > 0 {
-                driver.run(arguments.length)?;
+            if place == last && arguments.stay.length > Span::ZERO {
+                driver.run(arguments.stay.length)?;
                 image = driver.inputs(slave)?;
             }
             let [control, setpoint, third, fourth] = words;
+            objects.push(json!({
+                "stw": control, "hsw": setpoint, "pzd3": third, "pzd4": fourth, "reply": object(&image),
+            }));
+            if arguments.format == OutputForm::Json {
+                continue;
+            }
             let mut sent = format!("STW {control:04X} HSW {setpoint:04X}");
             if third != 0 || fourth != 0 {
                 sent.push_str(&format!(" PZD3 {third:04X} PZD4 {fourth:04X}"));
             }
             output.result(&format!("slave {slave}: {sent} -> {}\n", reply(&image)))?;
         }
+        if arguments.format == OutputForm::Json {
+            let all = json!({"schema": 1, "slave": slave, "exchanges": objects});
+            output.result(&format!("{all}\n"))?;
+        }
+        hold(&mut driver, arguments.stay, longest, output)?;
         Ok(Exit::Passed)
     })
+}
+
+/// How long words of a rig may be held, as far as its file says so; `None` where its time is virtual, and nothing is there behind the command.
+fn longest_hold(session: &Session) -> Option<Span> {
+    let rig = session.rig();
+    let most = rig.file.limits.max_run.as_ref();
+    let most = most.map_or(YEAR, |own| own.0.as_secs().min(YEAR));
+    (!rig.is_simulated()).then(|| Span::from_millis(most * 1_000))
+}
+
+/// Goes on exchanging the last words of all slaves until the user ends it, which is an error of the line, or the time is over.
+fn hold(
+    driver: &mut Driver<'_>,
+    stay: StayArguments,
+    longest: Option<Span>,
+    output: &mut Output,
+) -> Result<(), Failure> {
+    let Some(longest) = longest.filter(|_| stay.hold) else {
+        return Ok(());
+    };
+    output.say(
+        "held: the last words are exchanged until Ctrl-C, which takes the rig to its safe state\n",
+    );
+    driver.run(longest)?;
+    output.say("the hold reached `max_run` of the rig's file\n");
+    Ok(())
 }
 
 /// The words of a step.
@@ -130,6 +185,7 @@ pub(super) fn on(rig: &Rig, arguments: &OnArguments, output: &mut Output) -> Res
     with(rig, &select.rig, as_what, output, |session, output| {
         let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         refuse_motion(arguments.leave, "on", &slaves)?;
+        let longest = longest_hold(session);
         let mut driver = driver(session);
         let mut orders = Vec::new();
         let in_hertz = matches!(arguments.setpoint, Setpoint::Tenths(_));
@@ -148,7 +204,8 @@ pub(super) fn on(rig: &Rig, arguments: &OnArguments, output: &mut Output) -> Res
             let reached = driver.on(*slave, *setpoint)?;
             output.result(&format!("slave {slave}: {}\n", sent(&reached)))?;
         }
-        driver.run(arguments.length)?;
+        hold(&mut driver, arguments.stay, longest, output)?;
+        driver.run(arguments.stay.length)?;
         for slave in &slaves {
             let image = driver.inputs(*slave)?;
             output.result(&format!("slave {slave}: {}\n", reply(&image)))?;
@@ -178,7 +235,7 @@ pub(super) fn stop(
     with(rig, &arguments.rig, as_what, output, |session, output| {
         each(session, &arguments.drives, output, |driver, slave| {
             driver.start(slave, None)?;
-            call(driver, slave).map(|reached| sent(&reached))
+            call(driver, slave).map(|reached| Some(sent(&reached)))
         })
     })
 }
@@ -213,24 +270,25 @@ pub(super) fn acknowledge(
                 ),
                 None => "its fault is acknowledged".to_owned(),
             };
-            Ok(format!("{before}; {}", sent(&reached)))
+            Ok(Some(format!("{before}; {}", sent(&reached))))
         })
     })
 }
 
-/// Does it to every slave, and shows what came of it. A slave that fails does not keep the others from it.
+/// Does it to every slave, and shows what came of it as far as there is a text. A slave that fails does not keep the others from it.
 fn each(
     session: &mut Session,
     wanted: &[crate::buses::commands::Axes],
     output: &mut Output,
-    call: impl Fn(&mut Driver<'_>, u8) -> Result<String, Error>,
+    mut call: impl FnMut(&mut Driver<'_>, u8) -> Result<Option<String>, Error>,
 ) -> Result<Exit, Failure> {
     let slaves = select(wanted, session)?;
     let mut driver = driver(session);
     let mut exit = Exit::Passed;
     for slave in slaves {
         match call(&mut driver, slave) {
-            Ok(done) => output.result(&format!("slave {slave}: {done}\n"))?,
+            Ok(Some(done)) => output.result(&format!("slave {slave}: {done}\n"))?,
+            Ok(None) => {}
             Err(error @ Error::Link(_)) => return Err(error.into()),
             Err(error) => exit = exit.max(Failure::from(error).tell(output)),
         }
@@ -296,4 +354,12 @@ fn reply(image: &Image) -> String {
         text.push_str(&format!(", PZD4 {:04X}", image.fourth()));
     }
     text
+}
+
+/// A reply for tools: words as numbers, and their meaning.
+fn object(image: &Image) -> Value {
+    let [zsw, hiw, third, fourth, ..] = image.words;
+    json!({
+        "zsw": zsw, "state": status(zsw), "hiw": hiw, "actual": percentage(hiw), "pzd3": third, "pzd4": fourth,
+    })
 }

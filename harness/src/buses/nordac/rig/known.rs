@@ -5,7 +5,7 @@ use super::talk::{Talk, TalkError};
 use crate::buses::nordac::simulate::SlaveSetup;
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::properties::{PROPERTIES, Properties, SubindexBits};
+use harness_proto::nordac::properties::{Description, PROPERTIES, Properties, SubindexBits};
 use harness_proto::nordac::{Answer, Image, PARAMETERS, Parameter, Pkw, PpoType, Task};
 use std::collections::BTreeMap;
 
@@ -33,12 +33,28 @@ impl Known {
             slave,
             values: BTreeMap::new(),
             properties: Properties::default(),
-            open: candidates(Properties::default()),
+            open: candidates(Properties::default(), |_| true),
         }
     }
 
     pub(super) fn ppo(&self) -> PpoType {
         self.slave.ppo.unwrap_or_default()
+    }
+
+    /// Whether every value of a property but that of [`Self::properties`] is excluded.
+    pub(super) fn is_settled(&self, property: &Description) -> bool {
+        let own = value_of(property, &self.properties);
+        let mut open = self.open.iter();
+        open.all(|(_, other)| value_of(property, other) == own)
+    }
+
+    /// Settles a property.
+    pub(super) fn settle(&mut self, property: &Description, word: &str) {
+        let mut all = std::mem::take(&mut self.open);
+        all.retain_mut(|(_, other)| property.set(other, word));
+        let _fits = property.set(&mut self.properties, word);
+        all.retain(|(_, other)| *other != self.properties);
+        self.open = all;
     }
 
     /// Reads every parameter that can be written. Where one is refused, it is not known. The slave is in the exchange afterwards.
@@ -115,10 +131,13 @@ fn indices(parameter: &Parameter) -> impl Iterator<Item = u16> {
     (0..count).map(|own| own << 8)
 }
 
-/// The properties that differ from these in one point that the manual leaves open, each with the words of the difference.
-pub(super) fn candidates(own: Properties) -> Vec<(String, Properties)> {
+/// The properties that differ from these in one point that the manual leaves open and that `may` differ, each with the words of the difference.
+pub(super) fn candidates(
+    own: Properties,
+    may: impl Fn(&Description) -> bool,
+) -> Vec<(String, Properties)> {
     let mut all = Vec::new();
-    for property in PROPERTIES {
+    for property in PROPERTIES.iter().filter(|property| may(property)) {
         for word in super::values(property) {
             let mut other = own;
             if property.set(&mut other, &word) && other != own {
@@ -127,4 +146,15 @@ pub(super) fn candidates(own: Properties) -> Vec<(String, Properties)> {
         }
     }
     all
+}
+
+/// The value of a property, in words.
+pub(super) fn value_of(property: &Description, properties: &Properties) -> String {
+    let holds = |word: &String| {
+        let mut own = *properties;
+        property.set(&mut own, word) && own == *properties
+    };
+    let number = (0..=u8::MAX).map(|own| own.to_string());
+    let mut all = super::values(property).into_iter().chain(number);
+    all.find(holds).unwrap_or_default()
 }

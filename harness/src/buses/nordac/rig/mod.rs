@@ -5,6 +5,7 @@ mod observed;
 mod permitted;
 mod player;
 mod profile;
+mod qualify;
 mod run;
 mod session;
 mod settle;
@@ -169,10 +170,16 @@ pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
     })
 }
 
-/// Values of a property: each of its words, or numbers from the least to the most.
+/// The most numbers of a property that are all tried.
+const MOST_NUMBERS: u8 = 20;
+
+/// Values of a property: each of its words or numbers; of many numbers some from the least to the most.
 pub(crate) fn values(property: &Description) -> Vec<String> {
     match property.accepts {
         Accepts::Words(words) => words.iter().map(|own| (*own).to_owned()).collect(),
+        Accepts::Count { least, most, .. } if most - least < MOST_NUMBERS => {
+            (least..=most).map(|own| own.to_string()).collect()
+        }
         Accepts::Count {
             least,
             default,

@@ -9,6 +9,9 @@ use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
+/// The most octets of an attempt that are kept.
+const MOST_KEPT: usize = 1_000_000;
+
 /// A link to inverters, observed.
 pub(super) type Observed<'l> = crate::rig::segment::observed::Observed<'l, TelegramNotes>;
 
@@ -25,9 +28,81 @@ pub(super) struct TelegramNotes {
     pub(super) longest: Span,
     /// How many octets were received, and their checksum.
     heard: ReceivedSum,
+    /// The octets that were received: how long after the one before in the same conversation, and their bits with that of a line error.
+    kept: Vec<(Span, u16)>,
+    /// When the last of them came, in this conversation.
+    last: Option<Instant>,
+    /// How many had come when what came before did not count any more.
+    pub(super) fresh: usize,
+}
+
+/// Octets from the slaves, in order: how long after the octet before each came, and its bits.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Came(Vec<(Span, u16)>);
+
+/// How far two sequences of octets agree; the more the greater. [`WHOLE`] where they are the same.
+pub(super) type Agreement = usize;
+
+/// All octets agree.
+pub(super) const WHOLE: Agreement = Agreement::MAX;
+
+impl Came {
+    /// The same octets, whenever they came.
+    pub(super) fn at_any_time(mut self) -> Self {
+        self.0.iter_mut().for_each(|own| own.0 = Span::ZERO);
+        self
+    }
+
+    /// How many octets from the first on agree with those of another sequence, and how many bits of the next one.
+    pub(super) fn agrees(&self, other: &Self) -> Agreement {
+        if self == other {
+            return WHOLE;
+        }
+        let pairs = || self.0.iter().zip(&other.0);
+        let same = pairs().take_while(|(own, other)| own == other).count();
+        let next = pairs().nth(same);
+        let bits = next.map_or(0, |(own, other)| (own.1 ^ other.1).count_zeros() as usize);
+        same * 32 + bits
+    }
+
+    /// The telegrams among the octets.
+    pub(super) fn telegrams(&self) -> Vec<Telegram> {
+        let octets: Vec<u8> = self.0.iter().map(|(_, bits)| *bits as u8).collect();
+        let mut rest = octets.as_slice();
+        let mut all = Vec::new();
+        while !rest.is_empty() {
+            match Telegram::decode(rest) {
+                Decoded::Value { value, used } => {
+                    all.push(value);
+                    rest = &rest[used..];
+                }
+                _ => rest = &rest[1..],
+            }
+        }
+        all
+    }
 }
 
 impl TelegramNotes {
+    /// What comes from now on does not depend on what the slaves have done before.
+    pub(super) const fn begin_fresh(&mut self) {
+        self.fresh = self.kept.len();
+    }
+
+    /// How many octets are kept.
+    pub(super) const fn len(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// The octets that came behind the first so many.
+    pub(super) fn came(&self, behind: usize) -> Came {
+        let mut came = Came(self.kept[behind.min(self.kept.len())..].to_vec());
+        if let Some(first) = came.0.first_mut() {
+            first.0 = Span::ZERO;
+        }
+        came
+    }
+
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
         let ReceivedSum { pieces, sum } = self.heard;
@@ -57,8 +132,16 @@ impl LinkNotes for TelegramNotes {
         }
     }
 
-    fn heard(&mut self, medium: Medium, _: Instant, now: Instant, heard: Heard) {
+    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard) {
         let Heard::Octet(octet) = heard else { return };
+        if self.kept.len() < MOST_KEPT {
+            let error = u16::from(octet.error.is_some()) << 8;
+            let gap = self
+                .last
+                .replace(at)
+                .map_or(Span::ZERO, |last| at.since(last));
+            self.kept.push((gap, u16::from(octet.byte) | error));
+        }
         self.heard.pieces += 1;
         let bits = u32::from(octet.byte) | u32::from(octet.error.is_some()) << 8;
         self.heard.add(bits);
@@ -73,6 +156,7 @@ impl LinkNotes for TelegramNotes {
     }
 
     fn begin(&mut self) {
+        self.last = None;
         self.asked = None;
         self.reply.clear();
     }

@@ -1,20 +1,23 @@
 //! NORDAC inverters on which scenarios are played: what their player offers, and what is set back behind a scenario.
 
-use super::player::{Own, Player};
+use super::player::{Own, PPO_TYPE, Player};
 use super::profile::Profiled;
+use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
+use super::talk::TalkError;
 use super::{Session, limits, rate, slaves};
 use crate::buses::Bus;
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::TOLERANCE;
 use crate::link::{Link, LinkEvent, Replay};
 use crate::rig::Rig;
-use crate::rig::segment::OnSegment;
 use crate::rig::segment::run::PortPlayer;
+use crate::rig::segment::{OnSegment, Qualified};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
 use harness_proto::nordac::guard::{Class, class};
+use harness_proto::nordac::master::ExchangeError;
 use harness_proto::nordac::{Parameter, Pkw, Task};
 use harness_proto::time::Span;
 use std::sync::Arc;
@@ -37,7 +40,9 @@ impl PortPlayer for Player {
                 rig.is_simulated(),
             ),
         );
-        if !qualifies {
+        if qualifies {
+            player.qualify();
+        } else {
             player.profile = Profiled::of(rig);
         }
         player
@@ -87,9 +92,20 @@ impl PortPlayer for Player {
                 let mut talk = session.talk();
                 talk.restart(address);
                 let mut task = |ak, pwe| {
-                    let ppo = known.slave.ppo.unwrap_or_default();
-                    talk.start(address, ppo, None)?;
-                    known.task(&mut talk, Pkw::of(ak, *number, *ind, pwe))
+                    // A scenario may have switched it.
+                    let ppo = talk.configuration(address)?.or(known.slave.ppo);
+                    talk.start(address, ppo.unwrap_or_default(), None)?;
+                    let mut known = known.clone();
+                    known.slave.ppo = ppo;
+                    let answer = known.task(&mut talk, Pkw::of(ak, *number, *ind, pwe));
+                    match answer {
+                        // The module begins anew with another PPO type.
+                        Err(TalkError::Exchange {
+                            why: ExchangeError::Left,
+                            ..
+                        }) if *number == PPO_TYPE => Ok(Some(pwe)),
+                        other => other,
+                    }
                 };
                 let reads = match task(Task::read(parameter).ak(), 0) {
                     Ok(Some(reads)) if reads != *raw => reads,
@@ -112,5 +128,13 @@ impl PortPlayer for Player {
             }
         }
         notes
+    }
+
+    fn conversations(rig: &Rig) -> Vec<Source> {
+        conversations(rig)
+    }
+
+    fn qualified(&self, rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
+        Some(qualify(self, rig, began, whole))
     }
 }

@@ -4,8 +4,9 @@
 //! replies differ from those of the slave is excluded. Nothing that is sent enables the motor or writes a parameter.
 
 use super::known::{Known, candidates};
+use super::observed::{Agreement, WHOLE};
 use super::talk::{Talk, TalkError};
-use harness_proto::nordac::properties::Properties;
+use harness_proto::nordac::properties::{Description, Properties};
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{IDENT, Image, Pkw};
 use harness_proto::profibus::dp::{Service, SetPrm};
@@ -54,30 +55,24 @@ const MOST_DIFFERENCES: usize = 12;
 /// How many exchanges a task is given: its answer comes with the third (`pkw-latency`).
 const ANSWERED: usize = 6;
 
-/// What a slave replied, in order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Replies(Vec<String>);
-
-impl Replies {
-    /// How many of them, from the first on, are those of another conversation.
-    fn agrees(&self, other: &Self) -> usize {
-        let pairs = self.0.iter().zip(&other.0);
-        pairs.take_while(|(own, other)| own == other).count()
-    }
-}
-
-/// Holds the conversation with a slave. It is off afterwards.
+/// Lets a slave forget its master, whatever was before. It is off afterwards.
 ///
 /// # Errors
 /// The line is in trouble, or the slave does not get into the exchange.
-pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<Replies, TalkError> {
+pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkError> {
     let (slave, ppo) = (known.slave.address, known.ppo());
-    let mut all = Replies::default();
     talk.restart(slave);
-    // Without a master, whatever was before.
     talk.start(slave, ppo, Some(FORGET))?;
     talk.exchange(slave, ppo, &image(stw::SAFE))?;
-    talk.pass(FORGOTTEN)?;
+    talk.pass(FORGOTTEN)
+}
+
+/// Holds the conversation with a slave that has forgotten its master. It is off afterwards.
+///
+/// # Errors
+/// The line is in trouble, or the slave does not get into the exchange.
+pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkError> {
+    let (slave, ppo) = (known.slave.address, known.ppo());
     let mut early = SetPrm::lock(IDENT);
     let user = [0x00];
     for (service, data) in [
@@ -85,19 +80,24 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<Replies, Ta
         (Service::ChkCfg, ppo.cfg().to_vec()),
         (Service::SlaveDiag, Vec::new()),
     ] {
-        all.0.push(talk.raw(slave, service, &data)?);
+        talk.raw(slave, service, &data)?;
     }
     early.user = &user;
     let early = early.encode().unwrap_or_default();
-    all.0.push(talk.raw(slave, Service::SetPrm, &early)?);
-    all.0.push(talk.raw(slave, Service::SlaveDiag, &[])?);
+    talk.raw(slave, Service::SetPrm, &early)?;
+    talk.raw(slave, Service::SlaveDiag, &[])?;
     talk.start(slave, ppo, None)?;
-    all.0.push(talk.raw(slave, Service::SlaveDiag, &[])?);
+    for service in [
+        Service::SlaveDiag,
+        Service::GetCfg,
+        Service::RdInp,
+        Service::RdOutp,
+    ] {
+        talk.raw(slave, service, &[])?;
+    }
     for word in WORDS {
         for _ in 0..TIMES {
-            let reply = talk.exchange(slave, ppo, &image(word))?;
-            all.0
-                .push(format!("{:04X} {:04X}", reply.first(), reply.main()));
+            talk.exchange(slave, ppo, &image(word))?;
         }
     }
     if ppo.has_pkw() {
@@ -108,13 +108,12 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<Replies, Ta
                     ..Image::default()
                 };
                 for _ in 0..ANSWERED {
-                    let reply = talk.exchange(slave, ppo, &outputs)?;
-                    all.0.push(reply.pkw.to_string());
+                    talk.exchange(slave, ppo, &outputs)?;
                 }
             }
         }
     }
-    Ok(all)
+    Ok(())
 }
 
 fn image(word: u16) -> Image {
@@ -124,29 +123,58 @@ fn image(word: u16) -> Image {
     }
 }
 
-/// The properties that explain what a slave replied, and those that differ from them in one point and explain it as well. `model` holds the
-/// conversation with a model. One point after the other is changed as long as that explains more; where nothing explains all, every value of every
-/// point stays open.
-pub(super) fn settle(
-    seen: &Replies,
-    mut model: impl FnMut(Properties) -> Option<Replies>,
-) -> (Properties, Vec<(String, Properties)>) {
-    let mut explained = |own: Properties| model(own).map_or(0, |replies| replies.agrees(seen));
-    let all = seen.0.len();
-    let mut base = Properties::default();
-    let mut so_far = explained(base);
+/// The properties that explain what slaves did, slave by slave.
+pub(super) type Assumed = Vec<Properties>;
+
+/// Looks for properties that explain what slaves did: from `base` on, one point after the other that `may` differ of a slave is changed as long
+/// as that explains more. All that were found to explain everything, each with the words of its last difference; none if there are no such.
+pub(super) fn search(
+    base: &Assumed,
+    may: impl Fn(usize, &Description) -> bool,
+    mut explains: impl FnMut(&Assumed) -> Agreement,
+) -> Vec<(String, Assumed)> {
+    let mut so_far = (explains(base), base.clone());
+    if so_far.0 == WHOLE {
+        return vec![(String::new(), base.clone())];
+    }
     for _ in 0..MOST_DIFFERENCES {
-        if so_far == all {
-            let open = candidates(base).into_iter();
-            return (base, open.filter(|own| explained(own.1) == all).collect());
+        let mut best = Vec::new();
+        let mut most = so_far.0;
+        for place in 0..base.len() {
+            for (words, own) in candidates(so_far.1[place], |property| may(place, property)) {
+                let mut other = so_far.1.clone();
+                other[place] = own;
+                let agreed = explains(&other);
+                if agreed > most {
+                    most = agreed;
+                    best.clear();
+                }
+                if agreed == most && agreed > so_far.0 {
+                    best.push((words, other));
+                }
+            }
         }
-        let others = candidates(base).into_iter();
-        let others = others.map(|(_, own)| (explained(own), own));
-        match others.max_by_key(|(agreed, _)| *agreed) {
-            Some((agreed, better)) if agreed > so_far => (so_far, base) = (agreed, better),
-            _ => break,
+        match best.first() {
+            None => return Vec::new(),
+            Some(_) if most == WHOLE => return best,
+            Some((_, better)) => so_far = (most, better.clone()),
         }
     }
-    let default = Properties::default();
-    (default, candidates(default))
+    Vec::new()
+}
+
+/// The properties that explain what a slave did, and those that do so as well: they differ from them in one point, or were found in their
+/// place. Nothing where no properties explain it.
+pub(super) fn settle(
+    mut explains: impl FnMut(Properties) -> Agreement,
+) -> Option<(Properties, Vec<(String, Properties)>)> {
+    let default = vec![Properties::default()];
+    let found = search(&default, |_, _| true, |all| explains(all[0]));
+    let base = found.first()?.1[0];
+    let others = found.into_iter().skip(1);
+    let others = others.map(|(words, own)| (words, own[0]));
+    let near = candidates(base, |_| true).into_iter();
+    let mut open: Vec<_> = near.filter(|own| explains(own.1) == WHOLE).collect();
+    open.extend(others);
+    Some((base, open))
 }

@@ -466,9 +466,10 @@ impl Settle<Nordac> for Planner {
     fn needs(&self, scenario: &Scenario<Nordac>) -> Vec<Capability> {
         let lines = scenario.header.slaves.iter();
         let needs = lines.filter_map(|line| match &line.what {
-            Setup::There { .. } => None,
+            // A rig has slaves with properties of their own, which are found out.
+            Setup::There { .. } | Setup::Property(..) => None,
             Setup::Parameter(..) => Some(Capability::Memory),
-            Setup::Property(..) | Setup::Deviates(_) => Some(Capability::Simulator),
+            Setup::Deviates(_) => Some(Capability::Simulator),
         });
         let sends = scenario.steps.iter().filter_map(|step| match &step.action {
             Action::Send { message, .. } => Some(message),

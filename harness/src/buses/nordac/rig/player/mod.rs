@@ -1,0 +1,577 @@
+//! Attempts at scenarios on the slaves of a rig, whose parameters are read first.
+//!
+//! A scenario describes the slave of the manual; a rig has slaves of its own. So every scenario is played on a model of them first, behind the
+//! same limits. It is skipped if a right slave with these parameters would not meet its lines, or if the limits deny a telegram of it. A line
+//! that the rig does not meet then accuses the slave, unless a right slave with another value of a point that the manual leaves open would not
+//! meet it either, or the computer was late. Where time is virtual, only a right slave that sends the very same octets excuses it.
+
+mod judge;
+mod note;
+mod ready;
+
+pub(in crate::buses::nordac) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
+
+use super::RigSlave;
+use super::known::{Known, value_of};
+use super::observed::{Came, Observed};
+use super::profile::Profiled;
+use super::settle::{self, Assumed};
+use super::talk::{Talk, TalkError};
+use crate::buses::LimitSetting;
+use crate::buses::nordac::gate::guarded;
+use crate::buses::nordac::language::{Nordac, syntax};
+use crate::buses::nordac::simulate::{self, Bench};
+use crate::guard::Guarded;
+use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
+use crate::medium::Medium;
+use crate::rig::segment::observed::{LinkTimes, Slow};
+use crate::scenario::parse::parse;
+use crate::scenario::plan::{Plan, plan};
+use crate::scenario::problem::Problems;
+use crate::scenario::run::outcome::Unready;
+use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use crate::scenario::verdict::Verdict;
+use harness_proto::nordac::PpoType;
+use harness_proto::nordac::guard::{GuardedSlave, Limits};
+use harness_proto::nordac::properties::Properties;
+use harness_proto::profibus::BusRate;
+use harness_proto::time::Span;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Who controls an inverter: the first of the settings of the bus in which a scenario may differ from the rig (2.5.1).
+const INTERFACE: u16 = 1621;
+
+/// The PPO type, the other one. The module begins anew with it.
+pub(super) const PPO_TYPE: u16 = 1622;
+
+/// A scenario of this bus.
+#[derive(Debug)]
+pub(crate) struct Own {
+    /// The name of its source.
+    name: String,
+    scenario: Scenario<Nordac>,
+    pub(super) plan: Plan<Nordac>,
+}
+
+impl Own {
+    /// Reads a scenario.
+    pub(super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
+        let scenario: Scenario<Nordac> = parse(source)?;
+        let plan = plan(&scenario, source, None)?;
+        let name = source.name.clone();
+        Ok(Self {
+            name,
+            scenario,
+            plan,
+        })
+    }
+}
+
+/// What a model is beside what is known of the slaves.
+#[derive(Clone, Copy, Default)]
+struct Other<'o> {
+    /// The properties of the slaves in place of those that are known.
+    properties: Option<&'o Assumed>,
+    /// What adapter and computer do to telegrams.
+    slow: Option<Slow>,
+    /// Whether the settings of the bus are switched to those of the scenario.
+    switches: bool,
+}
+
+/// A scenario played on the model.
+struct Rehearsal {
+    outcome: Outcome,
+    denied: Option<(String, Vec<LimitSetting>)>,
+    /// What came from the first telegram on that makes the slaves ready.
+    came: Came,
+}
+
+impl Rehearsal {
+    fn passes(&self) -> bool {
+        self.denied.is_none() && self.outcome.verdict == Verdict::Passed
+    }
+}
+
+/// How an attempt went, before it is judged.
+enum AttemptCourse {
+    /// The slaves are not known, or did not become ready.
+    Unanswered(TalkError),
+    /// The rig does not play the scenario.
+    Skipped(Skip),
+    /// It was played.
+    Played(Box<Outcome>),
+}
+
+/// What is left of an attempt to judge it by.
+struct Left {
+    way: LinkTimes,
+    /// What came from the first telegram on that makes the slaves ready.
+    came: Came,
+    /// Whether the settings of the bus were switched to those of the scenario.
+    switches: bool,
+    /// Whether the slaves sent anything.
+    heard: bool,
+}
+
+/// Plays attempts, on a rig or on a record, and judges them.
+#[derive(Clone, Debug)]
+pub(crate) struct Player {
+    slaves: Vec<RigSlave>,
+    rate: BusRate,
+    patience: Span,
+    limits: Limits,
+    /// What a record of the rig shows that it can do.
+    capabilities: Vec<Capability>,
+    /// Slaves can be switched off and on: they are simulated.
+    restarts: bool,
+    /// Known from the first attempt on.
+    known: Option<Vec<Known>>,
+    /// What the last attempt may have written: station, number and IND.
+    written: BTreeSet<(u8, u16, u16)>,
+    /// What was received before the scenario of the last attempt; `None` where it was not begun.
+    before: Option<String>,
+    /// What the profile of the rig's file says.
+    pub(super) profile: Profiled,
+    /// What was found out of the slaves where finding out has failed.
+    partly: Vec<Known>,
+    /// What a slave did that no right slave does, before the first scenario: its verdict says so.
+    unlike: Option<String>,
+    /// The only slave has done what no right slave does: further lines that it does not meet accuse it too.
+    proven: bool,
+    /// Why nothing can be played on simulated slaves.
+    unable: Option<String>,
+    /// Whether the slaves are qualified.
+    qualifies: bool,
+    /// The attempts of a qualification.
+    notes: Vec<AttemptNote>,
+}
+
+impl Player {
+    pub(super) fn of(
+        slaves: Vec<RigSlave>,
+        rate: BusRate,
+        patience: Span,
+        limits: Limits,
+        (capabilities, restarts): (Vec<Capability>, bool),
+    ) -> Self {
+        Self {
+            slaves,
+            rate,
+            patience,
+            limits,
+            capabilities,
+            restarts,
+            known: None,
+            written: BTreeSet::new(),
+            before: None,
+            profile: Profiled::default(),
+            partly: Vec::new(),
+            unlike: None,
+            proven: false,
+            unable: None,
+            qualifies: false,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Keeps every attempt from now on.
+    pub(super) const fn qualify(&mut self) {
+        self.qualifies = true;
+    }
+
+    /// The attempts of a qualification.
+    pub(super) fn notes(&self) -> &[AttemptNote] {
+        &self.notes
+    }
+
+    /// What may be done.
+    pub(super) const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// What is known of the slaves; nothing before the first attempt.
+    pub(super) fn known(&self) -> &[Known] {
+        self.known.as_deref().unwrap_or_default()
+    }
+
+    /// What the last attempt may have written.
+    pub(super) const fn written(&self) -> &BTreeSet<(u8, u16, u16)> {
+        &self.written
+    }
+
+    /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
+    pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
+        let bench = &own.plan.setup;
+        for slave in &bench.slaves {
+            let listed = self.slaves.iter().find(|rig| rig.address == slave.address);
+            let why = match listed {
+                None => format!("the rig has no slave {}", slave.address),
+                Some(rig) if rig.ppo.is_some_and(|ppo| !self.may_switch(ppo, slave.ppo)) => {
+                    format!(
+                        "slave {} of the rig is set to another PPO type than that of the scenario, {}; the bench switches 1622 with `allow_motion`, \
+                     `allow_eeprom` and `allow_bus_settings`, if it can switch it back through a parameter channel",
+                        slave.address,
+                        slave.ppo.number()
+                    )
+                }
+                Some(_) if slave.posicon => {
+                    format!(
+                        "slave {} of the scenario has the option PosiCon",
+                        slave.address
+                    )
+                }
+                Some(_) => continue,
+            };
+            return Some(Why::OtherDrives(why).into());
+        }
+        let stated = own.scenario.header.rate.is_some();
+        if stated && bench.rate != self.rate {
+            let why = format!(
+                "the rig's line has {} kbit/s, that of the scenario {}",
+                self.rate.name(),
+                bench.rate.name()
+            );
+            return Some(Why::OtherDrives(why).into());
+        }
+        lacks(&own.plan, &self.replay(&[], Span::ZERO))
+    }
+
+    /// What was recorded of the rig, as a link.
+    pub(super) fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
+        let drives = u8::try_from(self.slaves.len()).unwrap_or(u8::MAX);
+        let medium = Medium::Octets(self.rate.format());
+        let capabilities = self.capabilities.clone();
+        let drives = vec![drives];
+        Replay::new(events.to_vec(), medium, tolerance, drives, capabilities)
+    }
+
+    /// Whether a slave may be switched from one PPO type to the other for a scenario, and back. Other settings of the bus go with it: who
+    /// controls the inverter may start a motor.
+    fn may_switch(&self, from: PpoType, to: PpoType) -> bool {
+        let limits = &self.limits;
+        let permitted = limits.motion && limits.eeprom && limits.bus_settings;
+        // A simulated slave is switched on anew for each attempt.
+        let back = self.restarts || to.has_pkw();
+        from == to || permitted && from.has_pkw() && back
+    }
+
+    /// One attempt over a link: reads the slaves, rehearses, makes them ready, plays and judges. With what was received before the
+    /// scenario, in words.
+    pub(super) fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+        link.begin();
+        let begun = self.qualifies.then(|| self.without_notes());
+        let mut link = Observed::new(link);
+        let exact = link.time_tolerance() == Span::ZERO;
+        let (gone, from, switches) = match &self.unable {
+            Some(why) => {
+                let why = Why::OtherDrives(why.clone());
+                (AttemptCourse::Skipped(why.into()), 0, false)
+            }
+            None => self.go(own, &mut link, None),
+        };
+        if let Some(begun) = begun {
+            self.note(begun, own, (&link, switches), &gone);
+        }
+        let left = Left {
+            way: LinkTimes {
+                late: link.take_late(),
+                longest: link.noted.longest,
+                tolerance: link.time_tolerance(),
+            },
+            came: link.noted.came(link.noted.fresh.max(from)),
+            switches,
+            heard: link.noted.len() > 0,
+        };
+        let outcome = match gone {
+            AttemptCourse::Unanswered(error) => self.unanswered(own, &error, &left),
+            AttemptCourse::Skipped(skip) => Outcome::skipped(skip),
+            AttemptCourse::Played(outcome) => self.judged(own, *outcome, &left),
+        };
+        let outcome = match self.unlike.take() {
+            Some(why) if exact && link.trouble().is_none() => {
+                Outcome::not_ready(Verdict::Failed, Unready::Differs, why)
+            }
+            _ => outcome,
+        };
+        if let Some(note) = self.notes.last_mut() {
+            note.judge(&outcome);
+        }
+        let before = match &self.before {
+            Some(before) => before.clone(),
+            None => link.noted.received(),
+        };
+        self.written = link.noted.written;
+        (outcome, before)
+    }
+
+    /// Reads the slaves, makes them ready, and plays: what their model meets, or `again` a scenario for which the settings of the bus were
+    /// switched or not. With the number of octets that came before the slaves were made ready, and whether settings were switched.
+    fn go(
+        &mut self,
+        own: &Own,
+        link: &mut Observed<'_>,
+        again: Option<bool>,
+    ) -> (AttemptCourse, usize, bool) {
+        self.before = None;
+        if let Err(error) = self.learn(link, again.is_none()) {
+            return (AttemptCourse::Unanswered(error), 0, false);
+        }
+        let from = link.noted.len();
+        if let Some(slave) = self.slaves_of(own).find(|slave| !slave.ppo().has_pkw()) {
+            let why = format!(
+                "slave {} is set to PPO type {}, which has no parameter channel: its parameters are not known",
+                slave.slave.address,
+                slave.ppo().number()
+            );
+            return (
+                AttemptCourse::Skipped(Why::OtherDrives(why).into()),
+                from,
+                false,
+            );
+        }
+        let switches = match again.map_or_else(|| self.rehearsed(own), Ok) {
+            Ok(switches) => switches,
+            Err(skip) => return (AttemptCourse::Skipped(skip), from, false),
+        };
+        let ready = self.prepare(own, link, switches);
+        self.before = Some(link.noted.received());
+        if let Err(error) = ready {
+            return (AttemptCourse::Unanswered(error), from, switches);
+        }
+        link.begin();
+        link.take_late();
+        let outcome = play(&own.plan, link, AtMismatch::Stop);
+        (AttemptCourse::Played(Box::new(outcome)), from, switches)
+    }
+
+    /// The slaves that a scenario names.
+    fn slaves_of<'p>(&'p self, own: &'p Own) -> impl Iterator<Item = &'p Known> {
+        let named = |known: &&Known| {
+            let mut slaves = own.plan.setup.slaves.iter();
+            slaves.any(|slave| slave.address == known.slave.address)
+        };
+        self.known().iter().filter(named)
+    }
+
+    /// Reads the slaves, the first time, and `settles` what the manual leaves open.
+    fn learn(&mut self, link: &mut Observed<'_>, settles: bool) -> Result<(), TalkError> {
+        if self.known.is_some() {
+            return Ok(());
+        }
+        let mut all: Vec<_> = self.slaves.iter().copied().map(Known::new).collect();
+        let mut learn = || {
+            let each = all.iter_mut();
+            let seen = each.map(|known| self.learn_of(known, link));
+            seen.collect::<Result<Vec<_>, _>>()
+        };
+        let seen = match learn() {
+            Ok(seen) => seen,
+            Err(error) => {
+                self.partly = all;
+                return Err(error);
+            }
+        };
+        let exact = link.time_tolerance() == Span::ZERO;
+        let came = |came: Came| if exact { came } else { came.at_any_time() };
+        for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
+            let seen = came(seen);
+            let settled = settle::settle(|own| came(self.conversed(known, own)).agrees(&seen));
+            match settled {
+                Some(settled) => (known.properties, known.open) = settled,
+                // Every value of every point stays open.
+                None => {
+                    self.proven = exact && self.slaves.len() == 1;
+                    self.unlike = Some(format!(
+                        "slave {}: no right slave, whatever the manual leaves open, sends what it sent before the first scenario",
+                        known.slave.address
+                    ));
+                }
+            }
+            self.profile.settle(known)?;
+        }
+        self.known = Some(all);
+        Ok(())
+    }
+
+    /// Reads a slave, and holds the conversation that settles what the manual leaves open. Returns what came in it.
+    fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<Came, TalkError> {
+        let address = known.slave.address;
+        let mut talk = Talk::new(Box::new(&mut *link), self.patience);
+        talk.restart(address);
+        // The record shows it, so that its judge knows it too.
+        let found = talk.configuration(address)?;
+        known.slave.ppo = found.or(known.slave.ppo);
+        known.read_all(&mut talk)?;
+        settle::forget(known, &mut talk)?;
+        drop(talk);
+        let from = link.noted.len();
+        let mut talk = Talk::new(Box::new(&mut *link), self.patience);
+        settle::converse(known, &mut talk)?;
+        drop(talk);
+        Ok(link.noted.came(from))
+    }
+
+    /// What comes from a model of a slave in the conversation that settles what the manual leaves open.
+    fn conversed(&self, known: &Known, properties: Properties) -> Came {
+        let mut link = self.model(vec![known.model(properties)], &self.limits);
+        let mut link = Observed::new(&mut link);
+        let mut talk = Talk::new(Box::new(&mut link), self.patience);
+        let ready = settle::forget(known, &mut talk);
+        drop(talk);
+        let from = link.noted.len();
+        if ready.is_ok() {
+            let mut talk = Talk::new(Box::new(&mut link), self.patience);
+            // What came before an error counts.
+            let _came = settle::converse(known, &mut talk);
+        }
+        link.noted.came(from)
+    }
+
+    /// A bench of simulated slaves behind the gate of the rig. They were asked as when a rig is opened.
+    fn model(&self, slaves: Vec<simulate::SlaveSetup>, limits: &Limits) -> Guarded<Bench> {
+        let gated = slaves.iter().map(|own| GuardedSlave {
+            address: own.address,
+            ppo: Some(own.ppo),
+        });
+        let gated: Vec<_> = gated.collect();
+        let setup = simulate::Setup {
+            rate: self.rate,
+            slaves,
+            master: None,
+        };
+        let mut link = guarded(Bench::new(&setup), *limits, &gated, false);
+        if let Some(gate) = link.slaves_mut() {
+            for known in self.known() {
+                for ((number, ind), raw) in &known.values {
+                    gate.learn(known.slave.address, *number, (ind >> 8 & 3) as u8, *raw);
+                }
+            }
+        }
+        let mut talk = Talk::new(Box::new(&mut link), self.patience);
+        for slave in &setup.slaves {
+            talk.restart(slave.address);
+            let asked = talk.diagnose(slave.address);
+            let _any = asked.and_then(|_| talk.configuration(slave.address));
+        }
+        drop(talk);
+        link
+    }
+
+    /// Plays a scenario on the model: with the settings of the bus as they are, or if that is permitted and needed with those of the scenario.
+    /// Returns whether they are switched.
+    ///
+    /// # Errors
+    /// Why the rig does not play it.
+    fn rehearsed(&self, own: &Own) -> Result<bool, Skip> {
+        if let Some(why) = self.other_properties(own) {
+            return Err(Why::OtherDrives(why).into());
+        }
+        let with = |switches| Other {
+            switches,
+            ..Other::default()
+        };
+        let first = self.rehearse(own, &self.limits, with(false));
+        if first.passes() {
+            return Ok(false);
+        }
+        let may = self.slaves_of(own).all(|known| {
+            let wanted = own.plan.setup.slaves.iter();
+            let mut wanted = wanted.filter(|slave| slave.address == known.slave.address);
+            wanted.all(|slave| self.may_switch(known.ppo(), slave.ppo))
+        });
+        let limits = &self.limits;
+        let permitted = limits.motion && limits.eeprom && limits.bus_settings;
+        if may && permitted && self.rehearse(own, &self.limits, with(true)).passes() {
+            return Ok(true);
+        }
+        let Some((why, settings)) = first.denied else {
+            let finding = first.outcome.finding.map(|own| own.message);
+            let remark = first.outcome.remarks.into_iter().next();
+            let found = finding.or(remark).unwrap_or_default();
+            let why = format!("a right slave with the same parameters does not meet it: {found}");
+            return Err(Why::OtherDrives(why).into());
+        };
+        // What the common settings would permit.
+        let mut limits = self.limits;
+        for setting in &settings {
+            permit(&mut limits, *setting);
+        }
+        let plays = self.rehearse(own, &limits, with(false)).passes();
+        let unlocks: BTreeSet<_> = settings.into_iter().map(Unlock::Limit).collect();
+        let skip = Skip::from(Why::Denied(why));
+        Err(match plays {
+            true => skip.and(unlocks),
+            false => skip,
+        })
+    }
+
+    /// The first property of the header of which a slave of the rig has another value, as far as is known.
+    fn other_properties(&self, own: &Own) -> Option<String> {
+        let lines = own.scenario.header.slaves.iter();
+        let mut named = lines.filter_map(|line| match &line.what {
+            syntax::Setup::Property(property, _) => Some(*property),
+            _ => None,
+        });
+        named.find_map(|property| {
+            own.plan.setup.slaves.iter().find_map(|slave| {
+                let address = slave.address;
+                let known = self.known().iter().find(|own| own.slave.address == address)?;
+                let wanted = value_of(property, &slave.properties);
+                let has = value_of(property, &known.properties);
+                let name = property.name;
+                let why = format!("it is for a slave with {name} = {wanted}; slave {address} has {has}, as far as is known");
+                (wanted != has).then_some(why)
+            })
+        })
+    }
+
+    /// Plays a scenario on the model within limits.
+    fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+        let known = self.known().iter().enumerate();
+        let slaves = known.map(|(place, known)| {
+            let other = other.properties.and_then(|all| all.get(place));
+            known.model(*other.unwrap_or(&known.properties))
+        });
+        let mut link = self.model(slaves.collect(), limits);
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        recording.begin();
+        let mut observed = Observed::new(&mut recording);
+        let ready = self.prepare(own, &mut observed, other.switches);
+        let outcome = match ready {
+            Ok(()) => {
+                observed.begin();
+                observed = observed.slowed(other.slow);
+                play(&own.plan, &mut observed, AtMismatch::Stop)
+            }
+            Err(TalkError::Line(trouble)) => Outcome::trouble(&trouble),
+            Err(error) => {
+                let remark = error.to_string();
+                Outcome::not_ready(Verdict::Inconclusive, Unready::Differs, remark)
+            }
+        };
+        let came = observed.noted.came(observed.noted.fresh);
+        let denied = match link.trouble() {
+            Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
+            _ => None,
+        };
+        Rehearsal {
+            outcome,
+            denied,
+            came,
+        }
+    }
+}
+
+/// Permits what a setting denies.
+const fn permit(limits: &mut Limits, setting: LimitSetting) {
+    match setting {
+        LimitSetting::Motion => limits.motion = true,
+        LimitSetting::Eeprom => limits.eeprom = true,
+        LimitSetting::MaxSpeed => limits.highest = None,
+        _ => {}
+    }
+}
