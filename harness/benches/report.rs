@@ -62,6 +62,7 @@ fn page_of(all: &[(Entry, Outcome, Vec<Trace>)]) -> String {
     let head = Head {
         title: "100 axes",
         facts: Vec::new(),
+        found: Vec::new(),
     };
     run(&head, shown.collect())
 }
