@@ -267,7 +267,7 @@ mod tests {
             "-|ADDRESS",
             "LINK=PLACE",
             "LINK=CHANNEL",
-            "LINK=PORT",
+            "NAME=PORT",
             "BYTES",
             "VERSION",
             "FORMAT",

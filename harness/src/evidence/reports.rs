@@ -32,7 +32,6 @@ pub(super) fn differences(
     let settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
     let mut wrong = Vec::new();
     wrong.extend(file(path, REPORT, |_| plain(opened.rig.id(), &settled)));
-    wrong.extend(file(path, PAGE, |_| made.html.clone()));
     wrong.extend(file(path, JUNIT, |stated| moved(&made.junit, path, stated)));
     wrong.extend(versions(path, opened));
     for own in judged {
@@ -40,6 +39,11 @@ pub(super) fn differences(
     }
     wrong.extend(foreign(path, opened, judged));
     wrong
+}
+
+/// The page, which shows what the files of a qualification say: these are compared before it.
+pub(super) fn page(path: &Path, made: &Derived) -> Option<String> {
+    file(path, PAGE, |_| made.html.clone())
 }
 
 /// Compares a file with what is made of its own text; `None` where they are the same.

@@ -127,6 +127,7 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
                 "{PROFILE} and {DEVIATIONS}: they are compared where nothing else is wrong"
             ));
         }
+        verified.files.extend(reports::page(path, &made));
     }
     Ok(verified)
 }

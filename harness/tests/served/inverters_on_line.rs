@@ -241,7 +241,11 @@ fn a_program_that_hangs_is_watched() {
 /// A served inverter is qualified: it is not blamed, the value of an open point is found, and the record bears both out.
 #[test]
 fn a_served_inverter_is_qualified() {
-    let desk = Desk::of("tcp", "", "slave 8\nslave 8 property spm = error\n");
+    let desk = Desk::of(
+        "tcp",
+        "",
+        "slave 8\nslave 8 property description-error-order = task-first\n",
+    );
     let output = desk.run("qualify --filter nordac-en-1-start --rig desk.toml --evidence kept");
     assert!(
         matches!(output.status.code(), Some(0 | 5)),
@@ -251,7 +255,7 @@ fn a_served_inverter_is_qualified() {
     let kept = |file: &str| std::fs::read_to_string(desk.path("kept").join(file)).expect("a file");
     let (profile, deviations) = (kept("profile.toml"), kept("deviations.txt"));
     assert!(
-        profile.contains("slave 8 property spm = error"),
+        profile.contains("slave 8 property description-error-order = task-first"),
         "{profile}"
     );
     assert!(deviations.starts_with("deviations: no"), "{deviations}");

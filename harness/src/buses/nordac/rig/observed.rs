@@ -94,7 +94,7 @@ impl TelegramNotes {
         self.kept.len()
     }
 
-    /// The octets that came behind the first so many.
+    /// The octets that came behind the first `behind` ones.
     pub(super) fn came(&self, behind: usize) -> Came {
         let mut came = Came(self.kept[behind.min(self.kept.len())..].to_vec());
         if let Some(first) = came.0.first_mut() {

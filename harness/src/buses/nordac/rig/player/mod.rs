@@ -44,7 +44,7 @@ use std::sync::Arc;
 /// Who controls an inverter: the first of the settings of the bus in which a scenario may differ from the rig (2.5.1).
 const INTERFACE: u16 = 1621;
 
-/// The PPO type, the other one. The module begins anew with it.
+/// The PPO type, the other one. The module begins again with it.
 pub(super) const PPO_TYPE: u16 = 1622;
 
 /// A scenario of this bus.

@@ -153,7 +153,7 @@ const RIGHT: [&str; 3] = [
     "drive 0..last eeprom 47 = 80\ndrive 0..last property read-long = as-printed\ndrive 0..last property short-address = kept-sum",
 ];
 
-/// A trial by hand: `BUSY=ONE_IN,FIRST,LAST,DRIVES,CASES` are one stall in so many actions, seeds from the first up to the last, an index into
+/// A trial by hand: `BUSY=ONE_IN,FIRST,LAST,DRIVES,CASES` are one stall in this number of actions, seeds from the first up to the last, an index into
 /// [`RIGHT`], and the number of cases of a fuzz run; 0 stands for a qualification, 1 for the
 /// built-in scenarios. `60,1,3,1,0` by default.
 #[test]
