@@ -53,7 +53,7 @@ impl Served {
             _ => "127.0.0.1:0".to_owned(),
         };
         let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
-        command.args(["sim", "--rig", "sim:4", "--for", "120s"]);
+        command.args(["sim", "--rig", "sim:4", "--for", "600s"]);
         command.args(["--marks", if marks { "in-band" } else { "none" }]);
         let setup = path("setup.scn");
         std::fs::write(&setup, "drive 0..last model plain\n").expect("room");

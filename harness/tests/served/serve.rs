@@ -31,7 +31,7 @@ impl Sim {
             .arg("sim")
             .args(arguments)
             // A test that goes wrong ends too.
-            .args(["--for", "120s"])
+            .args(["--for", "600s"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
