@@ -11,6 +11,7 @@ use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{IDENT, Image, Pkw};
 use harness_proto::profibus::dp::{Service, SetPrm};
 use harness_proto::time::Span;
+use std::collections::BTreeSet;
 
 /// A watchdog by which the slave forgets its master: 100 ms.
 const FORGET: [u8; 2] = [1, 10];
@@ -127,7 +128,8 @@ fn image(word: u16) -> Image {
 pub(super) type Assumed = Vec<Properties>;
 
 /// Looks for properties that explain what slaves did: from `base` on, one point after the other that `may` differ of a slave is changed as long
-/// as that explains more. All that were found to explain everything, each with the words of its last difference; none if there are no such.
+/// as that explains more, and two at once where no single one does. All that were found to explain everything, each with the words of its last
+/// difference; none if there are no such.
 pub(super) fn search(
     base: &Assumed,
     may: impl Fn(usize, &Description) -> bool,
@@ -138,29 +140,84 @@ pub(super) fn search(
         return vec![(String::new(), base.clone())];
     }
     for _ in 0..MOST_DIFFERENCES {
-        let mut best = Vec::new();
-        let mut most = so_far.0;
-        for place in 0..base.len() {
-            for (words, own) in candidates(so_far.1[place], |property| may(place, property)) {
-                let mut other = so_far.1.clone();
-                other[place] = own;
-                let agreed = explains(&other);
-                if agreed > most {
-                    most = agreed;
-                    best.clear();
-                }
-                if agreed == most && agreed > so_far.0 {
-                    best.push((words, other));
-                }
-            }
+        let one = judged(steps(&so_far.1, &may), &mut explains);
+        let mut found = best(so_far.0, &one);
+        if found.is_empty() {
+            // Two points that each show nothing up to the first difference do not explain it.
+            let seen = one.iter().filter(|own| own.agreed != so_far.0);
+            let seen: BTreeSet<_> = seen.map(|own| name_of(&own.words)).collect();
+            let two = one
+                .iter()
+                .filter(|own| seen.contains(name_of(&own.words)))
+                .flat_map(|first| {
+                    // Each pair in one order, and no property twice.
+                    let later = |place: usize, property: &Description| {
+                        let name = name_of(&first.words);
+                        let done = seen.contains(property.name) && property.name <= name;
+                        property.name != name && !done && may(place, property)
+                    };
+                    let both = |(second, own)| (format!("{}, {second}", first.words), own);
+                    steps(&first.slaves, later).into_iter().map(both)
+                })
+                .collect();
+            found = best(so_far.0, &judged(two, &mut explains));
         }
-        match best.first() {
+        match found.first() {
             None => return Vec::new(),
-            Some(_) if most == WHOLE => return best,
-            Some((_, better)) => so_far = (most, better.clone()),
+            Some(own) if own.agreed == WHOLE => {
+                let all = found.into_iter();
+                return all.map(|own| (own.words, own.slaves)).collect();
+            }
+            Some(own) => so_far = (own.agreed, own.slaves.clone()),
         }
     }
     Vec::new()
+}
+
+/// Slaves, how they differ from others, and how far they do what was seen.
+#[derive(Clone)]
+struct Step {
+    agreed: Agreement,
+    words: String,
+    slaves: Assumed,
+}
+
+fn judged(
+    all: Vec<(String, Assumed)>,
+    explains: &mut impl FnMut(&Assumed) -> Agreement,
+) -> Vec<Step> {
+    let all = all.into_iter().map(|(words, slaves)| Step {
+        agreed: explains(&slaves),
+        words,
+        slaves,
+    });
+    all.collect()
+}
+
+/// Those that explain most, all as much; none if that is no more than `so_far`.
+fn best(so_far: Agreement, all: &[Step]) -> Vec<Step> {
+    let most = all.iter().map(|own| own.agreed).max();
+    let most = most.filter(|most| *most > so_far);
+    let best = all.iter().filter(|own| Some(own.agreed) == most);
+    best.cloned().collect()
+}
+
+/// The property of the words of a difference.
+fn name_of(words: &str) -> &str {
+    words.split(' ').next().unwrap_or_default()
+}
+
+/// What differs in one point from these slaves.
+fn steps(from: &Assumed, may: impl Fn(usize, &Description) -> bool) -> Vec<(String, Assumed)> {
+    let of = |place: usize| {
+        let near = candidates(from[place], |property| may(place, property));
+        near.into_iter().map(move |(words, own)| {
+            let mut other = from.clone();
+            other[place] = own;
+            (words, other)
+        })
+    };
+    (0..from.len()).flat_map(of).collect()
 }
 
 /// The properties that explain what a slave did, and those that do so as well: they differ from them in one point, or were found in their
@@ -177,4 +234,34 @@ pub(super) fn settle(
     let mut open: Vec<_> = near.filter(|own| explains(own.1) == WHOLE).collect();
     open.extend(others);
     Some((base, open))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::known::value_of;
+    use super::{Assumed, WHOLE, search};
+    use harness_proto::nordac::properties::{Description, PROPERTIES, Properties};
+
+    /// What a slave does may follow from two points together, of which neither alone explains more than the default.
+    #[test]
+    fn two_points_are_changed_at_once() {
+        let holds = |all: &Assumed, name: &str, value: &str| {
+            let mut named = PROPERTIES.iter().filter(|own| own.name == name);
+            named.any(|own| value_of(own, &all[0]) == value)
+        };
+        let explains = |all: &Assumed| match (
+            holds(all, "subindex-bits", "7..15"),
+            holds(all, "plain-task-subindex", "ignored"),
+        ) {
+            (true, true) => WHOLE,
+            (true, false) => 90,
+            (false, _) => 100,
+        };
+        let base = vec![Properties::default()];
+        let found = search(&base, |_, _| true, explains);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(explains(&found[0].1), WHOLE);
+        let fixed = |_: usize, own: &Description| own.name != "subindex-bits";
+        assert!(search(&base, fixed, explains).is_empty());
+    }
 }
