@@ -3,9 +3,11 @@
 //! A bus supplies its attempts and what it knows of wrong drives ([`Attempts`]); the rules when a deviation is named are the same for all.
 
 use crate::counted::counted;
+use crate::rig::Rig;
 use crate::rig::profile::{Profile, ProfileLines};
 use crate::rig::segment::Qualified;
 use crate::scenario::verdict::Verdict;
+use std::collections::BTreeMap;
 
 /// The most deviations that are listed where several explain everything.
 const MOST_TOLD: usize = 8;
@@ -75,6 +77,46 @@ fn named<A: Attempts>(all: &A, attempts: &[Attempted]) -> Named {
         _ if accused => Named::Explained(explaining),
         _ => Named::None,
     }
+}
+
+/// What a drive has shown of a point that the manual leaves open.
+pub(crate) struct Point<'p> {
+    /// The drive, as the header of a scenario names it.
+    pub(crate) drive: String,
+    /// The property.
+    pub(crate) name: &'p str,
+    /// The section, with the document.
+    pub(crate) section: String,
+    /// Its value, or why none was settled.
+    pub(crate) value: Result<String, String>,
+}
+
+/// The profile of drives: every point that the manual leaves open, of each drive.
+pub(crate) fn profile<'p>(
+    (rig, began): (&Rig, &str),
+    drives: usize,
+    points: impl Iterator<Item = Point<'p>>,
+) -> Profile<ProfileLines> {
+    let mut profile = Profile {
+        schema: 1,
+        rig: rig.id().to_owned(),
+        date: began.to_owned(),
+        rings: vec![u8::try_from(drives).unwrap_or(u8::MAX)],
+        property: BTreeMap::new(),
+        open: BTreeMap::new(),
+    };
+    for own in points {
+        let drive = &own.drive;
+        match own.value {
+            Ok(value) => {
+                let line = format!("{drive} property {} = {value}", own.name);
+                let value = format!("{drive}: {value}");
+                profile.settle(own.name, &own.section, &value, &vec![line]);
+            }
+            Err(why) => profile.leave_open(own.name, &format!("{drive}: {why}")),
+        }
+    }
+    profile
 }
 
 /// What a qualification comes to. `frames` is the word for what is received, in the singular; `known` are the deviations that the rig's file

@@ -3,16 +3,15 @@
 use super::known::{Known, value_of};
 use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
 use super::{RigSlave, slaves};
-use crate::qualify::segment::{Attempted, Attempts, qualified};
+use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified};
+use crate::rig::Rig;
 use crate::rig::segment::Qualified;
-use crate::rig::{Profile, ProfileLines, Rig};
 use crate::scenario::source::Source;
 use harness_proto::nordac::guard::Limits;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
 use harness_sim::nordac::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
-use std::collections::BTreeMap;
 
 /// The conversations that are played with each slave behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/nordac");
@@ -173,7 +172,8 @@ pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Q
     for place in 0..known.len() {
         settle(&mut known, place, &notes);
     }
-    let profile = (!known.is_empty()).then(|| profile(&known, player.limits(), rig, began));
+    let points = points(&known, player.limits());
+    let profile = (!known.is_empty()).then(|| profile((rig, began), known.len(), points));
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let named: Vec<_> = named.collect();
     qualified(&AttemptNotes(notes), profile, "telegram", &named, whole)
@@ -196,31 +196,19 @@ fn settle(slaves: &mut [Known], place: usize, notes: &[&AttemptNote]) {
     }
 }
 
-fn profile(slaves: &[Known], limits: &Limits, rig: &Rig, began: &str) -> Profile<ProfileLines> {
-    let mut profile = Profile {
-        schema: 1,
-        rig: rig.id().to_owned(),
-        date: began.to_owned(),
-        rings: vec![u8::try_from(slaves.len()).unwrap_or(u8::MAX)],
-        property: BTreeMap::new(),
-        open: BTreeMap::new(),
-    };
-    for property in PROPERTIES {
-        for known in slaves {
-            let address = known.slave.address;
-            if known.is_settled(property) {
-                let value = value_of(property, &known.properties);
-                let line = format!("slave {address} property {} = {value}", property.name);
-                let section = format!("nordac {}", property.section);
-                let value = format!("slave {address}: {value}");
-                profile.settle(property.name, &section, &value, &vec![line]);
-            } else {
-                let why = why_open(property, limits);
-                profile.leave_open(property.name, &format!("slave {address}: {why}"));
-            }
-        }
-    }
-    profile
+/// What a slave has shown of each point.
+fn points<'p>(slaves: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
+    PROPERTIES.iter().flat_map(move |property| {
+        slaves.iter().map(move |known| Point {
+            drive: format!("slave {}", known.slave.address),
+            name: property.name,
+            section: format!("nordac {}", property.section),
+            value: match known.is_settled(property) {
+                true => Ok(value_of(property, &known.properties)),
+                false => Err(why_open(property, limits)),
+            },
+        })
+    })
 }
 
 /// The attempts of a qualification.

@@ -3,15 +3,14 @@
 use super::Axis;
 use super::known::Known;
 use super::player::{CONVERSATION, DriveIs, Note, Player};
-use crate::qualify::segment::{Attempted, Attempts, qualified};
+use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified};
+use crate::rig::Rig;
 use crate::rig::segment::Qualified;
-use crate::rig::{Profile, ProfileLines, Rig};
 use crate::scenario::source::Source;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
-use std::collections::BTreeMap;
 
 /// The conversations that are played with each drive behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/unitek");
@@ -112,7 +111,8 @@ pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Q
     for place in 0..known.len() {
         settle(&mut known, place, &notes);
     }
-    let profile = (!known.is_empty()).then(|| profile(&known, player.limits(), rig, began));
+    let points = points(&known, player.limits());
+    let profile = (!known.is_empty()).then(|| profile((rig, began), known.len(), points));
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     qualified(
         &Notes(notes),
@@ -145,31 +145,19 @@ fn settle(drives: &mut [Known], place: usize, notes: &[&Note]) {
     }
 }
 
-fn profile(drives: &[Known], limits: &Limits, rig: &Rig, began: &str) -> Profile<ProfileLines> {
-    let mut profile = Profile {
-        schema: 1,
-        rig: rig.id().to_owned(),
-        date: began.to_owned(),
-        rings: vec![u8::try_from(drives.len()).unwrap_or(u8::MAX)],
-        property: BTreeMap::new(),
-        open: BTreeMap::new(),
-    };
-    for property in PROPERTIES {
-        for drive in drives {
-            let node = drive.axis.node;
-            if drive.settled.contains(property.name) {
-                let value = property.of_drive(&drive.properties);
-                let line = format!("drive {node} property {} = {value}", property.name);
-                let section = format!("unitek {}", property.section);
-                let value = format!("drive {node}: {value}");
-                profile.settle(property.name, &section, &value, &vec![line]);
-            } else {
-                let why = why_open(property, limits);
-                profile.leave_open(property.name, &format!("drive {node}: {why}"));
-            }
-        }
-    }
-    profile
+/// What a drive has shown of each point.
+fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
+    PROPERTIES.iter().flat_map(move |property| {
+        drives.iter().map(move |known| Point {
+            drive: format!("drive {}", known.axis.node),
+            name: property.name,
+            section: format!("unitek {}", property.section),
+            value: match known.settled.contains(property.name) {
+                true => Ok(property.of_drive(&known.properties).to_string()),
+                false => Err(why_open(property, limits)),
+            },
+        })
+    })
 }
 
 /// The attempts of a qualification.

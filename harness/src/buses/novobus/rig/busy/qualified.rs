@@ -157,7 +157,7 @@ const RIGHT: [&str; 3] = [
 /// [`RIGHT`], and the number of cases of a fuzz run; 0 stands for a qualification, 1 for the
 /// built-in scenarios. `60,1,3,1,0` by default.
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes; .ci/nightly runs it"]
 fn by_hand() {
     let text = std::env::var("BUSY").unwrap_or_else(|_| "60,1,3,1,0".to_owned());
     let numbers: Vec<u64> = text
