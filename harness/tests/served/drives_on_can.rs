@@ -63,7 +63,18 @@ impl Desk {
     }
 
     fn command(&self, line: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        self.started_by(Command::new(env!("CARGO_BIN_EXE_drivebench")), line)
+    }
+
+    /// The same, ended by SIGHUP too, which `nohup` around the tests would have it ignore.
+    fn heeding(&self, line: &str) -> Command {
+        let mut command = Command::new("env");
+        let program = env!("CARGO_BIN_EXE_drivebench");
+        command.args(["--default-signal=HUP", program]);
+        self.started_by(command, line)
+    }
+
+    fn started_by(&self, mut command: Command, line: &str) -> Command {
         command
             .args(line.split(' '))
             .current_dir(self.folder.path())
@@ -87,7 +98,7 @@ impl Desk {
 
     /// Starts a move that lasts for minutes, and waits until the motor turns.
     fn moving(&self) -> (Child, BufReader<std::process::ChildStderr>) {
-        let mut command = self.command("position 1 --to 30000turns --move --rig desk.toml");
+        let mut command = self.heeding("position 1 --to 30000turns --move --rig desk.toml");
         let mut child = command.spawn().expect("the program");
         let mut said = BufReader::new(child.stderr.take().expect("a pipe"));
         let mut line = String::new();
