@@ -28,17 +28,30 @@ pub(super) struct TelegramNotes {
     pub(super) longest: Span,
     /// How many octets were received, and their checksum.
     heard: ReceivedSum,
-    /// The octets that were received: how long after the one before in the same conversation, and their bits with that of a line error.
-    kept: Vec<(Span, u16)>,
-    /// When the last of them came, in this conversation.
+    /// The octets that were received.
+    kept: Vec<CameOctet>,
+    /// How often something was sent since the last [`begin_fresh`](Self::begin_fresh).
+    sent: u32,
+    /// When the last octet came or the last telegram had left, in this conversation.
     last: Option<Instant>,
-    /// How many had come when what came before did not count any more.
-    pub(super) fresh: usize,
+    /// How many octets had come at the last [`begin_fresh`](Self::begin_fresh).
+    fresh: usize,
 }
 
-/// Octets from the slaves, in order: how long after the octet before each came, and its bits.
+/// An octet from a slave, and its place in the conversation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CameOctet {
+    /// How often something was sent before it: an answer to one request is none to another.
+    sent: u32,
+    /// How long after the octet before, or after what was sent last.
+    gap: Span,
+    /// The octet, and in bit 8 whether it has a line error.
+    bits: u16,
+}
+
+/// Octets from the slaves, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Came(Vec<(Span, u16)>);
+pub(super) struct Came(Vec<CameOctet>);
 
 /// How far two sequences of octets agree; the more the greater. [`WHOLE`] where they are the same.
 pub(super) type Agreement = usize;
@@ -49,7 +62,9 @@ pub(super) const WHOLE: Agreement = Agreement::MAX;
 impl Came {
     /// The same octets, whenever they came.
     pub(super) fn at_any_time(mut self) -> Self {
-        self.0.iter_mut().for_each(|own| own.0 = Span::ZERO);
+        for own in &mut self.0 {
+            (own.sent, own.gap) = (0, Span::ZERO);
+        }
         self
     }
 
@@ -61,13 +76,15 @@ impl Came {
         let pairs = || self.0.iter().zip(&other.0);
         let same = pairs().take_while(|(own, other)| own == other).count();
         let next = pairs().nth(same);
-        let bits = next.map_or(0, |(own, other)| (own.1 ^ other.1).count_zeros() as usize);
+        let bits = next.map_or(0, |(own, other)| {
+            (own.bits ^ other.bits).count_zeros() as usize
+        });
         same * 32 + bits
     }
 
     /// The telegrams among the octets.
     pub(super) fn telegrams(&self) -> Vec<Telegram> {
-        let octets: Vec<u8> = self.0.iter().map(|(_, bits)| *bits as u8).collect();
+        let octets: Vec<u8> = self.0.iter().map(|own| own.bits as u8).collect();
         let mut rest = octets.as_slice();
         let mut all = Vec::new();
         while !rest.is_empty() {
@@ -87,6 +104,8 @@ impl TelegramNotes {
     /// What comes from now on does not depend on what the slaves have done before.
     pub(super) const fn begin_fresh(&mut self) {
         self.fresh = self.kept.len();
+        self.sent = 0;
+        self.last = None;
     }
 
     /// How many octets are kept.
@@ -94,13 +113,14 @@ impl TelegramNotes {
         self.kept.len()
     }
 
-    /// The octets that came behind the first `behind` ones.
-    pub(super) fn came(&self, behind: usize) -> Came {
-        let mut came = Came(self.kept[behind.min(self.kept.len())..].to_vec());
-        if let Some(first) = came.0.first_mut() {
-            first.0 = Span::ZERO;
-        }
-        came
+    /// The octets that came since the last [`begin_fresh`](Self::begin_fresh).
+    pub(super) fn came(&self) -> Came {
+        Came(self.kept[self.fresh..].to_vec())
+    }
+
+    /// All octets that came.
+    pub(super) fn all(&self) -> Came {
+        Came(self.kept.clone())
     }
 
     /// What was received so far, in words.
@@ -113,6 +133,8 @@ impl TelegramNotes {
 impl LinkNotes for TelegramNotes {
     /// A telegram was sent. In every layout that its length fits, its parameter channel may write.
     fn sent(&mut self, what: Out<'_>, end: Instant) {
+        self.sent += 1;
+        self.last = Some(end);
         self.asked = Some(end);
         self.reply.clear();
         let telegram = Telegram::decode(what.octets()).value();
@@ -140,7 +162,11 @@ impl LinkNotes for TelegramNotes {
                 .last
                 .replace(at)
                 .map_or(Span::ZERO, |last| at.since(last));
-            self.kept.push((gap, u16::from(octet.byte) | error));
+            self.kept.push(CameOctet {
+                sent: self.sent,
+                gap,
+                bits: u16::from(octet.byte) | error,
+            });
         }
         self.heard.pieces += 1;
         let bits = u32::from(octet.byte) | u32::from(octet.error.is_some()) << 8;

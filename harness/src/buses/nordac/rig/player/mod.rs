@@ -265,10 +265,10 @@ impl Player {
         let begun = self.qualifies.then(|| self.without_notes());
         let mut link = Observed::new(link);
         let exact = link.time_tolerance() == Span::ZERO;
-        let (gone, from, switches) = match &self.unable {
+        let (gone, switches) = match &self.unable {
             Some(why) => {
                 let why = Why::OtherDrives(why.clone());
-                (AttemptCourse::Skipped(why.into()), 0, false)
+                (AttemptCourse::Skipped(why.into()), false)
             }
             None => self.go(own, &mut link, None),
         };
@@ -281,7 +281,7 @@ impl Player {
                 longest: link.noted.longest,
                 tolerance: link.time_tolerance(),
             },
-            came: link.noted.came(link.noted.fresh.max(from)),
+            came: link.noted.came(),
             switches,
             heard: link.noted.len() > 0,
         };
@@ -308,43 +308,39 @@ impl Player {
     }
 
     /// Reads the slaves, makes them ready, and plays: what their model meets, or `again` a scenario for which the settings of the bus were
-    /// switched or not. With the number of octets that came before the slaves were made ready, and whether settings were switched.
+    /// switched or not. With whether settings were switched.
     fn go(
         &mut self,
         own: &Own,
         link: &mut Observed<'_>,
         again: Option<bool>,
-    ) -> (AttemptCourse, usize, bool) {
+    ) -> (AttemptCourse, bool) {
         self.before = None;
         if let Err(error) = self.learn(link, again.is_none()) {
-            return (AttemptCourse::Unanswered(error), 0, false);
+            return (AttemptCourse::Unanswered(error), false);
         }
-        let from = link.noted.len();
+        link.noted.begin_fresh();
         if let Some(slave) = self.slaves_of(own).find(|slave| !slave.ppo().has_pkw()) {
             let why = format!(
                 "slave {} is set to PPO type {}, which has no parameter channel: its parameters are not known",
                 slave.slave.address,
                 slave.ppo().number()
             );
-            return (
-                AttemptCourse::Skipped(Why::OtherDrives(why).into()),
-                from,
-                false,
-            );
+            return (AttemptCourse::Skipped(Why::OtherDrives(why).into()), false);
         }
         let switches = match again.map_or_else(|| self.rehearsed(own), Ok) {
             Ok(switches) => switches,
-            Err(skip) => return (AttemptCourse::Skipped(skip), from, false),
+            Err(skip) => return (AttemptCourse::Skipped(skip), false),
         };
         let ready = self.prepare(own, link, switches);
         self.before = Some(link.noted.received());
         if let Err(error) = ready {
-            return (AttemptCourse::Unanswered(error), from, switches);
+            return (AttemptCourse::Unanswered(error), switches);
         }
         link.begin();
         link.take_late();
         let outcome = play(&own.plan, link, AtMismatch::Stop);
-        (AttemptCourse::Played(Box::new(outcome)), from, switches)
+        (AttemptCourse::Played(Box::new(outcome)), switches)
     }
 
     /// The slaves that a scenario names.
@@ -407,11 +403,11 @@ impl Player {
         known.read_all(&mut talk)?;
         settle::forget(known, &mut talk)?;
         drop(talk);
-        let from = link.noted.len();
+        link.noted.begin_fresh();
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
         settle::converse(known, &mut talk)?;
         drop(talk);
-        Ok(link.noted.came(from))
+        Ok(link.noted.came())
     }
 
     /// What comes from a model of a slave in the conversation that settles what the manual leaves open.
@@ -421,13 +417,13 @@ impl Player {
         let mut talk = Talk::new(Box::new(&mut link), self.patience);
         let ready = settle::forget(known, &mut talk);
         drop(talk);
-        let from = link.noted.len();
+        link.noted.begin_fresh();
         if ready.is_ok() {
             let mut talk = Talk::new(Box::new(&mut link), self.patience);
             // What came before an error counts.
             let _came = settle::converse(known, &mut talk);
         }
-        link.noted.came(from)
+        link.noted.came()
     }
 
     /// A bench of simulated slaves behind the gate of the rig. They were asked as when a rig is opened.
@@ -553,7 +549,7 @@ impl Player {
                 Outcome::not_ready(Verdict::Inconclusive, Unready::Differs, remark)
             }
         };
-        let came = observed.noted.came(observed.noted.fresh);
+        let came = observed.noted.came();
         let denied = match link.trouble() {
             Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
             _ => None,

@@ -79,7 +79,7 @@ impl AttemptShown {
                 (None, Some((outcome.verdict, place)))
             }
         };
-        let came = link.noted.came(0);
+        let came = link.noted.all();
         let mut telegrams: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (head, contents) in came.telegrams().iter().filter(|_| !exact).map(meaning) {
             let own = telegrams.entry(head).or_default();
@@ -269,7 +269,7 @@ impl Player {
             exact,
             verdict: Verdict::Skipped,
             accuses: false,
-            telegrams: link.noted.came(0).telegrams().len(),
+            telegrams: link.noted.all().telegrams().len(),
         });
     }
 }
