@@ -6,10 +6,11 @@ use crate::guard::{Guarded, Safe, SafeStep, Standstill};
 use crate::link::Line;
 use harness_proto::nordac::master::ExchangeError;
 use harness_proto::nordac::words::{State, stw, zsw};
-use harness_proto::nordac::{Image, PpoType};
-use harness_proto::profibus::dp::{Diagnosis, GlobalControl};
-use harness_proto::profibus::fdl::{FrameControl, Function, MAX_TELEGRAM, SD1, SD2, SD3, Sequence};
-use harness_proto::profibus::{Pdu, Telegram};
+use harness_proto::nordac::{IDENT, Image, PpoType};
+use harness_proto::profibus::Telegram;
+use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service, SetPrm};
+use harness_proto::profibus::fdl::{MAX_TELEGRAM, SD1, SD2, SD3};
+use harness_proto::profibus::master::Requests;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 
@@ -26,24 +27,36 @@ const LAGGING: u32 = 22;
 /// The bits of ZSW that show an output: ready, ready for operation, enabled.
 const OUTPUT: u16 = zsw::READY_TO_START | zsw::READY | zsw::ENABLED;
 
-/// The telegrams that stop every motor without waiting for anything: for a watchdog. Each is new to its slave, whatever it was sent last. A
-/// slave of an unknown PPO type is sent the words of each; it takes those of its own.
+/// The telegrams that stop every motor without waiting for anything: for a watchdog. Each is new to its slave, whatever it was sent last.
+///
+/// A slave that still exchanges data takes the first words. One whose own DP watchdog has expired before is in Wait_Prm and refuses them, while
+/// its motor goes on running (2.6): each slave is therefore taken into the exchange again, and is sent the words once more. A slave of an unknown
+/// PPO type refuses every configuration but its own.
 #[must_use]
 pub fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
-    let telegram = |address, ppo: PpoType| {
-        let control = FrameControl::request(Function::SrdHigh, Sequence::First);
-        let pdu = Pdu::new(address, MASTER, control, &safe_image().encode(ppo)).ok()?;
+    let telegram = |address, service: Service, data: &[u8]| {
+        let mut first = Requests::new(MASTER, address).ok()?;
+        let pdu = first.request(service, data).ok()?;
         Some(Telegram::Pdu(pdu).encode().to_vec())
     };
-    let words = |slave: &RigSlave| {
-        let known = slave.ppo.map_or(PpoType::ALL.to_vec(), |ppo| vec![ppo]);
+    let words = |address, ppo| telegram(address, Service::DataExchange, &safe_image().encode(ppo));
+    let at_once = slaves.iter().filter_map(|own| words(own.address, own.ppo?));
+    let again = slaves.iter().flat_map(|slave| {
         let address = slave.address;
-        let telegrams = known
-            .into_iter()
-            .filter_map(move |ppo| telegram(address, ppo));
-        telegrams.collect::<Vec<_>>()
-    };
-    slaves.iter().flat_map(words).collect()
+        let known = slave.ppo.map_or(PpoType::ALL.to_vec(), |ppo| vec![ppo]);
+        known.into_iter().flat_map(move |ppo| {
+            let mut parameters = SetPrm::lock(IDENT);
+            parameters.status |= SetPrm::WATCHDOG;
+            parameters.watchdog = WATCHDOG;
+            let parameters = parameters.encode().unwrap_or_default();
+            [
+                telegram(address, Service::SetPrm, &parameters),
+                telegram(address, Service::ChkCfg, ppo.cfg()),
+                words(address, ppo),
+            ]
+        })
+    });
+    at_once.chain(again.flatten()).collect()
 }
 
 fn image(word: u16) -> Image {
@@ -238,7 +251,8 @@ mod tests {
     use harness_proto::nordac::guard::{GuardedSlave, Limits};
     use harness_proto::nordac::pkw::Index;
     use harness_proto::nordac::properties::PROPERTIES;
-    use harness_proto::profibus::BusRate;
+    use harness_proto::profibus::fdl::{FrameControl, Function, Sequence};
+    use harness_proto::profibus::{BusRate, Pdu};
 
     const PATIENCE: Span = Span::from_millis(5);
 
@@ -444,18 +458,34 @@ mod tests {
         assert!(safe.confirmed, "{safe}");
     }
 
+    /// In the exchange, and in Wait_Prm after the DP watchdog of the slaves; with PPO types that are known, and with those that are not.
     #[test]
     fn last_words_switch_every_output_off() {
-        let (mut line, slaves) = line(
-            vec![slave(8, PpoType::One), slave(9, PpoType::Four)],
-            Limits::unlimited(),
-        );
-        run(&mut line, &slaves);
-        for telegram in last_words(&slaves) {
-            line.send_octets(0, &telegram);
-            let end = line.now() + PATIENCE;
-            while line.now() < end && line.wait(end) {}
+        for (waits, known) in [(0, true), (0, false), (5_000, true), (5_000, false)] {
+            let all = PpoType::ALL.into_iter().zip(8..);
+            let all = all.map(|(ppo, address)| slave(address, ppo)).collect();
+            let (mut line, mut slaves) = line(all, Limits::unlimited());
+            run(&mut line, &slaves);
+            let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
+            for slave in &slaves {
+                let ppo = slave.ppo.expect("known");
+                let started = talk.start(slave.address, ppo, Some(WATCHDOG));
+                started.expect("starts");
+            }
+            talk.pass(Span::from_millis(waits)).expect("sound");
+            drop(talk);
+            assert!(slaves.iter().all(|own| is_on(&line, own.address)));
+            if !known {
+                slaves.iter_mut().for_each(|own| own.ppo = None);
+            }
+            for telegram in last_words(&slaves) {
+                line.send_octets(0, &telegram);
+                let end = line.now() + PATIENCE;
+                while line.now() < end && line.wait(end) {}
+            }
+            for slave in &slaves {
+                assert!(!is_on(&line, slave.address), "{waits} {known} {slave:?}");
+            }
         }
-        assert!(!is_on(&line, 8) && !is_on(&line, 9));
     }
 }

@@ -29,8 +29,8 @@ pub(crate) const TOLERANCE: Span = SLACK;
 /// Octets of the longest reply of an inverter: a Data_Exchange with PPO2.
 const LONGEST_REPLY: u64 = 29;
 
-/// How long the line is left alone before each telegram that a watchdog sends: the reply to the one before has passed.
-const LAST_WORDS_GAP: time::Duration = time::Duration::from_millis(60);
+/// How long the line is left alone before each telegram that a watchdog sends: the one before and its reply have passed, at 9600 bit/s too.
+const LAST_WORDS_GAP: time::Duration = time::Duration::from_millis(100);
 
 /// The request that is under way, and its reply.
 #[derive(Debug)]
