@@ -51,7 +51,6 @@ hears! {
     "short-set-prm" "EN 2" "Set_Prm is accepted without its group." |_, p| {
         if p.is(Service::SetPrm) && p.data.len() == 6 { p.data.push(0); }
     };
-    "user-data-ignored" "EN 2" "Set_Prm is accepted with user data." |_, p| p.prm(|data| data.truncate(7));
     "watchdog-factor-0" "EN 2" "A watchdog factor of 0 counts as 1." |_, p| p.prm(|data| {
         data[1] = data[1].max(1);
         data[2] = data[2].max(1);
@@ -138,9 +137,6 @@ hears! {
     "setpoint-bit-ignored" "3.2.1" "Bit 6 of the control word is ignored." |s, p| p.control_word(s.ppo(), |word| word | stw::SETPOINT);
     "never-acknowledges" "3.2.1" "Bit 7 of the control word is ignored." |s, p| p.control_word(s.ppo(), |word| word & !stw::ACKNOWLEDGE);
     "always-clockwise" "3.2.1" "Bit 12 of the control word is ignored." |s, p| p.control_word(s.ppo(), |word| word & !stw::ANTICLOCKWISE);
-    "anticlockwise-wins" "3.2.1" "With bits 11 and 12 the setpoint is inverted." |s, p| p.control_word(s.ppo(), |word| {
-        if word & stw::ANTICLOCKWISE != 0 { word & !stw::CLOCKWISE } else { word }
-    });
     "one-parameter-set" "3.2.1" "Bits 14 and 15 of the control word are ignored." |s, p| p.control_word(s.ppo(), |word| word & 0x3FFF);
     "set-bits-exchanged" "3.2.1" "Bits 14 and 15 of the control word are exchanged." |s, p| p.control_word(s.ppo(), |word| {
         word & 0x3FFF | word >> 1 & 0x4000 | word << 1 & 0x8000
