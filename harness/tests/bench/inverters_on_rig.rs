@@ -111,7 +111,7 @@ fn what_a_scenario_needs_follows_from_its_telegrams() {
 /// An edit of any line or file is found: the inverters are simulated, so that the run can be played again.
 #[test]
 fn edited_evidence_is_found() {
-    edits::check_each(&edits::of(edited(), false), 12);
+    edits::check_each(&edits::of(edited(), false), 24);
 }
 
 #[test]

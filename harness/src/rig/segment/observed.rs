@@ -17,6 +17,11 @@ pub(crate) trait LinkNotes: Default + Send {
 
     /// A conversation begins.
     fn begin(&mut self);
+
+    /// Why nothing more is worth noting; `None` while something is.
+    fn ended(&self) -> Option<&Trouble> {
+        None
+    }
 }
 
 /// A link to drives, observed.
@@ -183,7 +188,7 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
     }
 
     fn trouble(&self) -> Option<&Trouble> {
-        self.link.trouble()
+        self.noted.ended().or_else(|| self.link.trouble())
     }
 
     fn pause_due(&self) -> Option<Instant> {

@@ -2,6 +2,7 @@
 
 use crate::medium::{Heard, Medium, Out};
 use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
+use crate::trouble::Trouble;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::{Image, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::Service;
@@ -35,7 +36,20 @@ pub(super) struct TelegramNotes {
     /// When the last octet came or the last telegram had left, in this conversation.
     last: Option<Instant>,
     /// How many octets had come at the last [`begin_fresh`](Self::begin_fresh).
-    fresh: usize,
+    pub(super) fresh: usize,
+    /// What others sent in the place of what counts here.
+    expected: Option<Expected>,
+    /// That something else came.
+    differs: Option<Trouble>,
+}
+
+/// Octets with which those of a model are compared as they come.
+struct Expected {
+    came: Came,
+    /// How many octets came before them.
+    behind: usize,
+    /// Whether their times count.
+    timed: bool,
 }
 
 /// An octet from a slave, and its place in the conversation.
@@ -47,6 +61,17 @@ struct CameOctet {
     gap: Span,
     /// The octet, and in bit 8 whether it has a line error.
     bits: u16,
+}
+
+impl CameOctet {
+    /// The same octet, whenever it came.
+    const fn at_any_time(self) -> Self {
+        Self {
+            sent: 0,
+            gap: Span::ZERO,
+            ..self
+        }
+    }
 }
 
 /// Octets from the slaves, in order.
@@ -62,9 +87,7 @@ pub(super) const WHOLE: Agreement = Agreement::MAX;
 impl Came {
     /// The same octets, whenever they came.
     pub(super) fn at_any_time(mut self) -> Self {
-        for own in &mut self.0 {
-            (own.sent, own.gap) = (0, Span::ZERO);
-        }
+        self.0.iter_mut().for_each(|own| *own = own.at_any_time());
         self
     }
 
@@ -106,6 +129,33 @@ impl TelegramNotes {
         self.fresh = self.kept.len();
         self.sent = 0;
         self.last = None;
+    }
+
+    /// The link ends with the first octet behind the first `behind` ones that is not that of `came`: how far they agree is known then.
+    pub(super) fn expect(&mut self, came: &Came, behind: usize, timed: bool) {
+        self.expected = Some(Expected {
+            came: came.clone(),
+            behind,
+            timed,
+        });
+    }
+
+    /// Compares the octet that came last with what is expected.
+    fn compare(&mut self) {
+        let Some(expected) = &self.expected else {
+            return;
+        };
+        let place = (self.kept.len() - 1).checked_sub(expected.behind);
+        let Some((place, own)) = place.zip(self.kept.last()) else {
+            return;
+        };
+        let own = match expected.timed {
+            true => *own,
+            false => own.at_any_time(),
+        };
+        if expected.came.0.get(place) != Some(&own) {
+            self.differs = Some(Trouble::Interrupted);
+        }
     }
 
     /// How many octets are kept.
@@ -167,6 +217,7 @@ impl LinkNotes for TelegramNotes {
                 gap,
                 bits: u16::from(octet.byte) | error,
             });
+            self.compare();
         }
         self.heard.pieces += 1;
         let bits = u32::from(octet.byte) | u32::from(octet.error.is_some()) << 8;
@@ -179,6 +230,10 @@ impl LinkNotes for TelegramNotes {
             self.longest = self.longest.max(took);
             self.asked = None;
         }
+    }
+
+    fn ended(&self) -> Option<&Trouble> {
+        self.differs.as_ref()
     }
 
     fn begin(&mut self) {

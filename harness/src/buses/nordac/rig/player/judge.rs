@@ -108,6 +108,7 @@ impl Player {
                 properties: Some(all),
                 slow: None,
                 switches: left.switches,
+                came: Some(&left.came),
             };
             self.rehearse(own, &self.limits, other).came
         };

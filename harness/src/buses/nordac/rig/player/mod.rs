@@ -79,6 +79,8 @@ struct Other<'o> {
     slow: Option<Slow>,
     /// Whether the settings of the bus are switched to those of the scenario.
     switches: bool,
+    /// What came from the slaves, where the model is played up to the first difference from it.
+    came: Option<&'o Came>,
 }
 
 /// A scenario played on the model.
@@ -374,7 +376,9 @@ impl Player {
         let came = |came: Came| if exact { came } else { came.at_any_time() };
         for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
             let seen = came(seen);
-            let settled = settle::settle(|own| came(self.conversed(known, own)).agrees(&seen));
+            let settled = settle::settle(|own| {
+                came(self.conversed(known, own, (&seen, exact))).agrees(&seen)
+            });
             match settled {
                 Some(settled) => (known.properties, known.open) = settled,
                 // Every value of every point stays open.
@@ -410,14 +414,16 @@ impl Player {
         Ok(link.noted.came())
     }
 
-    /// What comes from a model of a slave in the conversation that settles what the manual leaves open.
-    fn conversed(&self, known: &Known, properties: Properties) -> Came {
+    /// What comes from a model of a slave in the conversation that settles what the manual leaves open, up to the first octet that was not
+    /// `seen`, its time included or not.
+    fn conversed(&self, known: &Known, properties: Properties, seen: (&Came, bool)) -> Came {
         let mut link = self.model(vec![known.model(properties)], &self.limits);
         let mut link = Observed::new(&mut link);
         let mut talk = Talk::new(Box::new(&mut link), self.patience);
         let ready = settle::forget(known, &mut talk);
         drop(talk);
         link.noted.begin_fresh();
+        link.noted.expect(seen.0, link.noted.fresh, seen.1);
         if ready.is_ok() {
             let mut talk = Talk::new(Box::new(&mut link), self.patience);
             // What came before an error counts.
@@ -541,6 +547,9 @@ impl Player {
             Ok(()) => {
                 observed.begin();
                 observed = observed.slowed(other.slow);
+                if let Some(came) = other.came {
+                    observed.noted.expect(came, observed.noted.fresh, true);
+                }
                 play(&own.plan, &mut observed, AtMismatch::Stop)
             }
             Err(TalkError::Line(trouble)) => Outcome::trouble(&trouble),

@@ -231,6 +231,9 @@ impl AttemptNote {
         let mut recording = Recording::new(&mut link, &mut forgotten);
         recording.begin();
         let mut link = Observed::new(&mut recording);
+        if self.exact {
+            link.noted.expect(&self.shown.came, 0, true);
+        }
         let gone = match self.was_tried() {
             true => player.go(&self.own, &mut link, Some(self.switches)).0,
             false => match player.learn(&mut link, false) {
