@@ -242,3 +242,58 @@ impl LinkNotes for TelegramNotes {
         self.reply.clear();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Came, TelegramNotes, WHOLE};
+    use crate::medium::{Heard, Medium};
+    use crate::rig::segment::observed::LinkNotes;
+    use harness_proto::line::Received;
+    use harness_proto::profibus::BusRate;
+    use harness_proto::time::{Instant, Span};
+    use proptest::prelude::*;
+
+    /// Notes octets at their times in ms, until the link ends.
+    fn noted(octets: &[(u64, u8)], expected: Option<(&Came, bool)>) -> TelegramNotes {
+        let mut notes = TelegramNotes::default();
+        if let Some((came, timed)) = expected {
+            notes.expect(came, 0, timed);
+        }
+        let medium = Medium::Octets(BusRate::K500.format());
+        let mut at = Instant::default();
+        for (gap, octet) in octets {
+            if notes.ended().is_some() {
+                break;
+            }
+            at += Span::from_millis(*gap);
+            notes.heard(medium, at, at, Heard::Octet(Received::good(*octet)));
+        }
+        notes
+    }
+
+    fn octets() -> impl Strategy<Value = Vec<(u64, u8)>> {
+        prop::collection::vec((0..2_u64, 0..3_u8), 0..8)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// A link that ends with the first octet that was not expected shows how far all octets agree.
+        #[test]
+        fn an_end_at_the_first_difference_changes_no_agreement(
+            seen in octets(),
+            sent in octets(),
+            timed: bool,
+        ) {
+            let came = |notes: &TelegramNotes| match timed {
+                true => notes.came(),
+                false => notes.came().at_any_time(),
+            };
+            let expected = came(&noted(&seen, None));
+            let whole = came(&noted(&sent, None)).agrees(&expected);
+            let cut = noted(&sent, Some((&expected, timed)));
+            prop_assert_eq!(came(&cut).agrees(&expected), whole);
+            prop_assert!(cut.ended().is_none() || whole != WHOLE);
+        }
+    }
+}
