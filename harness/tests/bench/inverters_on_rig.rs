@@ -30,18 +30,29 @@ fn run(desk: &Desk, more: &[&str]) -> Output {
 /// Right inverters that differ from the model in a point that the manual leaves open, in the scenarios of the process words.
 #[test]
 fn no_right_inverter_is_accused() {
-    for line in [
+    not_accused(&[
         "property pzd-invalid = stop",
+        "property pzd-latency = 3",
+        "parameter 1202 = 1s",
+    ]);
+}
+
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn no_other_right_inverter_is_accused() {
+    not_accused(&[
         "property bit4-ramp = at-once",
         "property off1-zsw-while-ramping = 3",
         "property zsw8 = only-when-enabled",
         "property zsw11-at-rest = 0",
-        "property pzd-latency = 3",
         "property initial-zsw-4-5 = 0",
         "parameter 1205 = 50.0Hz",
-        "parameter 1202 = 1s",
         "parameter 1625 = 1s",
-    ] {
+    ]);
+}
+
+fn not_accused(lines: &[&str]) {
+    for line in lines {
         let output = run(&desk(line, ALL), &["--filter", "nordac-3.2.1-bit"]);
         let code = output.status.code();
         assert!(matches!(code, Some(0 | 5)), "{line}: {}", said(&output));
@@ -125,7 +136,7 @@ fn what_a_scenario_needs_follows_from_its_telegrams() {
 /// An edit of any line or file is found: the inverters are simulated, so that the run can be played again.
 #[test]
 fn edited_evidence_is_found() {
-    edits::check_each(&edits::of(edited(), false), 24);
+    edits::check_each(&edits::of(edited(), false), 48);
 }
 
 #[test]

@@ -282,7 +282,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
 
 #[test]
 fn some_planted_in_turn() {
-    planted_in_turn(SOME, 7, 1);
+    planted_in_turn(SOME, 3, 1);
 }
 
 #[test]
@@ -292,7 +292,7 @@ fn all_planted_in_turn() {
 }
 
 /// An ordinary run plants every `SOME`-th deviation, the nightly run plants all of them.
-const SOME: usize = 4;
+const SOME: usize = 8;
 
 /// Plants every `step`-th deviation, each in the next drive in turn. No other drive may be blamed. The planted drive is blamed where only
 /// its own answers differ, as for a deviation without a name. At least `named` deviations must be named, and `culprits` drives blamed.
@@ -488,12 +488,12 @@ fn a_follower_that_adds_nothing_is_told_from_the_drive_behind_it() {
 #[test]
 fn other_numbers() {
     let mut ends = BTreeMap::new();
-    for (planted, drive) in relatives().step_by(5).zip((0..DRIVES).cycle()) {
+    for (planted, drive) in relatives().step_by(10).zip((0..DRIVES).cycle()) {
         let (end, _) = end(planted, Some(drive));
         *ends.entry(end).or_insert(0) += 1;
     }
     let count = |end| ends.get(&end).copied().unwrap_or(0);
-    assert!(count(End::Alone) + count(End::AmongOthers) >= 6, "{ends:?}");
+    assert!(count(End::Alone) + count(End::AmongOthers) >= 3, "{ends:?}");
 }
 
 #[test]
