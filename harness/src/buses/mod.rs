@@ -7,6 +7,8 @@ pub mod nordac;
 pub mod novobus;
 pub(crate) mod port_row;
 #[cfg(test)]
+mod tape_tests;
+#[cfg(test)]
 mod toy;
 pub mod unitek;
 
@@ -78,7 +80,7 @@ use harness_proto::line::{Format, Rate};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
-use harness_sim::record::{Carried, Trace};
+use harness_sim::record::{Carried, LineByte, Trace};
 use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -364,6 +366,21 @@ pub(crate) fn write_shared(
     report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
+/// The telegrams of a shared line of octets, each with the slave that sent it; `None` is a master.
+pub(crate) fn telegrams(traces: &[Trace]) -> Vec<(Option<u8>, Vec<LineByte>)> {
+    let all = traces.iter().flat_map(nordac::report::telegrams_of);
+    all.map(|own| (own.from, own.octets)).collect()
+}
+
+/// The built-in scenario that shows a bus at work.
+pub(crate) const fn shown(bus: Bus) -> &'static str {
+    match bus {
+        Bus::Novobus => "9.8-check-sequence",
+        Bus::Unitek => "unitek-ex-11-speed-routine",
+        Bus::Nordac => "nordac-3.3-start-up",
+    }
+}
+
 /// The bit rate of octets on a shared line, by their times; the usual one where they do not show it.
 pub(crate) fn bits_per_second(traces: &[Trace]) -> u32 {
     let rate = traces.iter().find_map(nordac::report::pcapng::rate);
@@ -512,6 +529,11 @@ pub(crate) fn serve_frames(
         }
         Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
     }
+}
+
+/// Whether a bus carries frames.
+pub(crate) const fn carries_frames(bus: Bus) -> bool {
+    matches!(bus, Bus::Unitek)
 }
 
 /// Whether the stations of a bus share a line of octets.

@@ -18,6 +18,7 @@ pub(crate) mod live;
 mod pcap;
 mod pcapng;
 mod recorder;
+mod tape;
 mod telegrams;
 
 pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
@@ -26,6 +27,7 @@ pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
 pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
+pub(crate) use tape::{Tape, later};
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};

@@ -8,17 +8,17 @@ use super::capture::{listen_into, taps_of};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use crate::capture::{Carries, LiveRecorder, Piece, RecordedPlace};
+use crate::buses::{Bus, carries_frames, shown};
+use crate::capture::{LiveRecorder, Tape, later};
 use crate::library::{Entry, sources};
-use crate::report::pcapng::{LINK_TYPE, name};
+use crate::report::pcapng::LINK_TYPE;
 use crate::report::pcapng_frames;
-use crate::report::walk::in_time;
 use crate::rig::find::{self, find};
 use crate::scenario::run::AtMismatch;
 use crate::signals;
 use clap::{Args, Subcommand};
+use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::record::{Channel, LineByte, Trace};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io;
@@ -29,11 +29,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// The name of the link to this program in Wireshark's folder.
 pub(crate) const PROGRAM: &str = "drivebench-extcap";
-/// The interface of a simulated ring, and what stands in front of a rig's name.
+/// The interface of a simulated ring, in front of the name of another bus, and what stands in front of a rig's name.
 const SIMULATED: &str = "drivebench-sim";
 const RIG: &str = "drivebench-rig-";
-/// What a simulated ring plays by default, and the pause behind it.
-const SCENARIO: &str = "9.8-check-sequence";
+/// The pause behind a scenario.
 const PAUSE: Duration = Duration::from_secs(1);
 /// How often what has happened is written.
 const TICK: Duration = Duration::from_millis(5);
@@ -72,8 +71,8 @@ pub struct ExtcapArguments {
     #[arg(long, default_value = "sim:3")]
     rig: String,
     /// What it plays, again and again: a scenario's name or file.
-    #[arg(long, default_value = SCENARIO)]
-    scenario: PathBuf,
+    #[arg(long)]
+    scenario: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -92,7 +91,7 @@ pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Re
         return install(folder.as_deref(), output);
     }
     let interface = arguments.extcap_interface.as_deref();
-    let known = |own: &str| own == SIMULATED || own.starts_with(RIG);
+    let known = |own: &str| simulated_bus(own).is_some() || own.starts_with(RIG);
     match interface {
         _ if arguments.extcap_interfaces => output.result(&interfaces())?,
         Some(own) if !known(own) => {
@@ -102,7 +101,7 @@ pub(crate) fn extcap(arguments: &ExtcapArguments, output: &mut Output) -> io::Re
             return Ok(Exit::Usage);
         }
         Some(own) if arguments.extcap_dlts => output.result(&link_types(own))?,
-        Some(own) if arguments.extcap_config => output.result(config(own))?,
+        Some(own) if arguments.extcap_config => output.result(&config(own))?,
         Some(own) if arguments.capture => return capture(own, arguments, output),
         _ => {
             output.complain(
@@ -121,17 +120,40 @@ fn field(text: &str) -> String {
         .collect()
 }
 
-/// The interfaces: a simulated ring, and each rig with taps. A rig's file with mistakes is left out; `drivebench rig list` shows them.
+/// The interface of a simulated bench.
+fn simulated_interface(bus: Bus) -> String {
+    match bus == Bus::DEFAULT {
+        true => SIMULATED.to_owned(),
+        false => format!("{SIMULATED}-{}", bus.name()),
+    }
+}
+
+/// The bus of a simulated interface.
+fn simulated_bus(interface: &str) -> Option<Bus> {
+    let mut all = Bus::NAMES.into_iter().map(|(_, bus)| bus);
+    all.find(|bus| simulated_interface(*bus) == interface)
+}
+
+/// The interfaces: a simulated bench a bus, and each rig with taps. A rig's file with mistakes is left out; `drivebench rig list` shows them.
 fn interfaces() -> String {
     let version = env!("CARGO_PKG_VERSION");
-    let mut text = format!(
-        "extcap {{version={version}}}{{display=drivebench}}\ninterface {{value={SIMULATED}}}{{display=drivebench: simulated ring}}\n"
-    );
+    let mut text = format!("extcap {{version={version}}}{{display=drivebench}}\n");
+    for (name, bus) in Bus::NAMES {
+        let value = simulated_interface(bus);
+        let what = match bus == Bus::DEFAULT {
+            true => "simulated ring".to_owned(),
+            false => format!("simulated {name}"),
+        };
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(
+            text,
+            "interface {{value={value}}}{{display=drivebench: {what}}}"
+        );
+    }
     for (name, place) in find::all(&find::folder()) {
         let rig = place.source().ok().and_then(|own| find::read(&own).ok());
         if rig.is_some_and(|own| taps_of(&own).is_ok()) {
             let name = field(&name);
-            // Writing to a String cannot fail.
             let _infallible = writeln!(
                 text,
                 "interface {{value={RIG}{name}}}{{display=drivebench: taps of {name}}}"
@@ -141,11 +163,12 @@ fn interfaces() -> String {
     text
 }
 
-/// The link type of an interface: that of frames, where a rig has a CAN adapter.
+/// The link type of an interface: that of frames, where a bus has frames or a rig has a CAN adapter.
 fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
     let rig = rig.and_then(|name| find(name, &find::folder()).ok());
-    let frames = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
+    let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
+    let frames = adapter || simulated_bus(interface).is_some_and(carries_frames);
     let (number, name, display) = match frames {
         true => (pcapng_frames::LINK_TYPE, "CAN_SOCKETCAN", "CAN frames"),
         false => (LINK_TYPE, "RTAC_SERIAL", "Serial lines"),
@@ -154,14 +177,16 @@ fn link_types(interface: &str) -> String {
 }
 
 /// The options of an interface.
-fn config(interface: &str) -> &'static str {
-    match interface {
-        SIMULATED => {
-            "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n\
-             arg {number=1}{call=--scenario}{display=Scenario}{type=string}{default=9.8-check-sequence}{tooltip=drivebench list names them}\n"
-        }
-        _ => "",
-    }
+fn config(interface: &str) -> String {
+    let Some(bus) = simulated_bus(interface) else {
+        return String::new();
+    };
+    let rig = "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n";
+    let rig = if bus == Bus::DEFAULT { rig } else { "" };
+    format!(
+        "{rig}arg {{number=1}}{{call=--scenario}}{{display=Scenario}}{{type=string}}{{default={}}}{{tooltip=drivebench list names them}}\n",
+        shown(bus)
+    )
 }
 
 /// Writes what an interface carries into the pipe.
@@ -183,7 +208,7 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
             .map_err(|error| error.to_string())
             .and_then(|rig| taps_of(&rig))
             .and_then(|(taps, line, in_band)| listen_into(fifo, taps, line, in_band)),
-        None => simulated(arguments).and_then(|(traces, rate)| play_into(&pipe, &traces, rate)),
+        None => simulated(interface, arguments).and_then(|tape| play_into(&pipe, &tape)),
     };
     match done {
         Ok(()) => Ok(Exit::Passed),
@@ -194,53 +219,49 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
     }
 }
 
-/// What a simulated ring carries.
-fn simulated(
-    arguments: &ExtcapArguments,
-) -> Result<(Vec<Trace>, harness_proto::line::Rate), String> {
-    let rig = &arguments.rig;
-    let drives = rig
-        .strip_prefix("sim:")
-        .and_then(|own| own.parse::<u8>().ok());
-    let drives = drives.ok_or_else(|| {
-        format!("`{rig}` is no simulated ring: sim:N is expected; rigs with taps are interfaces of their own")
-    })?;
-    let name = arguments.scenario.display();
-    let found =
-        sources(std::slice::from_ref(&arguments.scenario)).map_err(|error| error.to_string())?;
+/// What a simulated bench carries.
+fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, String> {
+    let bus = simulated_bus(interface).unwrap_or(Bus::DEFAULT);
+    let scenario = arguments.scenario.clone();
+    let scenario = scenario.unwrap_or_else(|| PathBuf::from(shown(bus)));
+    let name = scenario.display();
+    let found = sources(std::slice::from_ref(&scenario)).map_err(|error| error.to_string())?;
     let [source] =
         <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
-    let entry = Entry::fitting(source, Some(drives)).map_err(|problems| problems.to_string())?;
-    let Some(plan) = &entry.plan else {
-        return Err(format!("{name}: scenarios of rings only are played live"));
+    let drives = match bus == Bus::DEFAULT {
+        true => Some(ring(&arguments.rig)?),
+        false => None,
     };
-    let rate = plan.rate;
-    Ok((play_entry(&entry, AtMismatch::GoOn).traces, rate))
+    let entry = Entry::fitting(source, drives).map_err(|problems| problems.to_string())?;
+    if entry.scenario.bus != bus {
+        return Err(format!(
+            "{name}: it is a scenario of {}; the interface of that bus is {}",
+            entry.scenario.bus.name(),
+            simulated_interface(entry.scenario.bus)
+        ));
+    }
+    let rate = entry.plan.as_ref().map_or(Rate::default(), |own| own.rate);
+    Ok(Tape::of(&play_entry(&entry, AtMismatch::GoOn).traces, rate))
 }
 
-/// Writes traces into a pipe at the pace of their times, again and again, until the reader closes it or a signal comes.
-fn play_into(pipe: &File, traces: &[Trace], rate: harness_proto::line::Rate) -> Result<(), String> {
+/// The number of drives of a simulated ring.
+fn ring(rig: &str) -> Result<u8, String> {
+    let drives = rig.strip_prefix("sim:");
+    drives.and_then(|own| own.parse::<u8>().ok()).ok_or_else(|| {
+        format!("`{rig}` is no simulated ring: sim:N is expected; rigs with taps are interfaces of their own")
+    })
+}
+
+/// Writes a tape into a pipe at the pace of its times, again and again, until the reader closes it or a signal comes.
+fn play_into(pipe: &File, tape: &Tape) -> Result<(), String> {
     let stop = signals::interrupt_flag();
-    let numbered = traces.iter().enumerate();
-    let names =
-        numbered.flat_map(|(ring, own)| own.channels.iter().map(move |link| name(ring, link)));
-    let places = names.map(|name| RecordedPlace {
-        name,
-        carries: Carries::Link,
-        bits_per_second: rate.bits_per_second(),
-    });
-    let places: Vec<_> = places.collect();
-    let all: Vec<Channel> = traces
-        .iter()
-        .flat_map(|own| own.channels.iter().cloned())
-        .collect();
     let failed = |error: &io::Error| format!("failed to write to the pipe: {error}");
-    let mut recorder = match LiveRecorder::start(pipe, &places) {
+    let mut recorder = match LiveRecorder::start(pipe, &tape.places) {
         Ok(own) => own,
         Err(error) => return closed(&error).ok_or_else(|| failed(&error)),
     };
     while !stop.load(Ordering::Relaxed) {
-        if let Err(error) = once(&mut recorder, &all, &stop) {
+        if let Err(error) = once(&mut recorder, tape, &stop) {
             return closed(&error).ok_or_else(|| failed(&error));
         }
         wait(PAUSE, &stop);
@@ -260,18 +281,13 @@ fn wait(time: Duration, stop: &AtomicBool) {
     }
 }
 
-/// Writes a trace once, at its pace.
-fn once(
-    recorder: &mut LiveRecorder<&File>,
-    links: &[Channel],
-    stop: &AtomicBool,
-) -> io::Result<()> {
+/// Writes a tape once, at its pace.
+fn once(recorder: &mut LiveRecorder<&File>, tape: &Tape, stop: &AtomicBool) -> io::Result<()> {
     let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     let wall = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or(0);
     let began = Instant::now();
-    for (place, index) in in_time(links) {
-        let byte = links[place].octets()[index];
-        let due = Duration::from_nanos(byte.at.since_start().as_nanos());
+    for (at, place, piece) in &tape.pieces {
+        let due = Duration::from_nanos(at.since_start().as_nanos());
         if due > began.elapsed() {
             recorder.flush()?;
             wait(due.saturating_sub(began.elapsed()), stop);
@@ -279,8 +295,7 @@ fn once(
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let at = byte.at + Span::from_nanos(wall);
-        recorder.piece(place, &Piece::Octet(LineByte { at, ..byte }))?;
+        recorder.piece(*place, &later(piece, Span::from_nanos(wall)))?;
     }
     recorder.flush()
 }

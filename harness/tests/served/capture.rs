@@ -425,6 +425,26 @@ fn wireshark_is_answered() {
         0,
         "{call=--rig}{display=Rig}{type=string}{default=sim:3}",
     );
+    for (bus, number, scenario) in [
+        ("unitek", 227, "unitek-ex-11-speed-routine"),
+        ("nordac", 250, "nordac-3.3-start-up"),
+    ] {
+        let name = format!("drivebench-sim-{bus}");
+        let interface =
+            format!("interface {{value={name}}}{{display=drivebench: simulated {bus}}}\n");
+        ended(&listed, 0, &interface);
+        let own = |what: &str| desk.run(&["extcap", "--extcap-interface", &name, what]);
+        ended(
+            &own("--extcap-dlts"),
+            0,
+            &format!("dlt {{number={number}}}"),
+        );
+        ended(
+            &own("--extcap-config"),
+            0,
+            &format!("{{default={scenario}}}"),
+        );
+    }
     let unknown = desk.run(&["extcap", "--extcap-interface", "eth0", "--extcap-dlts"]);
     ended(&unknown, 2, "there is no interface `eth0`");
     let pipe = desk.path("pipe");
@@ -434,6 +454,52 @@ fn wireshark_is_answered() {
     ]
     .concat();
     ended(&desk.run(&wrong), 3, "`sim:x` is no simulated ring");
+    let other = [
+        &own[..],
+        &["--capture", "--fifo", name(&pipe)],
+        &["--scenario", "nordac-3.3-start-up"],
+    ]
+    .concat();
+    let words = "it is a scenario of nordac; the interface of that bus is drivebench-sim-nordac";
+    ended(&desk.run(&other), 3, words);
+}
+
+/// A simulated bench of each other bus is captured live; what is captured is the bus's own and is judged.
+#[test]
+fn every_bus_is_captured_by_extcap() {
+    for (bus, scenario, pieces) in [
+        ("unitek", "unitek-3.1-rate-250", "frame"),
+        ("nordac", "nordac-3.3-start-up", "telegram"),
+    ] {
+        let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
+        let pipe = desk.path("pipe");
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).expect("a pipe");
+        let interface = format!("drivebench-sim-{bus}");
+        let mut command = desk.command(&["extcap", "--extcap-interface", &interface]);
+        command.args(["--capture", "--scenario", scenario, "--fifo"]);
+        let child = command.arg(&pipe).spawn().expect("the program");
+        let mut reader = std::fs::File::open(&pipe).expect("a pipe");
+        let mut kept = vec![0; 600];
+        reader.read_exact(&mut kept).expect("packets");
+        drop(reader);
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        // The last block is cut off.
+        let length = |at: usize| {
+            let bytes = kept.get(at + 4..at + 8)?;
+            usize::try_from(u32::from_le_bytes(bytes.try_into().ok()?)).ok()
+        };
+        let mut whole = 0;
+        while let Some(next) = length(whole)
+            .map(|own| whole + own)
+            .filter(|own| *own <= kept.len())
+        {
+            whole = next;
+        }
+        std::fs::write(desk.path("live.pcapng"), &kept[..whole]).expect("room");
+        let shown = desk.run(&["import", "live.pcapng"]);
+        assert!(said(&shown).contains(pieces), "{}", said(&shown));
+    }
 }
 
 /// tshark captures a simulated ring live, after `extcap install`.

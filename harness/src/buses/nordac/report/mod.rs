@@ -12,6 +12,7 @@ mod telegrams;
 mod words;
 
 pub use telegrams::TelegramRun;
+pub(crate) use telegrams::runs as telegrams_of;
 pub use telegrams::{Said, said};
 pub(super) use telegrams::{octets, runs};
 pub(super) use words::{CONTROL, PRM};

@@ -95,7 +95,7 @@ const CUT: Span = Span::from_nanos(SYN_OCTETS + 1);
 
 /// The octets of a trace, cut into runs. An octet begins a run where another station has sent before it, where the line was idle for 33 bits,
 /// and where it was idle for at least one octet behind a complete telegram.
-pub(in crate::buses::nordac) fn runs(trace: &Trace) -> Vec<TelegramRun> {
+pub(crate) fn runs(trace: &Trace) -> Vec<TelegramRun> {
     let octets = octets(trace);
     let one = octet_time(octets.iter().map(|(from, own)| (*from, own))).unwrap_or(Span::ZERO);
     let mut all: Vec<TelegramRun> = Vec::new();

@@ -1,0 +1,115 @@
+//! What a run carried, in order of time, so that it is recorded again as if it were heard.
+
+use super::recorder::{Carries, Piece, RecordedPlace};
+use crate::buses::{bits_per_second, carry_frames, share_a_line, telegrams};
+use crate::report::pcapng::name;
+use crate::report::pcapng_frames::rate_of;
+use crate::report::walk::in_time;
+use harness_proto::can::BitRate;
+use harness_proto::line::Rate;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::{Channel, LineByte, LineFrame, Trace};
+
+/// The name of the place at which a bus is heard whose stations share one line.
+const LINE: &str = "bus";
+
+/// What a run carried.
+#[derive(Clone, Debug)]
+pub(crate) struct Tape {
+    /// Where it was heard: each link of a ring, or the line that all stations share.
+    pub(crate) places: Vec<RecordedPlace>,
+    /// When each piece ended, counted from the start of the run, the number of its place, and the piece. In order of time.
+    pub(crate) pieces: Vec<(Instant, usize, Piece)>,
+}
+
+impl Tape {
+    /// What these traces carried; `rate` is that of the rings, where they are of rings.
+    pub(crate) fn of(traces: &[Trace], rate: Rate) -> Self {
+        if carry_frames(traces) {
+            Self::of_frames(traces)
+        } else if share_a_line(traces) {
+            Self::of_telegrams(traces)
+        } else {
+            Self::of_links(traces, rate)
+        }
+    }
+
+    fn of_frames(traces: &[Trace]) -> Self {
+        let channels = traces.iter().flat_map(|own| &own.channels);
+        let frames: Vec<&LineFrame> = channels.flat_map(Channel::frames).collect();
+        let rate: Option<BitRate> = frames.iter().find_map(|own| rate_of(own));
+        let pieces = frames
+            .into_iter()
+            .map(|own| (own.at, 0, Piece::Frame(*own)));
+        let bits = rate.unwrap_or(BitRate::K500).bits_per_second();
+        Self::of_line(Carries::Frames, bits, pieces)
+    }
+
+    fn of_telegrams(traces: &[Trace]) -> Self {
+        let pieces = telegrams(traces).into_iter().filter_map(|(from, octets)| {
+            let at = octets.last()?.at;
+            Some((at, 0, Piece::Telegram(from, octets)))
+        });
+        Self::of_line(Carries::Line, bits_per_second(traces), pieces)
+    }
+
+    fn of_line(
+        carries: Carries,
+        bits_per_second: u32,
+        pieces: impl Iterator<Item = (Instant, usize, Piece)>,
+    ) -> Self {
+        let mut pieces: Vec<_> = pieces.collect();
+        // Equal times stay in their order.
+        pieces.sort_by_key(|(at, ..)| *at);
+        let place = RecordedPlace {
+            name: LINE.to_owned(),
+            carries,
+            bits_per_second,
+        };
+        Self {
+            places: vec![place],
+            pieces,
+        }
+    }
+
+    fn of_links(traces: &[Trace], rate: Rate) -> Self {
+        let numbered = traces.iter().enumerate();
+        let links =
+            numbered.flat_map(|(ring, own)| own.channels.iter().map(move |link| (ring, link)));
+        let place = |(ring, link)| RecordedPlace {
+            name: name(ring, link),
+            carries: Carries::Link,
+            bits_per_second: rate.bits_per_second(),
+        };
+        let places = links.clone().map(place).collect();
+        let links: Vec<Channel> = links.map(|(_, link)| link.clone()).collect();
+        let pieces = in_time(&links).map(|(place, index)| {
+            let byte = links[place].octets()[index];
+            (byte.at, place, Piece::Octet(byte))
+        });
+        Self {
+            places,
+            pieces: pieces.collect(),
+        }
+    }
+}
+
+/// A piece that was heard so much later.
+pub(crate) fn later(piece: &Piece, span: Span) -> Piece {
+    let byte = |own: &LineByte| LineByte {
+        at: own.at + span,
+        ..*own
+    };
+    match piece {
+        Piece::Octet(own) => Piece::Octet(byte(own)),
+        Piece::Telegram(from, octets) => Piece::Telegram(*from, octets.iter().map(byte).collect()),
+        Piece::Frame(own) => Piece::Frame(LineFrame {
+            start: own.start + span,
+            at: own.at + span,
+            ..*own
+        }),
+        Piece::Event(nanos, words) => {
+            Piece::Event(nanos.saturating_add(span.as_nanos()), words.clone())
+        }
+    }
+}
