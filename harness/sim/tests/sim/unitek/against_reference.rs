@@ -186,7 +186,7 @@ fn random_frames_agree_with_the_reference() {
 }
 
 #[test]
-#[ignore = "takes a minute; the nightly run has it"]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn many_random_frames_agree_with_the_reference() {
     agree(40_000);
 }

@@ -114,7 +114,7 @@ fn no_right_slave_is_accused() {
 }
 
 #[test]
-#[ignore = "a minute; the nightly run plays it"]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn no_right_slave_is_accused_in_any_scenario() {
     let compared = right_slaves(1);
     assert!(compared > 50_000, "{compared}");
@@ -124,7 +124,7 @@ fn no_right_slave_is_accused_in_any_scenario() {
 const NOT_SHOWN: usize = 65;
 
 #[test]
-#[ignore = "a minute; the nightly run plays it"]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn wrong_slaves_are_accused() {
     let scenarios = scenarios();
     let found = |name: &str| {
