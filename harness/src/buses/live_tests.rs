@@ -2,10 +2,10 @@
 
 use super::{TelegramCutter, live_text};
 use crate::capture::live::{LiveLine, seconds};
-use crate::capture::{Carries, Piece, RecordedPlace};
+use crate::capture::{Carries, Piece, RecordedPlace, Tape};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
-use harness_proto::line::Received;
+use harness_proto::line::{Rate, Received};
 use harness_proto::time::Span;
 use harness_sim::record::{Channel, Trace};
 
@@ -97,4 +97,41 @@ fn frames_and_telegrams() {
     assert!(telegrams.starts_with(begins), "{telegrams}");
     let last = "3.004884 slave 8   2         Data_Exchange  ZSW 0F37 (OE, at setpoint, bus control, reference, clockwise)";
     assert!(telegrams.contains(last), "{telegrams}");
+}
+
+/// What each bus carried is heard again: all of it, in order, at its own rate, and an hour later if need be.
+#[test]
+fn every_bus_is_heard_again() {
+    let hour = Span::from_millis(3_600_000);
+    for (name, places, carries, bits) in [
+        ("9.8-check-sequence", 101, Carries::Link, 38_400),
+        ("unitek-3.1-rate-250", 1, Carries::Frames, 250_000),
+        ("nordac-en-1-rate-187.5", 1, Carries::Line, 187_500),
+    ] {
+        let traces = traces(name);
+        let tape = Tape::of(&traces, Rate::default());
+        assert_eq!(tape.places.len(), places, "{name}");
+        let as_expected =
+            |own: &RecordedPlace| own.carries == carries && own.bits_per_second == bits;
+        assert!(tape.places.iter().all(as_expected), "{:?}", tape.places);
+        assert!(tape.pieces.is_sorted_by_key(|(at, ..)| *at), "{name}");
+        let channels = traces.iter().flat_map(|own| &own.channels);
+        let carried: usize = match carries {
+            Carries::Frames => channels.map(|own| own.frames().len()).sum(),
+            _ => channels.map(|own| own.octets().len()).sum(),
+        };
+        let heard = |(at, _, piece): &(_, usize, Piece)| {
+            let (end, count) = match piece.later(hour) {
+                Piece::Octet(own) => (Some(own.at), 1),
+                Piece::Telegram(_, octets) => (octets.last().map(|own| own.at), octets.len()),
+                Piece::Frame(own) => (Some(own.at), 1),
+                Piece::Event(..) => (None, 0),
+            };
+            assert_eq!(end, Some(*at + hour), "{name}");
+            count
+        };
+        let heard: usize = tape.pieces.iter().map(heard).sum();
+        assert!(carried > 0, "{name}");
+        assert_eq!(heard, carried, "{name}");
+    }
 }

@@ -7,8 +7,6 @@ pub mod nordac;
 pub mod novobus;
 pub(crate) mod port_row;
 #[cfg(test)]
-mod tape_tests;
-#[cfg(test)]
 mod toy;
 pub mod unitek;
 
@@ -368,12 +366,12 @@ pub(crate) fn write_shared(
 
 /// The telegrams of a shared line of octets, each with the slave that sent it; `None` is a master.
 pub(crate) fn telegrams(traces: &[Trace]) -> Vec<(Option<u8>, Vec<LineByte>)> {
-    let all = traces.iter().flat_map(nordac::report::telegrams_of);
+    let all = traces.iter().flat_map(nordac::report::runs);
     all.map(|own| (own.from, own.octets)).collect()
 }
 
 /// The built-in scenario that shows a bus at work.
-pub(crate) const fn shown(bus: Bus) -> &'static str {
+pub(crate) const fn example(bus: Bus) -> &'static str {
     match bus {
         Bus::Novobus => "9.8-check-sequence",
         Bus::Unitek => "unitek-ex-11-speed-routine",
@@ -529,6 +527,11 @@ pub(crate) fn serve_frames(
         }
         Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
     }
+}
+
+/// Whether the drives of a bus stand in rings, whose number of drives a scenario takes from its bench.
+pub(crate) const fn has_rings(bus: Bus) -> bool {
+    matches!(bus, Bus::Novobus)
 }
 
 /// Whether a bus carries frames.

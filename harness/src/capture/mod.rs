@@ -27,7 +27,7 @@ pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
 pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
-pub(crate) use tape::{Tape, later};
+pub(crate) use tape::Tape;
 
 use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};

@@ -48,6 +48,30 @@ pub(crate) enum Piece {
     Event(u64, String),
 }
 
+impl Piece {
+    /// The same, heard so much later.
+    pub(crate) fn later(&self, span: Span) -> Self {
+        let byte = |own: &LineByte| LineByte {
+            at: own.at + span,
+            ..*own
+        };
+        match self {
+            Self::Octet(own) => Self::Octet(byte(own)),
+            Self::Telegram(from, octets) => {
+                Self::Telegram(*from, octets.iter().map(byte).collect())
+            }
+            Self::Frame(own) => Self::Frame(LineFrame {
+                start: own.start + span,
+                at: own.at + span,
+                ..*own
+            }),
+            Self::Event(nanos, words) => {
+                Self::Event(nanos.saturating_add(span.as_nanos()), words.clone())
+            }
+        }
+    }
+}
+
 /// A capture that is being written: an interface a place, a packet an octet of a ring, a telegram or a frame.
 pub(crate) struct LiveRecorder<W> {
     out: W,

@@ -7,8 +7,8 @@ use crate::report::pcapng_frames::rate_of;
 use crate::report::walk::in_time;
 use harness_proto::can::BitRate;
 use harness_proto::line::Rate;
-use harness_proto::time::{Instant, Span};
-use harness_sim::record::{Channel, LineByte, LineFrame, Trace};
+use harness_proto::time::Instant;
+use harness_sim::record::{Channel, LineFrame, Trace};
 
 /// The name of the place at which a bus is heard whose stations share one line.
 const LINE: &str = "bus";
@@ -90,26 +90,6 @@ impl Tape {
         Self {
             places,
             pieces: pieces.collect(),
-        }
-    }
-}
-
-/// A piece that was heard so much later.
-pub(crate) fn later(piece: &Piece, span: Span) -> Piece {
-    let byte = |own: &LineByte| LineByte {
-        at: own.at + span,
-        ..*own
-    };
-    match piece {
-        Piece::Octet(own) => Piece::Octet(byte(own)),
-        Piece::Telegram(from, octets) => Piece::Telegram(*from, octets.iter().map(byte).collect()),
-        Piece::Frame(own) => Piece::Frame(LineFrame {
-            start: own.start + span,
-            at: own.at + span,
-            ..*own
-        }),
-        Piece::Event(nanos, words) => {
-            Piece::Event(nanos.saturating_add(span.as_nanos()), words.clone())
         }
     }
 }

@@ -8,8 +8,8 @@ use super::capture::{listen_into, taps_of};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use crate::buses::{Bus, carries_frames, shown};
-use crate::capture::{LiveRecorder, Tape, later};
+use crate::buses::{Bus, carries_frames, example, has_rings};
+use crate::capture::{LiveRecorder, Tape};
 use crate::library::{Entry, sources};
 use crate::report::pcapng::LINK_TYPE;
 use crate::report::pcapng_frames;
@@ -32,6 +32,8 @@ pub(crate) const PROGRAM: &str = "drivebench-extcap";
 /// The interface of a simulated ring, in front of the name of another bus, and what stands in front of a rig's name.
 const SIMULATED: &str = "drivebench-sim";
 const RIG: &str = "drivebench-rig-";
+/// The usual simulated ring.
+const RING: &str = "sim:3";
 /// The pause behind a scenario.
 const PAUSE: Duration = Duration::from_secs(1);
 /// How often what has happened is written.
@@ -67,10 +69,10 @@ pub struct ExtcapArguments {
     /// The pipe.
     #[arg(long, value_name = "PATH")]
     fifo: Option<PathBuf>,
-    /// The simulated ring: sim:N for N drives.
-    #[arg(long, default_value = "sim:3")]
-    rig: String,
-    /// What it plays, again and again: a scenario's name or file.
+    /// The simulated ring: sim:N for N drives; sim:3 by default.
+    #[arg(long)]
+    rig: Option<String>,
+    /// What it plays, again and again: a scenario's name or file; by default one that shows the bus at work.
     #[arg(long)]
     scenario: Option<PathBuf>,
 }
@@ -140,7 +142,7 @@ fn interfaces() -> String {
     let mut text = format!("extcap {{version={version}}}{{display=drivebench}}\n");
     for (name, bus) in Bus::NAMES {
         let value = simulated_interface(bus);
-        let what = match bus == Bus::DEFAULT {
+        let what = match has_rings(bus) {
             true => "simulated ring".to_owned(),
             false => format!("simulated {name}"),
         };
@@ -182,10 +184,10 @@ fn config(interface: &str) -> String {
         return String::new();
     };
     let rig = "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n";
-    let rig = if bus == Bus::DEFAULT { rig } else { "" };
+    let rig = if has_rings(bus) { rig } else { "" };
     format!(
         "{rig}arg {{number=1}}{{call=--scenario}}{{display=Scenario}}{{type=string}}{{default={}}}{{tooltip=drivebench list names them}}\n",
-        shown(bus)
+        example(bus)
     )
 }
 
@@ -223,15 +225,21 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
 fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, String> {
     let bus = simulated_bus(interface).unwrap_or(Bus::DEFAULT);
     let scenario = arguments.scenario.clone();
-    let scenario = scenario.unwrap_or_else(|| PathBuf::from(shown(bus)));
+    let scenario = scenario.unwrap_or_else(|| PathBuf::from(example(bus)));
     let name = scenario.display();
     let found = sources(std::slice::from_ref(&scenario)).map_err(|error| error.to_string())?;
     let [source] =
         <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
-    let drives = match bus == Bus::DEFAULT {
-        true => Some(ring(&arguments.rig)?),
-        false => None,
+    let drives = match &arguments.rig {
+        Some(rig) if !has_rings(bus) => {
+            return Err(format!(
+                "--rig {rig}: a scenario of {} says which drives it has; leave --rig out",
+                bus.name()
+            ));
+        }
+        rig => has_rings(bus).then(|| ring(rig.as_deref().unwrap_or(RING))),
     };
+    let drives = drives.transpose()?;
     let entry = Entry::fitting(source, drives).map_err(|problems| problems.to_string())?;
     if entry.scenario.bus != bus {
         return Err(format!(
@@ -295,7 +303,7 @@ fn once(recorder: &mut LiveRecorder<&File>, tape: &Tape, stop: &AtomicBool) -> i
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        recorder.piece(*place, &later(piece, Span::from_nanos(wall)))?;
+        recorder.piece(*place, &piece.later(Span::from_nanos(wall)))?;
     }
     recorder.flush()
 }
