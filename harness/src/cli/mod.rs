@@ -34,6 +34,7 @@ pub(crate) mod shrink;
 mod tally;
 mod trace;
 mod verify;
+pub(crate) mod watch;
 
 pub use args::Arguments;
 pub use exit::Exit;

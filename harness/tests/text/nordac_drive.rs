@@ -365,8 +365,8 @@ fn info_top_watch_and_cells() {
         "watch", "8", "HIW", "1813", "--every", "100ms", "--for", "300ms", "--format", "csv",
     ]);
     let lines: Vec<_> = shown.lines().collect();
-    assert_eq!(lines[0], "time_ms,8 HIW,8 1813 Frequency");
-    assert!(lines.len() >= 4 && lines[1].ends_with(",0,0"), "{shown}");
+    assert_eq!(lines[0], "time_ms,8 HIW [%],8 1813 Frequency [Hz]");
+    assert!(lines.len() >= 4 && lines[1].ends_with(",0,0.0"), "{shown}");
     let (code, shown, _) = run(&["cells", "--bus", "nordac", "maximum frequ."]);
     assert_eq!(
         (code, &*shown),

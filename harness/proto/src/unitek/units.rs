@@ -183,16 +183,28 @@ const fn range(register: &Register) -> (i64, i64) {
 #[must_use]
 pub fn shown(register: &Register, raw: u32, given: Given, scaling: Scaling) -> Option<Shown> {
     let (num, den) = ratio(register.unit, given, scaling)?;
-    let raw = match register.unit {
-        Unit::Ramp => i64::from(raw & 0xFFFF),
-        _ => register.number_of(raw),
-    };
+    let raw = number(register, raw);
     let power = 10i128.pow(given.places());
     let digits = nearest(i128::from(raw) * den * power, num);
     Some(Shown {
         digits: i64::try_from(digits).ok()?,
         given,
     })
+}
+
+/// What a register counts: a ramp only its low word (App 4).
+fn number(register: &Register, raw: u32) -> i64 {
+    match register.unit {
+        Unit::Ramp => i64::from(raw & 0xFFFF),
+        _ => register.number_of(raw),
+    }
+}
+
+/// A raw number in a unit, not rounded; `None` where the register is not counted in it.
+#[must_use]
+pub fn value(register: &Register, raw: u32, given: Given, scaling: Scaling) -> Option<f64> {
+    let (num, den) = ratio(register.unit, given, scaling)?;
+    Some(number(register, raw) as f64 * den as f64 / num as f64)
 }
 
 /// The unit in which a register is shown; `None` where it is a plain number or a word of bits.

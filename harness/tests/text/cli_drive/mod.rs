@@ -303,7 +303,7 @@ fn watch_shows_values_again_and_again() {
     );
     assert_eq!(
         shown("watch 0..1 nist Status --format csv --for 100ms"),
-        "time_ms,0 nist rpm,0 Status,1 nist rpm,1 Status\n0.000,0.0,00,0.0,00\n100.000,0.0,00,0.0,00\n"
+        "time_ms,0 nist [rpm],0 Status [hex],1 nist [rpm],1 Status [hex]\n0.000,0.0,00,0.0,00\n100.000,0.0,00,0.0,00\n"
     );
     let folder = folder("watch");
     let setup = "drive 0..last input GPIN3 GPIN5 high\ndrive 0 memory nsoll = 100rpm\n";

@@ -45,6 +45,23 @@ fn registers_are_read_by_every_name() {
     );
 }
 
+/// For programs, a value stands below its unit as exactly as it was read.
+#[test]
+fn columns_name_their_units() {
+    let folder = folder("unitek-watch");
+    let setup = "bus unitek\ndrive 1 register 31 = 0CCD\n";
+    std::fs::write(folder.join("a.setup"), setup).expect("room");
+    let line =
+        "watch 1 SPEED_CMD STATUS CAN_BTR --for 0s --format csv --rig sim:unitek --setup a.setup";
+    let arguments: Vec<_> = line.split_whitespace().collect();
+    let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
+    assert_eq!((code, &*stderr), (0, ""));
+    assert_eq!(
+        stdout,
+        "time_ms,1 SPEED_CMD [%],1 STATUS [hex],1 CAN_BTR\n0.000,10.000916,0101,16421\n"
+    );
+}
+
 /// Header lines of a scenario set simulated drives up.
 #[test]
 fn simulated_drives_are_set_up() {

@@ -2,12 +2,13 @@
 
 use super::bench::driver;
 use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
-use crate::buses::nordac::driver::{Driver, Error};
-use crate::buses::nordac::value::{Cell, cells, shown};
+use crate::buses::nordac::driver::{Driver, Error, percent};
+use crate::buses::nordac::value::{Cell, ReplyWord, cells, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{on, select};
+use crate::cli::watch::{HEX, decimal};
 use crate::rig::Rig;
 use harness_proto::nordac::PkwError;
 use serde_json::json;
@@ -23,7 +24,7 @@ pub(super) struct Found {
 
 impl Found {
     /// The digits as they travel.
-    fn raw(&self) -> String {
+    pub(super) fn raw(&self) -> String {
         match self.cell {
             Cell::Word(_) => format!("{:04X}", self.word()),
             Cell::Parameter(_) => self.number.to_string(),
@@ -32,6 +33,20 @@ impl Found {
 
     fn word(&self) -> u16 {
         u16::try_from(self.number).unwrap_or_default()
+    }
+
+    /// Its value without its unit, and the unit.
+    pub(super) fn digits(&self) -> (String, &'static str) {
+        match self.cell {
+            Cell::Word(ReplyWord::Actual) => (decimal(percent(self.word())), "%"),
+            Cell::Word(_) => (self.raw(), HEX),
+            Cell::Parameter(own) => {
+                let unit = own.parameter.unit_of(own.index.element);
+                let text = unit.show(self.number).to_string();
+                let digits = text.strip_suffix(unit.name).unwrap_or(&text).trim_end();
+                (digits.to_owned(), unit.name)
+            }
+        }
     }
 
     /// Its meaning.

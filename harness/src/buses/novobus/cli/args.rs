@@ -22,8 +22,8 @@ With --format json: {\"schema\": 1, \"corrected\": n, \"drives\": [...]}, each d
 does not report is null.";
 
 const WATCH_FORM: &str = "\
-With --format csv the first line names the columns: time_ms, then the cells with their units. A value without a
-meaning in the manual is empty.";
+With --format csv the first line names the columns: time_ms, then each cell with its unit, such as `0 nist [rpm]`. A column
+marked [hex] holds hexadecimal digits. A value without a meaning in the manual is empty.";
 
 const TOP_KEYS: &str = "\
 Keys: q or Esc quit, / filter by text, e only drives in error, s sort, p pause, arrows and PgUp/PgDn scroll, ? help.

@@ -32,7 +32,6 @@ pub(crate) use args::{
 pub(crate) use axes::Axes;
 pub(crate) use read::columns;
 pub(crate) use rig::{RigName, Use};
-pub(crate) use watch::MOST as MOST_LINES;
 
 use crate::buses::novobus::driver;
 use crate::cli::exit::Exit;
