@@ -8,6 +8,7 @@ use super::capture::{listen_into, taps_of};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
+use crate::buses::rings::rig::named::ring_size;
 use crate::buses::{Bus, carries_frames, example, has_rings};
 use crate::capture::{LiveRecorder, Tape};
 use crate::library::{Entry, sources};
@@ -254,10 +255,10 @@ fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, Strin
 
 /// The number of drives of a simulated ring.
 fn ring(rig: &str) -> Result<u8, String> {
-    let drives = rig.strip_prefix("sim:");
-    drives.and_then(|own| own.parse::<u8>().ok()).ok_or_else(|| {
+    let drives = rig.strip_prefix("sim:").ok_or_else(|| {
         format!("`{rig}` is no simulated ring: sim:N is expected; rigs with taps are interfaces of their own")
-    })
+    })?;
+    ring_size(drives).map_err(|error| format!("`{rig}` is no simulated ring: {error}"))
 }
 
 /// Writes a tape into a pipe at the pace of its times, again and again, until the reader closes it or a signal comes.

@@ -448,12 +448,17 @@ fn wireshark_is_answered() {
     let unknown = desk.run(&["extcap", "--extcap-interface", "eth0", "--extcap-dlts"]);
     ended(&unknown, 2, "there is no interface `eth0`");
     let pipe = desk.path("pipe");
-    let wrong = [
-        &own[..],
-        &["--capture", "--fifo", name(&pipe), "--rig", "sim:x"],
-    ]
-    .concat();
-    ended(&desk.run(&wrong), 3, "`sim:x` is no simulated ring");
+    for rig in ["sim:x", "sim:400"] {
+        let wrong = [
+            &own[..],
+            &["--capture", "--fifo", name(&pipe), "--rig", rig],
+        ]
+        .concat();
+        let what = format!("`{rig}` is no simulated ring: ");
+        let wrong = desk.run(&wrong);
+        ended(&wrong, 3, &what);
+        ended(&wrong, 3, "1 to 250");
+    }
     let other = [
         &own[..],
         &["--capture", "--fifo", name(&pipe)],
