@@ -1,17 +1,25 @@
 //! What a capture shows while it goes on, in the words of each bus.
 
-use super::{TelegramCutter, live_text};
+use super::{TelegramCutter, judge_shared, live_text, share_a_line};
 use crate::capture::live::{LiveLine, seconds};
-use crate::capture::{Carries, Piece, RecordedPlace, Tape};
+use crate::capture::{
+    Capture, Carries, LiveRecorder, Options, Piece, RecordedPlace, Tape, judge, read,
+};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::Span;
 use harness_sim::record::{Channel, Trace};
 
 fn traces(scenario: &str) -> Vec<Trace> {
     let mut found = sources(&[scenario.into()]).expect("a scenario");
-    let entry = Entry::new(found.remove(0), None).expect("no mistakes");
+    traces_of(found.remove(0))
+}
+
+fn traces_of(source: Source) -> Vec<Trace> {
+    let entry = Entry::new(source, None).expect("no mistakes");
     let plan = entry.settled().expect("a plan");
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
@@ -133,5 +141,119 @@ fn every_bus_is_heard_again() {
         let heard: usize = tape.pieces.iter().map(heard).sum();
         assert!(carried > 0, "{name}");
         assert_eq!(heard, carried, "{name}");
+    }
+}
+
+/// A capture that begins in mid-conversation.
+fn begun_at(tape: &Tape, first: usize, octet: usize) -> Capture {
+    let mut bytes = Vec::new();
+    let mut recorder = LiveRecorder::start(&mut bytes, &tape.places).expect("room");
+    for (number, (_, place, piece)) in tape.pieces.iter().enumerate().skip(first) {
+        let piece = match piece {
+            Piece::Telegram(from, octets) if number == first => {
+                Piece::Telegram(*from, octets[octet.min(octets.len() - 1)..].to_vec())
+            }
+            other => other.clone(),
+        };
+        recorder.piece(*place, &piece).expect("room");
+    }
+    recorder.flush().expect("room");
+    drop(recorder);
+    read(&bytes, None).expect("a capture")
+}
+
+/// Built-in scenarios of a bus, each `step`th from `first` on, whose captures are not failures when they are whole.
+fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
+    let folder = format!("{}/corpora/scenarios/{bus}", env!("CARGO_MANIFEST_DIR"));
+    let files = std::fs::read_dir(folder).expect("a folder");
+    let mut names: Vec<String> = files
+        .map(|own| own.expect("a file").path())
+        // A supply that is switched off and on shows in no capture.
+        .filter(|path| {
+            !std::fs::read_to_string(path)
+                .expect("a scenario")
+                .contains("restart")
+        })
+        .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    let tape = |name: String| (Tape::of(&traces(&name), Rate::default()), name);
+    let all = names.into_iter().skip(first).step_by(step).map(tape);
+    let right = all.filter(|(tape, _)| (1..=MOST_PIECES).contains(&tape.pieces.len()));
+    let right = right.filter(|(tape, _)| {
+        verdict(&begun_at(tape, 0, 0)).is_some_and(|own| own != Verdict::Failed)
+    });
+    right.map(|(tape, name)| (name, tape)).collect()
+}
+
+const MOST_PIECES: usize = 20_000;
+
+fn verdict(capture: &Capture) -> Option<Verdict> {
+    let options = Options {
+        title: "begun in mid-conversation",
+        setup: None,
+        tolerance: Span::from_millis(10),
+    };
+    match share_a_line(&capture.traces) {
+        true => judge_shared(&capture.traces, None)
+            .ok()
+            .map(|own| own.verdict),
+        false => judge(capture, &options).ok().map(|own| own.verdict),
+    }
+}
+
+/// No right drive is blamed in a capture that begins at any of `cuts` places; returns how many captures passed.
+fn no_beginning_blames(bus: &str, first: usize, step: usize, cuts: usize) -> usize {
+    let mut passed = 0;
+    for (name, tape) in right_captures(bus, first, step) {
+        let pieces = tape.pieces.len();
+        for cut in 1..cuts.min(pieces) {
+            let first = cut * pieces / cuts.min(pieces);
+            for octet in [0, 1, 3] {
+                let found = verdict(&begun_at(&tape, first, octet));
+                assert_ne!(
+                    found,
+                    Some(Verdict::Failed),
+                    "{name} from piece {first}, octet {octet}"
+                );
+                passed += usize::from(found == Some(Verdict::Passed));
+                if !matches!(tape.pieces[first].2, Piece::Telegram(..)) {
+                    break;
+                }
+            }
+        }
+    }
+    passed
+}
+
+/// A drive that is wrong from its first telegram to its last is still found.
+#[test]
+fn captures_begun_in_mid_conversation_find_wrong_drives() {
+    let round = "> 88 FE C0 13 FE D1\n< 88 01 C0 13 88 A5\nwait 20ms\n";
+    let text = format!(
+        "title Wrong\nsource nd21 8.4\nring 3\ndrive 1 deviates checksum-wrong\n\n{}",
+        round.repeat(8)
+    );
+    let source = Source::from_bytes("wrong".to_owned(), text.into_bytes()).expect("text");
+    let tape = Tape::of(&traces_of(source), Rate::default());
+    let pieces = tape.pieces.len();
+    let found = [3, pieces / 4, pieces / 3].map(|first| verdict(&begun_at(&tape, first, 0)));
+    assert_eq!(found, [Some(Verdict::Failed); 3]);
+}
+
+/// A capture in a cabinet begins anywhere.
+#[test]
+fn captures_begun_in_mid_conversation_blame_no_right_drive() {
+    assert!(no_beginning_blames("novobus", 3, 24, 4) > 0);
+    assert!(no_beginning_blames("unitek", 1, 12, 6) > 0);
+    assert!(no_beginning_blames("nordac", 1, 30, 6) > 0);
+}
+
+#[test]
+#[ignore = "every scenario, from 8 or 40 places; .ci/nightly runs it"]
+fn all_captures_begun_in_mid_conversation() {
+    for (bus, cuts) in [("novobus", 8), ("unitek", 40), ("nordac", 40)] {
+        let passed = no_beginning_blames(bus, 0, 1, cuts);
+        assert!(passed > 100, "{bus}: {passed} passed");
     }
 }

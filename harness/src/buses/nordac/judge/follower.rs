@@ -91,6 +91,7 @@ struct Follower {
 }
 
 /// A request that was understood, and its number.
+#[derive(Debug)]
 struct Asked {
     number: usize,
     /// `None` for octets to which no slave may reply.
@@ -99,22 +100,31 @@ struct Asked {
     doubtful: bool,
 }
 
-/// Judges what the slaves of a line sent.
+/// Judges what the slaves of a line sent, in a capture that may begin in mid-conversation: its first octets may be the end of a telegram,
+/// or the reply to a request that was not heard.
 #[must_use]
 pub fn judge(trace: &Trace) -> JudgedSlaves {
-    judge_runs(runs(trace))
+    judge_from(true, runs(trace))
 }
 
-/// The same of octets that stations sent without a pause.
+/// The same of octets that stations sent without a pause, from the first telegram of the line on.
 pub(in crate::buses::nordac) fn judge_runs(
     runs: impl IntoIterator<Item = TelegramRun>,
 ) -> JudgedSlaves {
-    let mut judge = Judge::default();
+    judge_from(false, runs)
+}
+
+fn judge_from(midway: bool, runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
+    let mut judge = Judge {
+        midway,
+        ..Judge::default()
+    };
     for (number, run) in (1..).zip(runs) {
         match run.from {
             None => judge.asks(number, &run),
             Some(_) => judge.replies(number, &run),
         }
+        judge.midway = false;
     }
     judge.finished();
     judge.judged
@@ -122,15 +132,11 @@ pub(in crate::buses::nordac) fn judge_runs(
 
 #[derive(Debug, Default)]
 struct Judge {
+    /// Whether something was sent that was not heard, right before the next telegram.
+    midway: bool,
     followers: BTreeMap<u8, Follower>,
     asked: Option<Asked>,
     judged: JudgedSlaves,
-}
-
-impl std::fmt::Debug for Asked {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("Asked").field(&self.number).finish()
-    }
 }
 
 impl Judge {
@@ -169,8 +175,8 @@ impl Judge {
             Some(Decoded::Value { value, used }) if sound && whole(used) => {
                 (value.pdu().copied(), false)
             }
-            Some(Decoded::Value { used, .. }) => (None, !whole(used)),
-            _ => (None, false),
+            Some(Decoded::Value { used, .. }) => (None, self.midway || !whole(used)),
+            _ => (None, self.midway),
         };
         if let Some(pdu) = &pdu {
             self.sent(pdu);
@@ -269,6 +275,9 @@ impl Judge {
             .any(|own| own.sent != own.received || own.error.is_some());
         let from = said.from.unwrap_or(0);
         let Some(asked) = asked else {
+            if self.midway {
+                return;
+            }
             let about = "it sends again without a request in between".to_owned();
             return self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
         };

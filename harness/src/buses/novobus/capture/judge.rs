@@ -1,5 +1,6 @@
 //! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
+use super::begin::{after_silences, from, is_midway};
 use super::scenario::{Options, SketchError, scenario, unforeseen};
 use crate::capture::Capture;
 use crate::capture::diff::{ComparedRun, Summary, compare};
@@ -34,6 +35,18 @@ pub struct Judged {
     pub remarks: Vec<String>,
 }
 
+/// From how many places a capture that begins in mid-conversation is judged.
+const MOST_STARTS: usize = 6;
+
+impl Judged {
+    /// What differs does not accuse a drive, for this reason.
+    fn in_doubt(mut self, why: &str) -> Self {
+        self.verdict = Verdict::Inconclusive;
+        self.remarks.push(why.to_owned());
+        self
+    }
+}
+
 /// Why there is no judgement.
 #[derive(Debug, thiserror::Error)]
 pub enum JudgeError {
@@ -57,11 +70,44 @@ fn first(problems: &Problems) -> String {
     first.map_or_else(|| problems.to_string(), |first| first.message.clone())
 }
 
-/// Judges a capture; times are compared as far as the tolerance.
+/// Judges a capture; times are compared as far as the tolerance. One that begins in mid-conversation, and differs, is judged from where
+/// its rings were first silent: what bytes in front of it did to the drives is not known.
 ///
 /// # Errors
 /// [`JudgeError`].
 pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
+    let judged = judge_whole(capture, options)?;
+    if judged.verdict != Verdict::Failed || !is_midway(capture) {
+        return Ok(judged);
+    }
+    let starts = after_silences(capture);
+    let Some(start) = starts.first() else {
+        return Ok(judged.in_doubt(
+            "the capture begins in mid-conversation, and its rings are never silent: what differs may come of bytes in front of it; begin it \
+             before the master sends",
+        ));
+    };
+    let mut judged = judge_whole(&from(capture, *start), options)?;
+    judged.remarks.push(format!(
+        "the capture begins in mid-conversation: it is judged from {} on, where its rings were first silent, and bytes are counted from there",
+        start.since_start()
+    ));
+    if judged.verdict != Verdict::Failed {
+        return Ok(judged);
+    }
+    // What came before can show for a while, such as a reset. A fault that lasts shows from everywhere.
+    let later = starts.iter().skip(1);
+    for start in later.step_by(starts.len().div_ceil(MOST_STARTS)) {
+        if judge_whole(&from(capture, *start), options)?.verdict != Verdict::Failed {
+            return Ok(judged.in_doubt(
+                "what differs does not show from each silence on: it may come of bytes in front of the capture",
+            ));
+        }
+    }
+    Ok(judged)
+}
+
+fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
     let (model, remarks) = model(capture, options)?;
     let told = unforeseen(capture);
     let model = only_captured(&model, capture);
