@@ -239,6 +239,24 @@ fn captures_begun_in_mid_conversation_find_wrong_drives() {
     let pieces = tape.pieces.len();
     let found = [3, pieces / 4, pieces / 3].map(|first| verdict(&begun_at(&tape, first, 0)));
     assert_eq!(found, [Some(Verdict::Failed); 3]);
+    // Wrong bytes before the first silence: no right drive sends them, but the capture cannot tell.
+    let round = "> 88 FE C0 13 FE D1\n< 88 01 C0 13 88 A5\n";
+    let round = [&round.repeat(8), "wait 20ms\n"].concat();
+    let at = |first: usize| {
+        let text = format!(
+            "title Right\nsource nd21 8.4\nring 3\n\n{}",
+            round.repeat(3)
+        );
+        let source = Source::from_bytes("right".to_owned(), text.into_bytes()).expect("text");
+        let mut tape = Tape::of(&traces_of(source), Rate::default());
+        for (_, place, piece) in &mut tape.pieces[first..first + 40] {
+            if let (Piece::Octet(own), "0->master") = (piece, &*tape.places[*place].name) {
+                (own.sent, own.received) = (Some(0x55), Some(0x55));
+            }
+        }
+        verdict(&begun_at(&tape, first, 0))
+    };
+    assert_eq!([at(3), at(20)], [Some(Verdict::Inconclusive); 2]);
 }
 
 /// A capture in a cabinet begins anywhere.

@@ -1,7 +1,7 @@
 //! Where a capture begins: one that begins in mid-conversation is judged from where the ring was first silent.
 
 use crate::capture::Capture;
-use harness_proto::novobus::sync::SyncByte;
+use harness_proto::novobus::sync::{MAX_NET_LENGTH, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte, Trace};
 
@@ -27,13 +27,33 @@ pub(super) fn is_midway(capture: &Capture) -> bool {
     })
 }
 
+/// The most bytes of a telegram: sync byte, address and net bytes (ND21 9.2).
+const MOST_OF_A_TELEGRAM: u64 = 2 + MAX_NET_LENGTH as u64;
+
+/// Whether no more was sent before a time than the end of a telegram takes to leave its ring.
+pub(super) fn is_one_telegram(capture: &Capture, start: Instant) -> bool {
+    let links = capture.traces.iter().flat_map(|ring| &ring.channels);
+    let ends = links.flat_map(|link| link.octets().iter().map(|own| own.at));
+    let front: Vec<Instant> = ends.filter(|at| *at <= start).collect();
+    let most = Span::from_units(capture.rate.byte_time().units() * MOST_OF_A_TELEGRAM * 3 / 2);
+    match (front.iter().min(), front.iter().max()) {
+        (Some(first), Some(last)) => last.since(*first) <= flight(capture) + most,
+        _ => true,
+    }
+}
+
+/// In this time every byte has left its ring.
+fn flight(capture: &Capture) -> Span {
+    let most = capture.traces.iter().map(|ring| ring.stations).max();
+    let most = u64::from(most.unwrap_or(0));
+    Span::from_units(capture.rate.byte_time().units() * (most + 2) * 3 / 2)
+}
+
 /// When the master's first bytes after silences began, in each of which every byte has left its ring, as far as something came back later.
 /// One that is no sync byte (ND21 9.2) goes on with a telegram.
 pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
     let octet = capture.rate.byte_time();
-    let most = capture.traces.iter().map(|ring| ring.stations).max();
-    let most = u64::from(most.unwrap_or(0));
-    let silence = Span::from_units(octet.units() * (most + 2) * 3 / 2);
+    let silence = flight(capture);
     let links = capture.traces.iter().flat_map(|ring| &ring.channels);
     let begins = |own: &LineByte| {
         let sent = own.received.filter(|_| own.error.is_none());
