@@ -151,6 +151,12 @@ impl Html {
         self.out.is_empty()
     }
 
+    /// What was written, as a file of its own: a picture.
+    #[must_use]
+    pub(crate) fn into_text(self) -> String {
+        self.out
+    }
+
     /// The page.
     #[must_use]
     pub(crate) fn finish(self) -> String {

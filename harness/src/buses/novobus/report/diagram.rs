@@ -1,34 +1,19 @@
 //! The space-time diagram of a ring: drives across, bytes down, a colour for what each sender was doing (ND21 9.7, 9.8).
 //!
 //! The picture works without scripts and is aligned by index, as the manual's tables are. The page also holds the meaning of every byte
-//! as data. The script shows the meaning of a byte under the pointer or selected by keys, and can place the bytes at their times. Equal
-//! neighbours are one rectangle, and all rectangles of a colour are one path.
+//! as data. The script shows the meaning of a byte under the pointer or selected by keys, and can place the bytes at their times.
 
+use super::cells::Area;
+use super::picture::{LEFT, MAX_AREAS, ROW, RingPicture, RowPlacing, TOP};
+use super::walk::SenderState;
 use crate::report::html::Html;
 use crate::report::pcapng::name;
-use crate::report::svg::cells::{Area, Columns, areas};
-use crate::report::svg::{MAX_AREAS, RowPlacing, class};
-use crate::report::walk::SenderState;
 use harness_proto::line::Rate;
 use harness_sim::record::{Channel, LineByte, Trace};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::ops::Range;
 
-/// Where the columns begin.
-const LEFT: usize = 64;
-/// Where the rows begin.
-const TOP: usize = 28;
-/// How high a row is.
-const ROW: usize = 14;
-/// How wide all columns are together, if they are not narrower than [`NARROW`].
-const WIDE: usize = 1_336;
-const NARROW: usize = 5;
-/// Bytes are written into columns as wide as this.
-const LETTERS: usize = 22;
-/// How many faults the description names.
-const FAULTS: usize = 12;
 /// How far a byte may be from where the byte before it puts it, in thirds of a nanosecond: what times in nanoseconds lose.
 const EXACT: u64 = 6;
 
@@ -65,41 +50,29 @@ pub(crate) fn diagram(
     (ring, trace): (usize, &Trace),
     (rate, differs): (Rate, Option<usize>),
 ) {
-    let columns = Columns::read(trace, None);
-    let all = areas(&columns, RowPlacing::Index);
-    let cut = columns.cut || all.len() > MAX_AREAS;
-    let drawn = &all[..all.len().min(MAX_AREAS)];
-    let column = (WIDE / trace.channels.len().max(1)).clamp(NARROW, 48);
-    let rows = drawn.iter().map(|area| area.rows.end).max().unwrap_or(0);
-    let differs = differs.and_then(|byte| received(trace, byte));
-    let frame = Frame {
-        column,
-        rows,
-        differs: differs.filter(|own| own[1] < rows),
-    };
-    let description = description(ring, trace, drawn, cut);
+    let mut picture = RingPicture::new((ring, trace), (RowPlacing::Index, rate), None, MAX_AREAS);
+    if let Some([link, row]) = differs.and_then(|byte| received(trace, byte)) {
+        picture.mark(link, row);
+    }
     html.element("div", &[("class", &"ring")], |html| {
         html.scroll(title, |html| {
-            picture(html, id, title, &description, trace, drawn, &frame);
+            let title = format!("Space-time diagram: {title}");
+            let (id, words) = (format!("{id}-"), picture.description());
+            html.picture(&id, picture.size(), (&title, &words), |html| {
+                picture.draw(html);
+            });
         });
-        legend(html, drawn, frame.differs.is_some());
+        legend(html, &picture);
         damaged(html, ring, trace);
-        if cut {
+        if picture.cut {
             html.line(
                 "p",
                 &[("class", &"note")],
                 "The run goes on: only its beginning is drawn.",
             );
         }
-        html.data(&data(ring, trace, drawn, &frame, rate));
+        html.data(&data(ring, trace, &picture, rate));
     });
-}
-
-struct Frame {
-    column: usize,
-    rows: usize,
-    /// The link and the row of the byte that differs.
-    differs: Option<[usize; 2]>,
 }
 
 /// The link and the row of a byte that the master received, counted from 1; where it never came, of the last one that did.
@@ -159,153 +132,8 @@ fn damaged(html: &mut Html, ring: usize, trace: &Trace) {
     }
 }
 
-impl Frame {
-    fn place(&self, area: &Area) -> (usize, usize, usize, usize) {
-        (
-            LEFT + self.column * area.links.start,
-            TOP + ROW * area.rows.start,
-            self.column * area.links.len(),
-            ROW * area.rows.len(),
-        )
-    }
-}
-
-fn picture(
-    html: &mut Html,
-    id: &str,
-    title: &str,
-    description: &str,
-    trace: &Trace,
-    areas: &[Area],
-    frame: &Frame,
-) {
-    let width = (LEFT + frame.column * trace.channels.len() + 16).max(240);
-    let height = TOP + ROW * frame.rows + 8;
-    let title = format!("Space-time diagram: {title}");
-    let id = format!("{id}-");
-    html.picture(&id, (width, height), (&title, description), |html| {
-        heads(html, trace, areas, frame);
-        html.element("g", &[("class", &"by-index")], |html| {
-            numbers(html, frame.rows);
-            shapes(html, areas, frame);
-            if frame.column >= LETTERS {
-                letters(html, areas, frame);
-            }
-        });
-    });
-}
-
-/// The senders above their columns; where there is not room for all, those at faults and at the byte that differs first.
-fn heads(html: &mut Html, trace: &Trace, areas: &[Area], frame: &Frame) {
-    let all = 0..trace.channels.len();
-    let faults = areas.iter().filter(|area| area.fault);
-    let matters = faults.map(|area| area.links.start);
-    let matters = frame.differs.map(|own| own[0]).into_iter().chain(matters);
-    // A fault on a link is of its sender or of the receiver, whose column is the next one.
-    let matters = matters.flat_map(|place| [place, place + 1]);
-    let ends = [0, all.end.saturating_sub(1)];
-    // Neighbours that matter stand in two lines.
-    let mut placed: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
-    let mut place_one = |place: usize, lines: &[usize]| {
-        let x = LEFT + frame.column * place + frame.column / 2;
-        let room = |own: usize| if own == 0 { 22 } else { 10 };
-        let free = |y: &usize| {
-            let apart = |(other, own): (&usize, &(usize, usize))| {
-                own.1 != *y || own.0.abs_diff(x) >= room(*other) + room(place)
-            };
-            placed.iter().all(apart)
-        };
-        let line = lines.iter().find(|y| free(y)).copied();
-        if let Some(y) = line.filter(|_| all.contains(&place) && !placed.contains_key(&place)) {
-            placed.insert(place, (x, y));
-        }
-    };
-    for place in matters.chain(ends) {
-        place_one(place, &[TOP - 9, TOP - 19]);
-    }
-    for place in all.clone() {
-        place_one(place, &[TOP - 9]);
-    }
-    for (place, (x, y)) in placed {
-        let attributes: [(&str, &dyn std::fmt::Display); 3] =
-            [("class", &"m"), ("x", &x), ("y", &y)];
-        match trace.channels[place].from {
-            Some(drive) => html.line("text", &attributes, drive),
-            None => html.line("text", &attributes, "master"),
-        }
-    }
-}
-
-/// The rows at the left edge.
-fn numbers(html: &mut Html, rows: usize) {
-    let step = if rows > 1_000 { 10 } else { 5 };
-    for row in (0..rows).step_by(step) {
-        let y = TOP + ROW * row + 11;
-        html.line(
-            "text",
-            &[("class", &"e"), ("x", &(LEFT - 8)), ("y", &y)],
-            row + 1,
-        );
-    }
-}
-
-/// One path a colour, and one for the marks of faults.
-fn shapes(html: &mut Html, areas: &[Area], frame: &Frame) {
-    let mut paths: BTreeMap<char, String> = BTreeMap::new();
-    for area in areas {
-        let (x, y, width, height) = frame.place(area);
-        let (width, height) = (width - 1, height - 1);
-        let mut draw = |class: char| {
-            let path = paths.entry(class).or_default();
-            // Writing to a String cannot fail.
-            let _infallible = write!(path, "M{x} {y}h{width}v{height}h-{width}z");
-        };
-        draw(class(area.state));
-        if area.fault {
-            // Behind all letters of the states.
-            draw('x');
-            let edge = LEFT - 6;
-            let middle = y + ROW / 2;
-            let path = paths.entry('y').or_default();
-            let _infallible = write!(path, "M{edge} {}l5 4l-5 4z", middle - 4);
-        }
-    }
-    for (class, path) in &paths {
-        html.shape("path", &[("class", class), ("d", path)]);
-    }
-    if let Some([link, row]) = frame.differs {
-        let (x, y) = (LEFT + frame.column * link, TOP + ROW * row);
-        let around = format!(
-            "M{} {}h{}v{ROW}h-{}z",
-            x - 1,
-            y - 1,
-            frame.column,
-            frame.column
-        );
-        html.shape("path", &[("class", &"w"), ("d", &around)]);
-    }
-}
-
-/// A text a row, in which each letter has its place: much shorter than a text a byte.
-fn letters(html: &mut Html, areas: &[Area], frame: &Frame) {
-    let mut rows: BTreeMap<usize, (String, String)> = BTreeMap::new();
-    for area in areas {
-        let (x, y, width, _) = frame.place(area);
-        let (places, letters) = rows.entry(y + 11).or_default();
-        let middle = x + width / 2;
-        // Writing to a String cannot fail.
-        let _infallible = write!(places, "{} {} ", middle - 3, middle + 3);
-        letters.push_str(&area.letters);
-    }
-    html.element("g", &[("class", &"m")], |html| {
-        for (y, (places, letters)) in &rows {
-            html.line("text", &[("y", y), ("x", &places.trim_end())], letters);
-        }
-    });
-}
-
 /// The colours in words, of the states that occur.
-fn legend(html: &mut Html, areas: &[Area], differs: bool) {
+fn legend(html: &mut Html, picture: &RingPicture<'_>) {
     html.element(
         "ul",
         &[
@@ -313,78 +141,14 @@ fn legend(html: &mut Html, areas: &[Area], differs: bool) {
             ("aria-label", &"Colours of the diagram"),
         ],
         |html| {
-            for state in SenderState::ALL {
-                if areas.iter().any(|area| area.state == state) {
-                    html.element("li", &[], |html| {
-                        html.line(
-                            "i",
-                            &[("class", &class(state)), ("aria-hidden", &"true")],
-                            "",
-                        );
-                        html.text(state.name());
-                    });
-                }
-            }
-            let faults = areas.iter().any(|area| area.fault);
-            let mark = |html: &mut Html, class: &str, text: &str| {
+            for (class, meaning) in picture.legend() {
                 html.element("li", &[], |html| {
                     html.line("i", &[("class", &class), ("aria-hidden", &"true")], "");
-                    html.text(text);
+                    html.text(meaning);
                 });
-            };
-            if faults {
-                mark(
-                    html,
-                    "x",
-                    "fault: damaged on the line, or the drive that detected it",
-                );
-                mark(html, "y", "a row with a fault");
-            }
-            if differs {
-                mark(
-                    html,
-                    "w",
-                    "the first byte that differs from what was expected",
-                );
             }
         },
     );
-}
-
-/// What the picture shows, in words: of every fault the place.
-fn description(ring: usize, trace: &Trace, areas: &[Area], cut: bool) -> String {
-    let bytes = trace
-        .channels
-        .iter()
-        .map(|l| l.octets().len())
-        .max()
-        .unwrap_or(0);
-    let mut text = format!(
-        "The links of a ring of {} drives across, headed by their senders; downwards {bytes} bytes, row n the n-th byte of each link.",
-        trace.stations
-    );
-    let faults = areas.iter().filter(|area| area.fault);
-    for area in faults.clone().take(FAULTS) {
-        let words = if area.remark.is_empty() {
-            &area.status
-        } else {
-            &area.remark
-        };
-        let link = name(ring, &trace.channels[area.links.start]);
-        let _infallible = write!(
-            text,
-            " Fault: {link} byte {}: {words}.",
-            area.rows.start + 1
-        );
-    }
-    let more = faults.count().saturating_sub(FAULTS);
-    if more > 0 {
-        let _infallible = write!(text, " And {more} more.");
-    }
-    if cut {
-        text.push_str(" Only the beginning is drawn.");
-    }
-    text
 }
 
 /// Words that occur again and again, each once.
@@ -406,7 +170,8 @@ impl Texts {
     }
 }
 
-fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -> Data {
+fn data(ring: usize, trace: &Trace, picture: &RingPicture<'_>, rate: Rate) -> Data {
+    let areas: &[Area] = &picture.areas;
     let mut texts = Texts::default();
     let number = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
     let range = |range: &Range<usize>| [number(range.start), number(range.len())];
@@ -428,19 +193,19 @@ fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -
     }
     let byte = rate.byte_time().units();
     let times = trace.channels.iter().map(|link| {
-        let ends = link.octets().iter().take(frame.rows);
+        let ends = link.octets().iter().take(picture.rows.end);
         times(ends.map(|byte| byte.at.since_start().units()), byte)
     });
     Data {
         left: LEFT,
         top: TOP,
-        column: frame.column,
+        column: picture.column,
         row: ROW,
         first: 0,
-        rows: frame.rows,
+        rows: picture.rows.end,
         byte,
         links: trace.channels.iter().map(|link| name(ring, link)).collect(),
-        differs: frame.differs,
+        differs: picture.differs,
         texts: texts.all,
         areas: flat,
         times: times.collect(),

@@ -1,11 +1,13 @@
 //! How the ring's bytes read, and its tables and pictures: a column a drive.
 
+mod cells;
 pub mod csv;
 pub(crate) mod diagram;
 pub mod json;
 pub(crate) mod lines;
 pub(crate) mod live;
 pub mod meaning;
+mod picture;
 pub mod plot;
 pub(crate) mod sequence;
 pub mod svg;

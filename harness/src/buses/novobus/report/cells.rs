@@ -1,8 +1,8 @@
 //! The bytes of a diagram, and equal neighbours put together.
 
-use super::{MAX_ROWS, RowPlacing};
-use crate::report::csv::{remark, status};
-use crate::report::walk::{Reader, SenderState};
+use super::csv::{remark, status};
+use super::picture::{MAX_ROWS, RowPlacing};
+use super::walk::{Reader, SenderState};
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
