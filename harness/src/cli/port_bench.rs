@@ -12,18 +12,30 @@ use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use std::time::Duration;
 
-/// Takes a rig, runs `act` on it and gives it back. The drives stay as they are if `as_what` says so and `act` succeeds, or if nothing
-/// was done. In all other cases the bench is given back in its safe state.
+/// Where a command runs.
+pub(crate) enum PortBench<'b, D: PortDrives> {
+    /// On a rig that is taken for this command.
+    Rig(&'b Rig),
+    /// On a rig that a session holds.
+    Held(&'b mut PortSession<D>),
+}
+
+/// Runs `act` on a bench. A rig is taken for it and given back: its drives stay as they are if `as_what` says so and `act` succeeds, or if
+/// nothing was done. In all other cases it is given back in its safe state. What a session holds stays as `act` leaves it.
 ///
 /// # Errors
-/// [`Failure`]: the rig cannot be taken.
+/// [`Failure`]: the rig cannot be taken. Of a session also that of `act`.
 pub(crate) fn on<D: PortDrives>(
-    rig: &Rig,
+    bench: PortBench<'_, D>,
     arguments: &RigArguments,
     as_what: Use,
     output: &mut Output,
     act: impl FnOnce(&mut PortSession<D>, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
+    let rig = match bench {
+        PortBench::Rig(rig) => rig,
+        PortBench::Held(session) => return act(session, output),
+    };
     let mut rig = rig.clone();
     if let Some(path) = &arguments.setup {
         let Some(port) = rig.port().filter(|_| rig.origin.starts_with("sim:")) else {

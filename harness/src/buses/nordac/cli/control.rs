@@ -12,8 +12,7 @@ use crate::buses::nordac::value::{Setpoint, Step, percentage, status, steps};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on as with, select, single};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on as with, select, single};
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
@@ -29,13 +28,13 @@ const YEAR: u64 = 365 * 24 * 3_600;
 
 /// Brings slaves into the exchange.
 pub(super) fn start(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &StartArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let as_what = Use::look("start");
     let select = &arguments.select;
-    with(rig, &select.rig, as_what, output, |session, output| {
+    with(bench, &select.rig, as_what, output, |session, output| {
         let mut objects = Vec::new();
         let exit = each(session, &select.drives, output, |driver, slave| {
             let started = driver.start(slave, None)?;
@@ -61,7 +60,7 @@ pub(super) fn start(
 
 /// Exchanges words with a slave, step by step.
 pub(super) fn exchange(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &ExchangeArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -71,7 +70,7 @@ pub(super) fn exchange(
         moves: arguments.leave,
         holds: false,
     };
-    with(rig, &arguments.rig, as_what, output, |session, output| {
+    with(bench, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
         let longest = longest_hold(session);
         let mut driver = driver(session);
@@ -175,14 +174,18 @@ fn word(given: Setpoint, slave: u8, maximum: i64) -> Result<u16, Error> {
 }
 
 /// Switches motors on for a time.
-pub(super) fn on(rig: &Rig, arguments: &OnArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(super) fn on(
+    bench: PortBench<'_, Inverters>,
+    arguments: &OnArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let as_what = Use {
         purpose: "on",
         moves: arguments.leave,
         holds: false,
     };
     let select = &arguments.select;
-    with(rig, &select.rig, as_what, output, |session, output| {
+    with(bench, &select.rig, as_what, output, |session, output| {
         let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         refuse_motion(arguments.leave, "on", &slaves)?;
         let longest = longest_hold(session);
@@ -223,7 +226,7 @@ pub(super) type Stop = fn(&mut Driver<'_>, u8) -> Result<Reached, Error>;
 
 /// Stops motors; needs no permission.
 pub(super) fn stop(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     (purpose, call): (&'static str, Stop),
     arguments: &SelectArguments,
     output: &mut Output,
@@ -232,7 +235,7 @@ pub(super) fn stop(
         moves: true,
         ..Use::look(purpose)
     };
-    with(rig, &arguments.rig, as_what, output, |session, output| {
+    with(bench, &arguments.rig, as_what, output, |session, output| {
         each(session, &arguments.drives, output, |driver, slave| {
             driver.start(slave, None)?;
             call(driver, slave).map(|reached| Some(sent(&reached)))
@@ -242,7 +245,7 @@ pub(super) fn stop(
 
 /// Acknowledges faults.
 pub(super) fn acknowledge(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &AcknowledgeArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -251,7 +254,7 @@ pub(super) fn acknowledge(
         ..Use::look("acknowledge")
     };
     let select = &arguments.select;
-    with(rig, &select.rig, as_what, output, |session, output| {
+    with(bench, &select.rig, as_what, output, |session, output| {
         let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         let mut driver = driver(session);
         for slave in &slaves {

@@ -4,12 +4,12 @@ use super::bench::driver;
 use super::read::{Found, find};
 use crate::buses::commands::{Axes, InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error};
+use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, ReplyWord, parameter};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
 
@@ -99,12 +99,12 @@ fn look(driver: &mut Driver<'_>, slave: u8, ppo: PpoType) -> Result<Seen, Error>
 
 /// Lists slaves. One that does not answer is reported, and the others are listed.
 pub(super) fn info(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &InfoArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let as_what = Use::look("info");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         let mut all = Vec::new();
@@ -132,7 +132,7 @@ pub(super) fn info(
 
 /// Shows all slaves, a row each; with `--once` one page, and without it again and again until the program is interrupted.
 pub(super) fn top(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -142,7 +142,7 @@ pub(super) fn top(
         ));
     }
     let as_what = Use::look("top");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
         let mut driver = driver(session);
         let mut known = Vec::new();

@@ -16,10 +16,11 @@ pub(crate) use check::check;
 
 use super::driver;
 use crate::buses::commands::{DriveCommand, ParamsCommand};
+use crate::buses::nordac::rig::Inverters;
 use crate::cli::exit::Exit;
 use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::output::Output;
-use crate::rig::Rig;
+use crate::cli::port_bench::PortBench;
 use control::Stop;
 
 /// The calls that stop motors, with their names on the command line.
@@ -28,35 +29,35 @@ const STOP: (&str, Stop) = ("stop", |driver, slave| driver.off(slave));
 const BLOCK: (&str, Stop) = ("block", |driver, slave| driver.block(slave));
 const QUICK_STOP: (&str, Stop) = ("quick-stop", |driver, slave| driver.quick_stop(slave));
 
-/// Runs a command on a rig.
+/// Runs a command on a rig, or on one that a session holds.
 ///
 /// # Errors
 /// [`Failure`].
 pub(crate) fn drive(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     command: &DriveCommand,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     match command {
-        DriveCommand::Read(own) => read::read(rig, own, output),
-        DriveCommand::Write(own) => write::write(rig, own, output),
-        DriveCommand::Info(own) => info::info(rig, own, output),
-        DriveCommand::Watch(own) => watch::watch(rig, own, output),
-        DriveCommand::Top(own) => info::top(rig, own, output),
-        DriveCommand::Params(ParamsCommand::Save(own)) => params::save(rig, own, output),
-        DriveCommand::Params(ParamsCommand::Diff(own)) => params::diff(rig, own, output),
-        DriveCommand::Params(ParamsCommand::Load(own)) => params::load(rig, own, output),
-        DriveCommand::Stop(own) => control::stop(rig, STOP, own, output),
-        DriveCommand::Block(own) => control::stop(rig, BLOCK, own, output),
-        DriveCommand::Cyclic(CyclicCommand::Start(own)) => control::start(rig, own, output),
-        DriveCommand::Cyclic(CyclicCommand::Exchange(own)) => control::exchange(rig, own, output),
-        DriveCommand::Cyclic(CyclicCommand::On(own)) => control::on(rig, own, output),
-        DriveCommand::Cyclic(CyclicCommand::Off(own)) => control::stop(rig, OFF, own, output),
+        DriveCommand::Read(own) => read::read(bench, own, output),
+        DriveCommand::Write(own) => write::write(bench, own, output),
+        DriveCommand::Info(own) => info::info(bench, own, output),
+        DriveCommand::Watch(own) => watch::watch(bench, own, output),
+        DriveCommand::Top(own) => info::top(bench, own, output),
+        DriveCommand::Params(ParamsCommand::Save(own)) => params::save(bench, own, output),
+        DriveCommand::Params(ParamsCommand::Diff(own)) => params::diff(bench, own, output),
+        DriveCommand::Params(ParamsCommand::Load(own)) => params::load(bench, own, output),
+        DriveCommand::Stop(own) => control::stop(bench, STOP, own, output),
+        DriveCommand::Block(own) => control::stop(bench, BLOCK, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Start(own)) => control::start(bench, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Exchange(own)) => control::exchange(bench, own, output),
+        DriveCommand::Cyclic(CyclicCommand::On(own)) => control::on(bench, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Off(own)) => control::stop(bench, OFF, own, output),
         DriveCommand::Cyclic(CyclicCommand::QuickStop(own)) => {
-            control::stop(rig, QUICK_STOP, own, output)
+            control::stop(bench, QUICK_STOP, own, output)
         }
         DriveCommand::Cyclic(CyclicCommand::Acknowledge(own)) => {
-            control::acknowledge(rig, own, output)
+            control::acknowledge(bench, own, output)
         }
         DriveCommand::Go(_)
         | DriveCommand::DeleteError(_)

@@ -10,13 +10,13 @@ use super::read::{Found, find};
 use super::write::refuse_denied;
 use crate::buses::commands::{LoadArguments, ParamsArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error};
+use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Assignment, Cell, every, parameter, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, single};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, single};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use harness_proto::nordac::parameter::Flag;
@@ -41,12 +41,12 @@ fn is_kept(own: &Parameter) -> bool {
 
 /// Writes the parameters of a slave into a file.
 pub(super) fn save(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &ParamsArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let as_what = Use::look("params save");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
         let found = parameters(&mut driver(session), slave)?;
         file::write(&arguments.file, &text(slave, &found))?;
@@ -61,13 +61,13 @@ pub(super) fn save(
 
 /// Compares a slave with a file.
 pub(super) fn diff(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &ParamsArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let wanted = read_file(&arguments.file)?;
     let as_what = Use::look("params diff");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
         let mut driver = driver(session);
         driver.start(slave, None)?;
@@ -82,7 +82,7 @@ pub(super) fn diff(
 
 /// Writes the parameters of a file that differ into a slave.
 pub(super) fn load(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &LoadArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -98,7 +98,7 @@ pub(super) fn load(
         moves: arguments.yes,
         holds: arguments.hold.hold || !arguments.yes,
     };
-    on(rig, &own.rig, as_what, output, |session, output| {
+    on(bench, &own.rig, as_what, output, |session, output| {
         let slave = single(&own.drive, session)?;
         let mut driver = driver(session);
         driver.start(slave, None)?;

@@ -3,13 +3,13 @@
 use super::bench::driver;
 use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error, percent};
+use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, ReplyWord, cells, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
+use crate::cli::port_bench::{PortBench, on, select};
 use crate::cli::watch::{HEX, decimal};
-use crate::rig::Rig;
 use harness_proto::nordac::PkwError;
 use serde_json::json;
 
@@ -60,13 +60,13 @@ impl Found {
 
 /// Reads cells and shows them.
 pub(super) fn read(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &ReadArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells).map_err(Failure::refused)?;
     let as_what = Use::look("read");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         let mut found = Vec::new();

@@ -4,25 +4,25 @@ use super::bench::driver;
 use super::read::{Found, find};
 use crate::buses::commands::{Use, WatchArguments};
 use crate::buses::nordac::driver::Driver;
+use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, cells};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
+use crate::cli::port_bench::{PortBench, on, select};
 use crate::cli::watch::{WatchBench, WatchedCell, check_times, watch as show};
-use crate::rig::Rig;
 use harness_proto::time::{Instant, Span};
 
 /// Shows values, a line each time.
 pub(super) fn watch(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &WatchArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells).map_err(Failure::refused)?;
     check_times(arguments)?;
     let as_what = Use::look("watch");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         for slave in &slaves {

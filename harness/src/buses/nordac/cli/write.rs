@@ -3,12 +3,12 @@
 use super::bench::driver;
 use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::nordac::driver::{Driver, Error, Written};
+use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Assignment, assignments, shown};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, Task};
 
 /// The parameters that are the address, and that load factory settings.
@@ -17,7 +17,7 @@ const FACTORY: [u16; 2] = [970, 1602];
 
 /// Writes parameters and shows what the slave answers.
 pub(super) fn write(
-    rig: &Rig,
+    bench: PortBench<'_, Inverters>,
     arguments: &WriteArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -27,7 +27,7 @@ pub(super) fn write(
         moves: arguments.leave,
         holds: arguments.hold.hold,
     };
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         for slave in &slaves {

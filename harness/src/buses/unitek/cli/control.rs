@@ -7,8 +7,7 @@ use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
@@ -23,7 +22,7 @@ const CANCEL: (u8, u16) = (0x8E, 0x4D44);
 
 /// Releases drives: their motors may turn.
 pub(super) fn go(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &MoveArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -33,7 +32,7 @@ pub(super) fn go(
         holds: arguments.hold.hold,
     };
     let select = &arguments.select;
-    on(rig, &select.rig, as_what, output, |session, output| {
+    on(bench, &select.rig, as_what, output, |session, output| {
         let drives = crate::cli::port_bench::select(&select.drives, session)?;
         let warning = format!("go: {}: motors may turn", UnitekDrives::named(&drives));
         if !arguments.leave {
@@ -65,7 +64,7 @@ pub(super) fn start_up(axis: Axis) -> [Order; 4] {
 
 /// Stops drives: a speed command of 0, or a lock where no command is permitted.
 pub(super) fn stop(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &SelectArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -73,7 +72,7 @@ pub(super) fn stop(
         moves: true,
         ..Use::look("stop")
     };
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(&arguments.drives, session)?;
         each(session, &drives, output, |driver, axis| {
             Ok(match driver.stop(axis)? {
@@ -88,12 +87,12 @@ pub(super) fn stop(
 
 /// Locks drives: no torque.
 pub(super) fn block(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &SelectArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     on(
-        rig,
+        bench,
         &arguments.rig,
         Use::look("block"),
         output,
@@ -108,7 +107,7 @@ pub(super) fn block(
 
 /// Clears errors.
 pub(super) fn delete_error(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &DeleteErrorArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -117,7 +116,7 @@ pub(super) fn delete_error(
         ..Use::look("delete-error")
     };
     let select = &arguments.select;
-    on(rig, &select.rig, as_what, output, |session, output| {
+    on(bench, &select.rig, as_what, output, |session, output| {
         let drives = crate::cli::port_bench::select(&select.drives, session)?;
         let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
         let orders: Vec<_> = drives.iter().map(order).collect();

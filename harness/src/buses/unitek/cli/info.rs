@@ -2,12 +2,12 @@
 
 use super::read::{Found, find};
 use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
+use crate::buses::unitek::rig::UnitekDrives;
 use crate::buses::unitek::value::hex;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
 
@@ -28,12 +28,12 @@ const SHOWN: [(&str, u8); 11] = [
 
 /// Lists drives.
 pub(super) fn info(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &InfoArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     on(
-        rig,
+        bench,
         &arguments.rig,
         Use::look("info"),
         output,
@@ -57,7 +57,7 @@ pub(super) fn info(
 
 /// Shows all drives, a row each; with `--once` one page, and without it again and again until the program is interrupted.
 pub(super) fn top(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -67,7 +67,7 @@ pub(super) fn top(
         ));
     }
     let look = Use::look("top");
-    on(rig, &arguments.rig, look, output, |session, output| {
+    on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
         loop {
             let drives = session.axes().to_vec();

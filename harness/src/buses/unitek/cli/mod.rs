@@ -16,40 +16,41 @@ pub(crate) use check::check;
 
 use super::driver;
 use crate::buses::commands::{DriveCommand, ParamsCommand};
+use crate::buses::unitek::rig::UnitekDrives;
 use crate::cli::exit::Exit;
 use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::output::Output;
-use crate::rig::Rig;
+use crate::cli::port_bench::PortBench;
 
-/// Runs a command on a rig.
+/// Runs a command on a rig, or on one that a session holds.
 ///
 /// # Errors
 /// [`Failure`].
 pub(crate) fn drive(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     command: &DriveCommand,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     match command {
-        DriveCommand::Read(arguments) => read::read(rig, arguments, output),
-        DriveCommand::Write(arguments) => write::write(rig, arguments, output),
-        DriveCommand::Info(arguments) => info::info(rig, arguments, output),
-        DriveCommand::Watch(arguments) => watch::watch(rig, arguments, output),
+        DriveCommand::Read(arguments) => read::read(bench, arguments, output),
+        DriveCommand::Write(arguments) => write::write(bench, arguments, output),
+        DriveCommand::Info(arguments) => info::info(bench, arguments, output),
+        DriveCommand::Watch(arguments) => watch::watch(bench, arguments, output),
         DriveCommand::Params(ParamsCommand::Save(arguments)) => {
-            params::save(rig, arguments, output)
+            params::save(bench, arguments, output)
         }
         DriveCommand::Params(ParamsCommand::Diff(arguments)) => {
-            params::diff(rig, arguments, output)
+            params::diff(bench, arguments, output)
         }
         DriveCommand::Params(ParamsCommand::Load(arguments)) => {
-            params::load(rig, arguments, output)
+            params::load(bench, arguments, output)
         }
-        DriveCommand::Position(arguments) => position::position(rig, arguments, output),
-        DriveCommand::Go(arguments) => control::go(rig, arguments, output),
-        DriveCommand::Stop(arguments) => control::stop(rig, arguments, output),
-        DriveCommand::Block(arguments) => control::block(rig, arguments, output),
-        DriveCommand::DeleteError(arguments) => control::delete_error(rig, arguments, output),
-        DriveCommand::Top(arguments) => info::top(rig, arguments, output),
+        DriveCommand::Position(arguments) => position::position(bench, arguments, output),
+        DriveCommand::Go(arguments) => control::go(bench, arguments, output),
+        DriveCommand::Stop(arguments) => control::stop(bench, arguments, output),
+        DriveCommand::Block(arguments) => control::block(bench, arguments, output),
+        DriveCommand::DeleteError(arguments) => control::delete_error(bench, arguments, output),
+        DriveCommand::Top(arguments) => info::top(bench, arguments, output),
         DriveCommand::Scope(_)
         | DriveCommand::Reset(_)
         | DriveCommand::Recover(_)

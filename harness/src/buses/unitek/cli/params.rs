@@ -9,14 +9,13 @@
 use super::read::{Found, find};
 use super::write::{Order, refuse_denied};
 use crate::buses::commands::{Axes, LoadArguments, ParamsArguments, Use};
-use crate::buses::unitek::rig::{Axis, Session};
+use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{hex, is_parameter, register};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, single};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, single};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use harness_proto::unitek::guard::{Class, class};
@@ -34,12 +33,12 @@ const STORE: (u8, u16) = (0x84, 0);
 
 /// Writes the parameters of a drive into a file.
 pub(super) fn save(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &ParamsArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     on(
-        rig,
+        bench,
         &arguments.rig,
         Use::look("params save"),
         output,
@@ -59,13 +58,13 @@ pub(super) fn save(
 
 /// Compares a drive with a file.
 pub(super) fn diff(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &ParamsArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let wanted = read_file(&arguments.file)?;
     on(
-        rig,
+        bench,
         &arguments.rig,
         Use::look("params diff"),
         output,
@@ -83,7 +82,7 @@ pub(super) fn diff(
 
 /// Writes the parameters of a file that differ into a drive.
 pub(super) fn load(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &LoadArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -94,7 +93,7 @@ pub(super) fn load(
         holds: arguments.hold.hold || !arguments.yes,
     };
     on(
-        rig,
+        bench,
         &arguments.params.rig,
         as_what,
         output,

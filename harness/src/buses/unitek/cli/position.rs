@@ -8,8 +8,7 @@ use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, single};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, single};
 use crate::scenario::quantity::Quantity;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
@@ -28,7 +27,7 @@ const STALLED: Span = Span::from_millis(2_000);
 
 /// Homes a drive, or moves it, and waits until it has arrived.
 pub(super) fn position(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &PositionArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -42,7 +41,7 @@ pub(super) fn position(
         moves: arguments.leave,
         holds: arguments.hold.hold,
     };
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let axis = single::<UnitekDrives>(&arguments.drive, session)?;
         if !arguments.leave {
             return Err(Failure::refused(format!(

@@ -2,13 +2,12 @@
 
 use super::bench::scaling;
 use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
-use crate::buses::unitek::rig::{Axis, Session};
+use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers, words};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use harness_proto::unitek::frame::Reply;
 use harness_proto::unitek::units::{Scaling, usual};
 use harness_proto::unitek::words::set_bits;
@@ -34,13 +33,13 @@ impl Found {
 
 /// Reads registers and shows them.
 pub(super) fn read(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &ReadArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let registers = registers(&arguments.cells).map_err(Failure::refused)?;
     on(
-        rig,
+        bench,
         &arguments.rig,
         Use::look("read"),
         output,

@@ -2,28 +2,27 @@
 
 use super::read::{Found, find};
 use crate::buses::commands::{Use, WatchArguments};
-use crate::buses::unitek::rig::{Axis, Session};
+use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
+use crate::cli::port_bench::{PortBench, on, select};
 use crate::cli::watch::{HEX, WatchBench, WatchedCell, check_times, decimal, watch as show};
-use crate::rig::Rig;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Register;
 use harness_proto::unitek::units::{usual, value};
 
 /// Shows values, a line each time.
 pub(super) fn watch(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &WatchArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let registers = registers(&arguments.cells).map_err(Failure::refused)?;
     check_times(arguments)?;
     let as_what = Use::look("watch");
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut watched = WatchedRegisters {
             session,

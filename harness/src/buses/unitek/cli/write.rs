@@ -3,13 +3,12 @@
 use super::bench::scaling;
 use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::unitek::driver::Driver;
-use crate::buses::unitek::rig::Axis;
+use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::buses::unitek::value::{assignment, hex, words};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::port_bench::{on, select};
-use crate::rig::Rig;
+use crate::cli::port_bench::{PortBench, on, select};
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::master::Job;
@@ -20,7 +19,7 @@ pub(super) type Order = (Axis, &'static Register, Data);
 
 /// Writes registers and shows what they read.
 pub(super) fn write(
-    rig: &Rig,
+    bench: PortBench<'_, UnitekDrives>,
     arguments: &WriteArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
@@ -34,7 +33,7 @@ pub(super) fn write(
         moves: arguments.leave,
         holds: arguments.hold.hold,
     };
-    on(rig, &arguments.rig, as_what, output, |session, output| {
+    on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = session.driver();
         let mut orders = Vec::new();

@@ -21,6 +21,7 @@ use super::simulate::{DriveSetup, Setup};
 use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
 use crate::cli::fuzz::LineFuzz;
+use crate::cli::port_bench::PortBench;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -55,7 +56,7 @@ pub(crate) const PORT: PortRow = PortRow {
     judge: Some(|rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
     }),
-    command: super::cli::drive,
+    command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
     check: super::cli::check,
     fuzz: LineFuzz::of::<Unitek>(),
 };
