@@ -52,7 +52,8 @@ use crate::cli::failure::Failure;
 use crate::cli::fuzz::{LineFuzz, verify};
 use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
-use crate::cli::rig_failure::find_any_rig;
+use crate::cli::rig_failure::{exit_of, find_any_rig};
+use crate::cli::shell::HeldBench;
 use crate::evidence::Signer;
 use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
@@ -410,6 +411,22 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
     };
     let end = (bus.row().command)(&rig, command, output);
     told(end, output)
+}
+
+/// Takes a rig for a session.
+///
+/// # Errors
+/// [`Failure`]; nothing is left locked or open.
+pub(crate) fn hold(
+    rig: &Rig,
+    options: &Options,
+    output: &mut Output,
+) -> Result<Box<dyn HeldBench>, Failure> {
+    match rig.port() {
+        None => novobus::cli::held::hold(rig, options, output),
+        Some(port) => (port.bus.row().hold)(rig, options)
+            .map_err(|error| Failure::Said(exit_of(&error), error.to_string())),
+    }
 }
 
 /// Runs `rig check`.

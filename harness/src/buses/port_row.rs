@@ -6,6 +6,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::fuzz::LineFuzz;
 use crate::cli::output::Output;
+use crate::cli::shell::HeldBench;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Options, Rig, SessionError};
@@ -48,6 +49,8 @@ pub(crate) struct PortRow {
     pub(crate) judge: Option<OpenJudge>,
     /// Runs a command on its drives.
     pub(crate) command: fn(&Rig, &DriveCommand, &mut Output) -> Result<Exit, Failure>,
+    /// Takes a rig for a session.
+    pub(crate) hold: fn(&Rig, &Options) -> Result<Box<dyn HeldBench>, SessionError>,
     /// Runs `rig check`, as text or for tools.
     pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
     /// Explores its drives.

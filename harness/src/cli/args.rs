@@ -7,6 +7,7 @@ use super::extcap::ExtcapArguments;
 use super::fuzz::FuzzCommand;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
+use super::shell::ShellArguments;
 use super::shrink::ShrinkArguments;
 use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
@@ -119,6 +120,10 @@ pub enum Command {
         /// The kind of file.
         of: SchemaName,
     },
+    /// Hold a bench for a program: JSON requests on standard input, answers on standard output.
+    ///
+    /// The bus stays at work between two requests. The end of the input, a signal or a lost port ends in the safe state.
+    Shell(ShellArguments),
     /// Search for unknown faults with random conversations.
     Fuzz {
         /// What to do.
@@ -473,6 +478,8 @@ pub enum SchemaName {
     Record,
     /// A rig's file, as `rig schema`.
     Rig,
+    /// A line of `shell --json`, in either direction.
+    Session,
 }
 
 /// The forms of a table.

@@ -39,7 +39,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "recover",
         ],
     ),
-    ("Benches", &["rig", "sim"]),
+    ("Benches", &["rig", "sim", "shell"]),
     ("Find", &["fuzz", "shrink", "promote", "campaign"]),
     (
         "Exchange",

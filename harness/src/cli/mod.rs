@@ -30,6 +30,7 @@ pub(crate) mod run;
 mod run_rig;
 mod run_segment;
 mod schema;
+pub(crate) mod shell;
 pub(crate) mod shrink;
 mod tally;
 mod trace;
@@ -89,6 +90,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Verify(arguments) => verify::verify(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
         Command::Schema { of } => schema::schema(of, output),
+        Command::Shell(arguments) => shell::shell(&arguments, output),
         Command::Fuzz { command } => fuzz::fuzz(&command, output),
         Command::Shrink(arguments) => shrink::shrink(&arguments, output),
         Command::Promote(arguments) => promote::promote(&arguments, output),

@@ -19,7 +19,12 @@ pub(crate) struct Output {
     pub(crate) full_screen: bool,
     /// The columns of the terminal on standard output.
     width: Option<usize>,
+    /// Results and messages, where they are collected for an answer in place of being written.
+    collected: Option<[String; 2]>,
 }
+
+/// Maximum bytes that are collected of results, and of messages.
+const MOST_COLLECTED: usize = 4 << 20;
 
 /// What the streams of the process are, and what its environment says of colours.
 struct Streams {
@@ -80,7 +85,45 @@ impl Output {
             terminal: streams.out_is_terminal,
             full_screen: streams.out_is_terminal && !streams.dumb,
             width: streams.width.filter(|_| streams.out_is_terminal),
+            collected: None,
         }
+    }
+
+    /// Collects results and messages for an answer.
+    pub(crate) fn collecting() -> Self {
+        Self {
+            colour_out: false,
+            colour_err: false,
+            progress: false,
+            terminal: false,
+            full_screen: false,
+            width: None,
+            collected: Some(Default::default()),
+        }
+    }
+
+    /// The results and messages collected since the last call.
+    pub(crate) fn take_collected(&mut self) -> [String; 2] {
+        self.collected
+            .as_mut()
+            .map(std::mem::take)
+            .unwrap_or_default()
+    }
+
+    /// The results collected so far.
+    pub(crate) fn collected_result(&self) -> &str {
+        self.collected.as_ref().map_or("", |own| &own[0])
+    }
+
+    /// Keeps a text where texts are collected; of too long ones their beginning.
+    fn collect(&mut self, stream: usize, text: &str) -> bool {
+        let Some(collected) = &mut self.collected else {
+            return false;
+        };
+        if collected[stream].len() < MOST_COLLECTED {
+            collected[stream].push_str(text);
+        }
+        true
     }
 
     /// Lines that fit the terminal: the words that do not fit go on in indented lines. A pipe or a file gets the lines as they are.
@@ -101,6 +144,9 @@ impl Output {
 
     /// Writes a result.
     pub(crate) fn result(&mut self, text: &str) -> std::io::Result<()> {
+        if self.collect(0, text) {
+            return Ok(());
+        }
         let mut out = std::io::stdout().lock();
         unless_closed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
     }
@@ -119,6 +165,9 @@ impl Output {
 
     /// Writes to standard error; a failure is ignored, because a closed standard error means that no one reads it.
     pub(crate) fn say(&mut self, text: &str) {
+        if self.collect(1, text) {
+            return;
+        }
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
     }
 

@@ -11,6 +11,7 @@ pub(crate) fn schema(name: SchemaName, output: &mut Output) -> std::io::Result<E
     let schema = match name {
         SchemaName::Record => evidence::schema(),
         SchemaName::Rig => rig::schema(),
+        SchemaName::Session => super::shell::schema(),
     };
     output.result(&format!("{schema:#}\n"))?;
     Ok(Exit::Passed)

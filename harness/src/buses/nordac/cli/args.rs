@@ -57,6 +57,17 @@ impl CyclicCommand {
             Self::Acknowledge(own) => &own.select.rig,
         }
     }
+
+    /// The same, to be changed.
+    pub(crate) const fn rig_mut(&mut self) -> &mut RigArguments {
+        match self {
+            Self::Start(own) => &mut own.select.rig,
+            Self::Off(own) | Self::QuickStop(own) => &mut own.rig,
+            Self::Exchange(own) => &mut own.rig,
+            Self::On(own) => &mut own.select.rig,
+            Self::Acknowledge(own) => &mut own.select.rig,
+        }
+    }
 }
 
 /// For `start`.

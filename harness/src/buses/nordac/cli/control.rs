@@ -74,7 +74,7 @@ pub(super) fn exchange(
         let slave = single(&arguments.drive, session)?;
         let longest = longest_hold(session);
         let mut driver = driver(session);
-        driver.start(slave, None)?;
+        driver.join(slave)?;
         let hertz = |own: &Step| matches!(own.setpoint, Some(Setpoint::Tenths(_)));
         let maximum = supervised(&mut driver, slave, steps.iter().any(hertz))?;
         let mut words = [0; 4];
@@ -193,7 +193,7 @@ pub(super) fn on(
         let mut orders = Vec::new();
         let in_hertz = matches!(arguments.setpoint, Setpoint::Tenths(_));
         for slave in &slaves {
-            driver.start(*slave, None)?;
+            driver.join(*slave)?;
             let maximum = supervised(&mut driver, *slave, in_hertz)?;
             let setpoint = word(arguments.setpoint, *slave, maximum)?;
             refuse_denied(&driver, *slave, [stw::START, setpoint, 0, 0])?;
@@ -237,7 +237,7 @@ pub(super) fn stop(
     };
     with(bench, &arguments.rig, as_what, output, |session, output| {
         each(session, &arguments.drives, output, |driver, slave| {
-            driver.start(slave, None)?;
+            driver.join(slave)?;
             call(driver, slave).map(|reached| Some(sent(&reached)))
         })
     })
@@ -258,12 +258,12 @@ pub(super) fn acknowledge(
         let slaves = crate::cli::port_bench::select(&select.drives, session)?;
         let mut driver = driver(session);
         for slave in &slaves {
-            driver.start(*slave, None)?;
+            driver.join(*slave)?;
             refuse_denied(&driver, *slave, [stw::SAFE | stw::ACKNOWLEDGE, 0, 0, 0])?;
         }
         drop(driver);
         each(session, &select.drives, output, |driver, slave| {
-            driver.start(slave, None)?;
+            driver.join(slave)?;
             let (fault, reached) = driver.acknowledge(slave)?;
             let before = match fault {
                 Some(0) => "it had no fault".to_owned(),

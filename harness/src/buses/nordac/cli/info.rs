@@ -111,8 +111,8 @@ pub(super) fn info(
         let mut exit = Exit::Passed;
         for slave in slaves {
             let seen = driver
-                .start(slave, None)
-                .and_then(|started| look(&mut driver, slave, started.ppo));
+                .join(slave)
+                .and_then(|ppo| look(&mut driver, slave, ppo));
             match seen {
                 Ok(seen) => all.push(seen),
                 Err(error @ Error::Link(_)) => return Err(error.into()),
@@ -147,7 +147,7 @@ pub(super) fn top(
         let mut driver = driver(session);
         let mut known = Vec::new();
         for slave in slaves {
-            known.push((slave, driver.start(slave, None)?.ppo));
+            known.push((slave, driver.join(slave)?));
         }
         loop {
             let mut seen = Vec::new();

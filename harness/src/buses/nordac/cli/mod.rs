@@ -5,6 +5,7 @@ mod bench;
 pub(crate) mod cells;
 mod check;
 mod control;
+mod held;
 mod info;
 mod params;
 mod read;
@@ -12,6 +13,7 @@ mod watch;
 mod write;
 
 pub(crate) use args::CyclicCommand;
+pub(super) use bench::Parked;
 pub(crate) use check::check;
 
 use super::driver;

@@ -70,7 +70,7 @@ pub(super) fn diff(
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slave = single(&arguments.drive, session)?;
         let mut driver = driver(session);
-        driver.start(slave, None)?;
+        driver.join(slave)?;
         let differing = differing(&mut driver, slave, &wanted)?;
         output.result(&page(&differing))?;
         Ok(match differing.is_empty() {
@@ -101,7 +101,7 @@ pub(super) fn load(
     on(bench, &own.rig, as_what, output, |session, output| {
         let slave = single(&own.drive, session)?;
         let mut driver = driver(session);
-        driver.start(slave, None)?;
+        driver.join(slave)?;
         let differing = differing(&mut driver, slave, &wanted)?;
         output.result(&page(&differing))?;
         if !arguments.yes {
@@ -161,7 +161,7 @@ fn write_all(driver: &mut Driver<'_>, slave: u8, orders: &[Assignment]) -> Resul
 
 /// The parameters that a file keeps, read.
 fn parameters(driver: &mut Driver<'_>, slave: u8) -> Result<Vec<Found>, Failure> {
-    driver.start(slave, None)?;
+    driver.join(slave)?;
     let all: Vec<_> = every(is_kept).map(Cell::Parameter).collect();
     Ok(find(driver, slave, &all)?)
 }

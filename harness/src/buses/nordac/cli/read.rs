@@ -71,7 +71,7 @@ pub(super) fn read(
         let mut driver = driver(session);
         let mut found = Vec::new();
         for slave in slaves {
-            driver.start(slave, None)?;
+            driver.join(slave)?;
             found.extend(find(&mut driver, slave, &cells)?);
         }
         match arguments.format {

@@ -1,9 +1,8 @@
 //! `drivebench watch` on NORDAC inverters: process words and parameters, again and again.
 
-use super::bench::driver;
+use super::bench::{Master, driver};
 use super::read::{Found, find};
 use crate::buses::commands::{Use, WatchArguments};
-use crate::buses::nordac::driver::Driver;
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, cells};
 use crate::cli::exit::Exit;
@@ -26,7 +25,7 @@ pub(super) fn watch(
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         for slave in &slaves {
-            driver.start(*slave, None)?;
+            driver.join(*slave)?;
         }
         let mut watched = WatchedSlaves {
             driver,
@@ -38,7 +37,7 @@ pub(super) fn watch(
 }
 
 struct WatchedSlaves<'a> {
-    driver: Driver<'a>,
+    driver: Master<'a>,
     slaves: &'a [u8],
     cells: &'a [Cell],
 }

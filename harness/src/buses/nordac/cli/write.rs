@@ -31,7 +31,7 @@ pub(super) fn write(
         let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
         let mut driver = driver(session);
         for slave in &slaves {
-            driver.start(*slave, None)?;
+            driver.join(*slave)?;
             refuse_denied(&driver, *slave, &orders)?;
         }
         let mut exit = Exit::Passed;

@@ -117,6 +117,30 @@ impl<'l> Driver<'l> {
         }
     }
 
+    /// The same master with all that it knows over another handle of its line: for a session, which lends the line to one request after
+    /// another.
+    #[must_use]
+    pub fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Driver<'b> {
+        Driver {
+            wire: self.wire.onto(line),
+            station: self.station,
+            master: self.master,
+            slaves: self.slaves,
+            options: self.options,
+        }
+    }
+
+    /// Brings a slave into the exchange unless it is there, and returns its PPO type. A slave in the exchange goes on with its last words.
+    ///
+    /// # Errors
+    /// See [`Self::start`].
+    pub fn join(&mut self, slave: u8) -> Result<PpoType, Error> {
+        if let Ok(place) = self.place(slave) {
+            return Ok(self.slaves[place].exchange.ppo());
+        }
+        self.start(slave, None).map(|started| started.ppo)
+    }
+
     /// The time of its line.
     #[must_use]
     pub fn now(&self) -> Instant {

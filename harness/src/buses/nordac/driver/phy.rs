@@ -109,6 +109,23 @@ impl<'l> Wire<'l> {
         &*self.line
     }
 
+    /// The same over another handle of the line.
+    pub(super) fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Wire<'b> {
+        Wire {
+            line,
+            timing: self.timing,
+            master: self.master,
+            left: self.left,
+            asked: self.asked,
+            begun: self.begun,
+            reply: self.reply,
+            ahead: self.ahead,
+            failed: self.failed,
+            diagnosis: self.diagnosis,
+            not_activated: self.not_activated,
+        }
+    }
+
     /// The master's time.
     pub(super) fn clock(&self) -> time::Instant {
         let micros = (self.line.now().since_start() + self.ahead).as_nanos() / 1000;

@@ -2,6 +2,7 @@
 
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
+use crate::buses::nordac::cli::Parked;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
@@ -23,6 +24,8 @@ use harness_proto::time::Span;
 pub struct Inverters {
     slaves: Vec<RigSlave>,
     patience: Span,
+    /// The master, between two requests of a session.
+    pub(in crate::buses::nordac) parked: Parked,
 }
 
 /// A rig in use.
@@ -44,7 +47,16 @@ impl PortDrives for Inverters {
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &known, port.listen_only);
         let patience = patience_of(rig, port);
-        Ok((Self { slaves, patience }, link, locks))
+        let parked = Parked::default();
+        Ok((
+            Self {
+                slaves,
+                patience,
+                parked,
+            },
+            link,
+            locks,
+        ))
     }
 
     /// Asks every slave for its diagnosis and its configuration, which changes nothing.
@@ -119,7 +131,9 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
     if session.listens_only() || !session.rig().file.health.before && !unknown {
         return Ok(());
     }
-    let Inverters { slaves, patience } = session.drives().clone();
+    let Inverters {
+        slaves, patience, ..
+    } = session.drives().clone();
     let mut silent = Ok(());
     let mut found = Vec::new();
     let mut talk = Talk::new(Box::new(session.link()), patience);

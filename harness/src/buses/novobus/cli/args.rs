@@ -1,7 +1,7 @@
 //! The arguments of the commands on a bus.
 
 use super::axes::Axes;
-use super::rig::RigName;
+use super::rig::{OpenBench, RigName};
 use super::sim::{SIM_HELP, SimArguments};
 use crate::buses::CyclicCommand;
 use crate::scenario::argument::{duration, number};
@@ -9,6 +9,7 @@ use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
 use harness_proto::time::Span;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 const READ_JSON: &str = "\
 With --format json: {\"schema\": 1, \"cells\": [...]}, each cell with `axis`, `name`, `memory` (\"ram\" or
@@ -115,6 +116,29 @@ impl DriveCommand {
             Self::Sim(_) => return None,
         })
     }
+
+    /// The same, to be changed.
+    pub(crate) const fn rig_mut(&mut self) -> Option<&mut RigArguments> {
+        Some(match self {
+            Self::Read(arguments) => &mut arguments.rig,
+            Self::Write(arguments) => &mut arguments.rig,
+            Self::Info(arguments) => &mut arguments.rig,
+            Self::Watch(arguments) => &mut arguments.rig,
+            Self::Top(arguments) => &mut arguments.rig,
+            Self::Params(ParamsCommand::Save(arguments) | ParamsCommand::Diff(arguments)) => {
+                &mut arguments.rig
+            }
+            Self::Params(ParamsCommand::Load(arguments)) => &mut arguments.params.rig,
+            Self::Scope(arguments) => &mut arguments.rig,
+            Self::Position(arguments) => &mut arguments.rig,
+            Self::Go(arguments) | Self::Reset(arguments) => &mut arguments.select.rig,
+            Self::Stop(arguments) | Self::Block(arguments) => &mut arguments.rig,
+            Self::DeleteError(arguments) => &mut arguments.select.rig,
+            Self::Recover(arguments) => &mut arguments.rig,
+            Self::Cyclic(command) => command.rig_mut(),
+            Self::Sim(_) => return None,
+        })
+    }
 }
 
 /// Which bench.
@@ -131,6 +155,9 @@ pub struct RigArguments {
     /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = duration, default_value = "0ms")]
     pub patience: Span,
+    /// The bench of a session, in place of one that is opened for the command.
+    #[arg(skip)]
+    pub(crate) held: Option<Rc<OpenBench>>,
 }
 
 /// For commands that change something on drives with ports.

@@ -7,6 +7,7 @@ mod control;
 pub(crate) mod coverage;
 pub(crate) mod deviations;
 pub(crate) mod distil;
+pub(crate) mod held;
 mod info;
 mod params;
 mod params_file;
@@ -40,7 +41,19 @@ use crate::cli::output::Output;
 
 /// Runs a command and reports its errors.
 pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
-    let end = match command {
+    match perform(command, output) {
+        Ok(exit) => Ok(exit),
+        Err(Failure::Output(error)) => Err(error),
+        Err(failure) => Ok(failure.tell(output)),
+    }
+}
+
+/// Runs a command.
+///
+/// # Errors
+/// [`Failure`].
+fn perform(command: &DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
+    match command {
         DriveCommand::Read(arguments) => read::read(arguments, output),
         DriveCommand::Write(arguments) => write::write(arguments, output),
         DriveCommand::Info(arguments) => info::info(arguments, output),
@@ -59,11 +72,6 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
             "this command is for slaves with a cyclic master, such as --rig sim:nordac; on a ring there are go, stop, block and delete-error",
         )),
         DriveCommand::Sim(arguments) => sim::sim(arguments, output),
-    };
-    match end {
-        Ok(exit) => Ok(exit),
-        Err(Failure::Output(error)) => Err(error),
-        Err(failure) => Ok(failure.tell(output)),
     }
 }
 

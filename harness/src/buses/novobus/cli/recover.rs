@@ -38,7 +38,7 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
     }
 }
 
-fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {
+pub(super) fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {
     (0..rings).map(|ring| driver::recover(link, ring)).collect()
 }
 
@@ -75,7 +75,7 @@ fn show(
     }
 }
 
-fn text(ring: usize, recovery: &Recovery) -> String {
+pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
     let name = |drive: u8| Axis::new(ring, drive).map_or(String::new(), |axis| axis.to_string());
     let fault = |drive: u8| {
         format!(

@@ -25,6 +25,7 @@ use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
@@ -97,7 +98,30 @@ pub(crate) struct OpenBench {
     rig: Option<Shared>,
 }
 
+impl fmt::Debug for OpenBench {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OpenBench")
+            .field("rig", &self.rig)
+            .finish_non_exhaustive()
+    }
+}
+
 impl OpenBench {
+    /// The rings of a rig that a session holds.
+    ///
+    /// # Errors
+    /// [`Failure`]: the rings do not answer.
+    pub(crate) fn held(plan: Plan, rig: Shared) -> Result<Self, Failure> {
+        let sizes = rig.with(|session| session.rings().to_vec());
+        let line = Box::new(rig.line());
+        let bus = OpenRings::open(line, &sizes.unwrap_or_default(), Options::default())?;
+        Ok(Self {
+            bus,
+            plan,
+            rig: Some(rig),
+        })
+    }
+
     /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from
     /// the drive (14.3.2).
     pub(crate) fn units(&self, axis: Axis) -> Result<DriveUnits, Failure> {
@@ -126,7 +150,11 @@ impl OpenBench {
     /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error, and so does a silence where time-outs are
     /// monitored (9.9). Before a command that may move drives the error is confirmed, with a nominal speed of 0: a drive that was in go
     /// stands there, released.
-    fn confirm_bus_errors(&self, as_what: Use, output: &mut Output) -> Result<(), Failure> {
+    pub(crate) fn confirm_bus_errors(
+        &self,
+        as_what: Use,
+        output: &mut Output,
+    ) -> Result<(), Failure> {
         let mut confirmed: BTreeMap<bool, Vec<Axis>> = BTreeMap::new();
         for axis in self.bus.axes() {
             let error = self.bus.state(axis)?.error;
@@ -182,6 +210,9 @@ pub(crate) fn on_after(
     first: impl FnOnce(&mut Session, &mut Output) -> Result<(), Failure>,
     act: impl FnOnce(&OpenBench, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
+    if let Some(bench) = &arguments.held {
+        return act(bench, output);
+    }
     let Some(RigName::Named(name)) = &arguments.rig else {
         let (plan, link) = link(arguments, output)?;
         let bus = OpenRings::open(Box::new(link), &plan.rings, Options::default())?;

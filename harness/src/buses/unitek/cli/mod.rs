@@ -5,6 +5,7 @@ pub(crate) mod cells;
 mod check;
 mod control;
 pub(crate) mod deviations;
+mod held;
 mod info;
 mod params;
 mod position;

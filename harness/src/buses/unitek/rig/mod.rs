@@ -22,7 +22,9 @@ use crate::buses::Bus;
 use crate::buses::port_row::PortRow;
 use crate::cli::fuzz::LineFuzz;
 use crate::cli::port_bench::PortBench;
+use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
+use crate::rig::port_session::PortSession;
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
@@ -57,6 +59,11 @@ pub(crate) const PORT: PortRow = PortRow {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
     }),
     command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
+    hold: |rig, options| {
+        Ok(Box::new(HeldPort::<UnitekDrives>(PortSession::open(
+            rig, options,
+        )?)))
+    },
     check: super::cli::check,
     fuzz: LineFuzz::of::<Unitek>(),
 };

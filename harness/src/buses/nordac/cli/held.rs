@@ -1,0 +1,41 @@
+//! Drives of a port that a session holds.
+
+use crate::buses::commands::DriveCommand;
+use crate::buses::nordac::rig::Inverters;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::cli::port_bench::PortBench;
+use crate::cli::shell::HeldDrives;
+use crate::link::Line;
+use crate::rig::port_session::PortSession;
+use harness_proto::time::Span;
+
+impl HeldDrives for Inverters {
+    fn perform(
+        session: &mut PortSession<Self>,
+        command: &DriveCommand,
+        output: &mut Output,
+    ) -> Result<Exit, Failure> {
+        super::drive(PortBench::Held(session), command, output)
+    }
+
+    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure> {
+        let mut driver = super::bench::driver(session);
+        if driver.slaves().next().is_some() {
+            return Ok(driver.run(time)?);
+        }
+        drop(driver);
+        let link = session.link();
+        let end = link.now() + time;
+        while link.now() < end && link.wait(end) {}
+        Ok(())
+    }
+
+    fn forget(&self) {
+        *self
+            .parked
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner) = None;
+    }
+}

@@ -1,0 +1,202 @@
+//! Rings that a session holds.
+
+use super::args::DriveCommand;
+use super::rig::{OpenBench, Use};
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::cli::shell::HeldBench;
+use crate::library::Entry;
+use crate::link::{Line, Link, Trouble};
+use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
+use crate::scenario::parse::parse_step;
+use crate::scenario::plan::{Plan, plan_step};
+use crate::scenario::run::{Now, now};
+use crate::scenario::source::Source;
+use crate::serve::first;
+use harness_proto::time::Span;
+use std::rc::Rc;
+
+struct HeldRings {
+    rig: Shared,
+    plan: Plan,
+    moves: bool,
+    /// `None` while the rings are used without their master.
+    bench: Option<Rc<OpenBench>>,
+}
+
+/// Takes a rig with rings for a session. With permission to move, errors of the opening are confirmed.
+///
+/// # Errors
+/// [`SessionError`], as text with its exit code.
+pub(crate) fn hold(
+    rig: &Rig,
+    options: &Options,
+    output: &mut Output,
+) -> Result<Box<dyn HeldBench>, Failure> {
+    let plan = rig.plan()?;
+    let failed = |error: SessionError| {
+        Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+    };
+    let rig = Shared::new(Session::open(rig, options).map_err(failed)?);
+    let mut held = HeldRings {
+        rig,
+        plan,
+        moves: options.allow_motion,
+        bench: None,
+    };
+    let ready = held.open().and_then(|()| {
+        let as_what = Use {
+            purpose: "shell",
+            moves: held.moves,
+            holds: true,
+        };
+        held.bench()?.confirm_bus_errors(as_what, output)
+    });
+    match ready {
+        Ok(()) => Ok(Box::new(held)),
+        Err(failure) => {
+            let _given_back = Box::new(held).end(true);
+            Err(failure)
+        }
+    }
+}
+
+impl HeldRings {
+    fn open(&mut self) -> Result<(), Failure> {
+        self.bench = None;
+        self.bench = Some(Rc::new(OpenBench::held(
+            self.plan.clone(),
+            self.rig.clone(),
+        )?));
+        Ok(())
+    }
+
+    fn bench(&self) -> Result<Rc<OpenBench>, Failure> {
+        let gone = || Failure::Bus(Exit::RigError, "the rings do not answer".to_owned());
+        self.bench.clone().ok_or_else(gone)
+    }
+
+    /// Does something with the rings without their master.
+    fn apart<T>(&mut self, act: impl FnOnce(&mut Session) -> T) -> Result<T, Failure> {
+        if let Some(bench) = self.bench.take() {
+            bench.bus.clone().close();
+        }
+        let gone = || Failure::Bus(Exit::RigError, "the rig has been given back".to_owned());
+        let done = self.rig.with(act).ok_or_else(gone)?;
+        self.open()?;
+        Ok(done)
+    }
+}
+
+impl HeldBench for HeldRings {
+    fn drives(&self) -> Vec<String> {
+        let axes = self.rig.with(|session| session.axes());
+        axes.iter().flatten().map(ToString::to_string).collect()
+    }
+
+    fn perform(&mut self, mut command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
+        if matches!(command, DriveCommand::Reset(_)) {
+            return Err(Failure::refused(
+                "a session keeps the state of its drives and does not reset them; end it and use `drivebench reset`",
+            ));
+        }
+        if let Some(rig) = command.rig_mut() {
+            rig.held = Some(self.bench()?);
+        }
+        super::perform(&command, output)
+    }
+
+    fn pass(&mut self, time: Span) -> Result<(), Failure> {
+        let bench = self.bench()?;
+        bench.bus.run(time);
+        match bench.bus.halted() {
+            Some(error) => Err(error.into()),
+            None => Ok(()),
+        }
+    }
+
+    fn play(&mut self, entry: &Entry) -> Result<Played, Failure> {
+        let Some(plan) = entry.plan.clone() else {
+            return Err(Failure::refused(format!(
+                "{}: the scenario is for another bus",
+                entry.short_name()
+            )));
+        };
+        let played = self.apart(|session| match Run::new(session) {
+            Ok(mut run) => run.play(&plan, None).map_err(|error| {
+                Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+            }),
+            Err(problems) => Err(problems.into()),
+        })?;
+        played
+    }
+
+    fn strike(&mut self, line: &str) -> Result<(), Failure> {
+        let bench = self.bench()?;
+        let source = Source::from_bytes("fault".to_owned(), line.as_bytes().to_vec());
+        let source = source.map_err(|error| Failure::refused(error.to_string()))?;
+        let step = parse_step(&source).and_then(|step| plan_step(&self.plan, &step, &source));
+        let step = step.map_err(|problems| Failure::refused(first(&source.text, &problems)))?;
+        let plan = &self.plan;
+        let done = bench.with_rig(|session| {
+            if !session.rig().is_simulated() {
+                return Now::Refused("faults are injected into simulated drives only");
+            }
+            now(plan, session.link().inner_mut(), &step)
+        });
+        match done {
+            Some(Now::Done) => Ok(()),
+            Some(Now::Otherwise(found)) => Err(Failure::drive(found)),
+            Some(Now::Refused(why)) => Err(Failure::refused(why)),
+            None => Err(Failure::refused("the rig has been given back")),
+        }
+    }
+
+    fn recover(&mut self) -> Result<String, Failure> {
+        let rings = self.plan.rings.len();
+        let found = self.apart(|session| super::recover::every(session.link(), rings))?;
+        let texts = found.iter().enumerate();
+        Ok(texts
+            .map(|(ring, own)| super::recover::text(ring, own))
+            .collect())
+    }
+
+    fn events(&mut self) -> Vec<String> {
+        let bench = self.bench.as_ref();
+        bench.map_or_else(Vec::new, |bench| bench.bus.take_log())
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        let trouble = self.rig.with(|session| session.link().trouble().cloned());
+        trouble.flatten()
+    }
+
+    fn overdue(&self) -> bool {
+        self.rig.with(|session| session.overdue()).unwrap_or(true)
+    }
+
+    fn resume(&mut self) -> Result<(), Failure> {
+        self.bench = None;
+        self.rig.with(|session| {
+            let link = session.link();
+            if let Some(ports) = link.inner_mut().ports_mut() {
+                ports.resume();
+            }
+            link.reset_after_denial();
+            link.begin();
+        });
+        self.open()
+    }
+
+    fn end(mut self: Box<Self>, error: bool) -> End {
+        if let Some(bench) = self.bench.take() {
+            bench.bus.clone().close();
+        }
+        self.rig.close(error).unwrap_or(End {
+            safe: None,
+            power: Vec::new(),
+            remarks: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,25 @@
+//! Drives of a port that a session holds.
+
+use crate::buses::commands::DriveCommand;
+use crate::buses::unitek::rig::UnitekDrives;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::cli::port_bench::PortBench;
+use crate::cli::shell::HeldDrives;
+use crate::rig::port_session::PortSession;
+use harness_proto::time::Span;
+
+impl HeldDrives for UnitekDrives {
+    fn perform(
+        session: &mut PortSession<Self>,
+        command: &DriveCommand,
+        output: &mut Output,
+    ) -> Result<Exit, Failure> {
+        super::drive(PortBench::Held(session), command, output)
+    }
+
+    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure> {
+        Ok(session.driver().run(time)?)
+    }
+}

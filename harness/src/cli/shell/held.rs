@@ -1,0 +1,151 @@
+//! A bench that a session holds, whatever its bus.
+
+use crate::buses::commands::DriveCommand;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::library::Entry;
+use crate::link::{Line, Trouble};
+use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::{End, Played};
+use harness_proto::time::Span;
+
+/// A bench that stays open between requests.
+pub(crate) trait HeldBench {
+    /// The numbers of its drives.
+    fn drives(&self) -> Vec<String>;
+
+    /// Runs a command on it.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure>;
+
+    /// Lets time pass while the bus stays at work. Virtual time passes at once.
+    ///
+    /// # Errors
+    /// [`Failure`]: the port is lost.
+    fn pass(&mut self, time: Span) -> Result<(), Failure>;
+
+    /// Plays a scenario on its drives.
+    ///
+    /// # Errors
+    /// [`Failure`]: the bench cannot be used any more, or not for scenarios.
+    fn play(&mut self, entry: &Entry) -> Result<Played, Failure>;
+
+    /// Does a line of the scenario language to simulated drives at once: a fault, or what happens to a drive from outside the bus.
+    ///
+    /// # Errors
+    /// [`Failure`]: the line has a mistake, or the drives are not simulated.
+    fn strike(&mut self, line: &str) -> Result<(), Failure>;
+
+    /// Brings rings out of the error mode; returns what was found.
+    ///
+    /// # Errors
+    /// [`Failure`]: the bus has no error mode.
+    fn recover(&mut self) -> Result<String, Failure>;
+
+    /// What happened on the bus that no answer reports, since the last call.
+    fn events(&mut self) -> Vec<String>;
+
+    /// Why the link carries nothing.
+    fn trouble(&self) -> Option<Trouble>;
+
+    /// Whether the bench has been used for longer than its file allows.
+    fn overdue(&self) -> bool;
+
+    /// Makes the link of use again after a denial or a cancelled request.
+    ///
+    /// # Errors
+    /// [`Failure`]: the drives do not answer.
+    fn resume(&mut self) -> Result<(), Failure>;
+
+    /// Takes the drives to their safe state and gives the bench back.
+    fn end(self: Box<Self>, error: bool) -> End;
+}
+
+/// What a session asks of the drives of a port.
+pub(crate) trait HeldDrives: PortDrives {
+    /// Runs a command.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    fn perform(
+        session: &mut PortSession<Self>,
+        command: &DriveCommand,
+        output: &mut Output,
+    ) -> Result<Exit, Failure>;
+
+    /// Lets time pass.
+    ///
+    /// # Errors
+    /// [`Failure`]: the port is lost.
+    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure>;
+
+    /// Forgets what a master knows of slaves: the conversation was broken off.
+    fn forget(&self) {}
+}
+
+/// The drives of a port that a session holds.
+pub(crate) struct HeldPort<D: PortDrives>(pub(crate) PortSession<D>);
+
+impl<D: HeldDrives> HeldBench for HeldPort<D> {
+    fn drives(&self) -> Vec<String> {
+        let drives = self.0.drives().listed();
+        drives
+            .iter()
+            .map(|own| D::number(own).to_string())
+            .collect()
+    }
+
+    fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
+        D::perform(&mut self.0, &command, output)
+    }
+
+    fn pass(&mut self, time: Span) -> Result<(), Failure> {
+        D::pass(&mut self.0, time)
+    }
+
+    fn play(&mut self, _: &Entry) -> Result<Played, Failure> {
+        Err(Failure::refused(
+            "a session plays no scenario on drives of this bench yet; end it and use `drivebench run --rig`",
+        ))
+    }
+
+    fn strike(&mut self, _: &str) -> Result<(), Failure> {
+        Err(Failure::refused(
+            "a session injects faults into simulated rings only; write the fault into a scenario",
+        ))
+    }
+
+    fn recover(&mut self) -> Result<String, Failure> {
+        Err(Failure::refused(
+            "this bus has no error mode: recover is for rings",
+        ))
+    }
+
+    fn events(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.0.guarded().trouble().cloned()
+    }
+
+    fn overdue(&self) -> bool {
+        self.0.overdue()
+    }
+
+    fn resume(&mut self) -> Result<(), Failure> {
+        if let Some(ports) = self.0.link().inner_mut().ports_mut() {
+            ports.resume();
+        }
+        self.0.link().reset_after_denial();
+        self.0.drives().forget();
+        Ok(())
+    }
+
+    fn end(self: Box<Self>, error: bool) -> End {
+        self.0.close(error)
+    }
+}

@@ -1,0 +1,506 @@
+//! `drivebench shell --json`: a session that holds a bench, for programs. One request a line on standard input, one answer a line on standard
+//! output.
+
+mod held;
+mod inbox;
+mod request;
+
+pub(crate) use held::{HeldBench, HeldDrives, HeldPort};
+pub(crate) use request::schema;
+
+use super::args::{Arguments, Command};
+use super::exit::Exit;
+use super::failure::{Failure, exit_of_trouble};
+use super::help::command;
+use super::output::Output;
+use super::rig_failure::{alarm, find_any_rig, tell_end};
+use super::run::play_entry;
+use crate::buses::{Bus, hold};
+use crate::library::{Entry, sources};
+use crate::link::Trouble;
+use crate::rig::{Options, Rig};
+use crate::scenario::run::{AtMismatch, Outcome};
+use crate::scenario::source::{Source, line_number};
+use crate::signals::interrupt_flag;
+use clap::{Args, FromArgMatches};
+use harness_proto::time::Span;
+use inbox::{Inbox, Item, Outbox};
+use request::{Event, Line, Request, SCHEMA};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The commands of a session.
+const COMMANDS: [&str; 17] = [
+    "info",
+    "read",
+    "write",
+    "watch",
+    "params",
+    "scope",
+    "position",
+    "go",
+    "stop",
+    "block",
+    "start",
+    "exchange",
+    "on",
+    "off",
+    "quick-stop",
+    "acknowledge",
+    "delete-error",
+];
+
+/// Options that a session has settled already.
+const SETTLED: [&str; 4] = ["--rig", "--setup", "--wait-for-rig", "--hold"];
+
+/// How long the bus is kept between two looks at the requests, in real time.
+const KEPT: Span = Span::from_micros(500);
+
+/// How often a session in virtual time looks for a signal.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// The longest wait that a request may ask for.
+const LONGEST_WAIT: u32 = 60_000;
+
+/// For `shell`.
+#[derive(Clone, Debug, Args)]
+pub struct ShellArguments {
+    /// The rig: sim:N, sim:unitek:N, sim:nordac:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "RIG", default_value = "sim:3")]
+    pub rig: String,
+    /// Read JSON requests, one a line, and write JSON answers; `schema session` describes both.
+    #[arg(long, required = true)]
+    pub json: bool,
+    /// Let motors turn; the rig's file must allow it too.
+    #[arg(long = "move", visible_alias = "allow-motion")]
+    pub leave: bool,
+    /// How long to wait if another program holds the rig, such as 30s.
+    #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = super::args::duration)]
+    pub wait: Option<Duration>,
+}
+
+/// Holds a bench until the input ends.
+pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io::Result<Exit> {
+    // Nothing else may write to standard output from now on: it becomes standard error for the rest of the program.
+    let lines = File::from(rustix::io::dup(rustix::stdio::stdout())?);
+    rustix::stdio::dup2_stdout(rustix::stdio::stderr())?;
+    let (out, writer) = Outbox::write(lines);
+    out.put(&Line::Event(Event::Hello {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        rig: arguments.rig.clone(),
+    }));
+    let mut told = Output::collecting();
+    let exit = serve(arguments, &out, &mut told);
+    let [_, what] = told.take_collected();
+    output.say(&what);
+    let what = what.trim_end().to_owned();
+    out.put(&Line::Event(Event::End {
+        code: exit as u8,
+        what,
+    }));
+    let stuck = out.is_stuck();
+    drop(out);
+    if !stuck {
+        // A client that reads nothing any more must not keep the program.
+        let mut naps = 0;
+        while !writer.is_finished() && naps < 100 {
+            std::thread::sleep(Duration::from_millis(10));
+            naps += 1;
+        }
+    }
+    Ok(exit)
+}
+
+fn serve(arguments: &ShellArguments, out: &Outbox, told: &mut Output) -> Exit {
+    let Some(rig) = find_any_rig(&arguments.rig, told) else {
+        return Exit::Usage;
+    };
+    // Set by every signal that ends the program; the second one by `cancel` and `stop` too.
+    let ended = interrupt_flag();
+    let interrupt = interrupt_flag();
+    let options = Options {
+        purpose: "shell".to_owned(),
+        wait: arguments.wait.unwrap_or_default(),
+        allow_motion: arguments.leave,
+        keeps_lines: true,
+        interrupt: Arc::clone(&interrupt),
+        alarm: alarm(),
+        ..Options::default()
+    };
+    let bench = match hold(&rig, &options, told) {
+        Ok(bench) => bench,
+        Err(failure) => return failure.tell(told),
+    };
+    let bus = rig.port().map_or(Bus::DEFAULT, |port| port.bus.bus());
+    out.put(&Line::Event(Event::Ready {
+        bus: bus.name(),
+        drives: bench.drives(),
+        simulated: rig.is_simulated(),
+        motion: arguments.leave,
+    }));
+    let mut session = Session {
+        inbox: Inbox::read(std::io::stdin(), Arc::clone(&interrupt), out.clone()),
+        rig,
+        bus,
+        bench,
+        out: out.clone(),
+        motion: arguments.leave,
+        struck: false,
+        ended,
+        interrupt,
+    };
+    let exit = session.work(told);
+    let end = session
+        .bench
+        .end(matches!(exit, Exit::RigError | Exit::Interlock));
+    tell_end(&end, exit, told)
+}
+
+struct Session {
+    inbox: Inbox,
+    rig: Rig,
+    bus: Bus,
+    bench: Box<dyn HeldBench>,
+    out: Outbox,
+    motion: bool,
+    /// A fault was injected: a scenario with drives of its own would not show it.
+    struck: bool,
+    ended: Arc<AtomicBool>,
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Session {
+    /// Does requests until the session ends; returns why as an exit code.
+    fn work(&mut self, told: &mut Output) -> Exit {
+        let patience = match self.rig.is_simulated() {
+            true => LOOK,
+            false => Duration::ZERO,
+        };
+        loop {
+            if self.ended.load(Ordering::Relaxed) {
+                return Exit::Interrupted;
+            }
+            if self.out.is_stuck() {
+                told.complain("the client reads no answers any more");
+                return Exit::RigError;
+            }
+            if self.bench.overdue() {
+                told.complain("the session reached `max_run` of the rig's file");
+                return Exit::RigError;
+            }
+            match self.inbox.next(patience) {
+                Some(Item::End) => return Exit::Passed,
+                Some(Item::Cancelled(id)) => {
+                    self.out
+                        .error(id, Exit::Interrupted, "cancelled before it began")
+                }
+                Some(Item::Ask(id, Request::End)) => {
+                    self.out.put(&Line::Result {
+                        id,
+                        result: json!({}),
+                    });
+                    return Exit::Passed;
+                }
+                Some(Item::Ask(id, request)) => self.ask(id, &request),
+                None if self.rig.is_simulated() => {}
+                None => {
+                    if let Err(failure) = self.bench.pass(KEPT)
+                        && self.bench.trouble().is_none()
+                    {
+                        let mut own = Output::collecting();
+                        failure.tell(&mut own);
+                        let [_, what] = own.take_collected();
+                        self.out.put(&Line::Event(Event::Bus {
+                            what: what.trim_end().to_owned(),
+                        }));
+                        if let Err(failure) = self.bench.resume() {
+                            return failure.tell(told);
+                        }
+                    }
+                }
+            }
+            for what in self.bench.events() {
+                self.out.put(&Line::Event(Event::Bus { what }));
+            }
+            if let Some(exit) = self.in_trouble(told) {
+                return exit;
+            }
+        }
+    }
+
+    /// Ends the session where its link is lost; after a denial it goes on.
+    fn in_trouble(&mut self, told: &mut Output) -> Option<Exit> {
+        match self.bench.trouble()? {
+            // Answered already, or the loop ends by itself.
+            Trouble::Interrupted if self.ended.load(Ordering::Relaxed) => return None,
+            Trouble::Interrupted | Trouble::Denied(_) => {}
+            trouble => {
+                told.complain(&trouble.to_string());
+                return Some(exit_of_trouble(&trouble));
+            }
+        }
+        match self.bench.resume() {
+            Ok(()) => None,
+            Err(failure) => Some(failure.tell(told)),
+        }
+    }
+
+    /// Does a request and answers it.
+    fn ask(&mut self, id: Value, request: &Request) {
+        let mut output = Output::collecting();
+        let done = self.perform(request, &mut output);
+        let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
+        if cancelled {
+            self.interrupt.store(false, Ordering::Relaxed);
+        }
+        let (exit, result) = match done {
+            Ok((exit, result)) => (exit, result),
+            Err(failure) => (failure.tell(&mut output), Value::Null),
+        };
+        let [text, notes] = output.take_collected();
+        let reading = matches!(request, Request::Run { .. });
+        if exit == Exit::Passed || reading && !result.is_null() {
+            let mut result = result;
+            if let Value::Object(own) = &mut result {
+                if !text.is_empty() && !own.contains_key("values") && !own.contains_key("data") {
+                    own.insert("text".to_owned(), json!(text));
+                }
+                if !notes.is_empty() {
+                    own.insert("notes".to_owned(), json!(notes));
+                }
+            }
+            return self.out.put(&Line::Result { id, result });
+        }
+        let exit = if cancelled { Exit::Interrupted } else { exit };
+        let what = notes.trim_end();
+        let what = what.strip_prefix("error: ").unwrap_or(what);
+        self.out.error(id, exit, format!("{text}{what}"));
+    }
+
+    fn perform(
+        &mut self,
+        request: &Request,
+        output: &mut Output,
+    ) -> Result<(Exit, Value), Failure> {
+        let done = match request {
+            Request::Info => json!({
+                "rig": self.rig.id(), "bus": self.bus.name(), "drives": self.bench.drives(), "simulated": self.rig.is_simulated(),
+                "motion": self.motion, "commands": COMMANDS,
+            }),
+            Request::Wait { ms } if *ms > LONGEST_WAIT => {
+                return Err(Failure::refused(format!(
+                    "`ms`: 0 to {LONGEST_WAIT} expected"
+                )));
+            }
+            Request::Wait { ms } => {
+                self.bench.pass(Span::from_millis(u64::from(*ms)))?;
+                json!({})
+            }
+            Request::Fault { line } => {
+                let written = line.trim_start();
+                let bare = ["!", "drive", "slave", "?"]
+                    .iter()
+                    .any(|own| written.starts_with(own));
+                let line = if bare {
+                    line.clone()
+                } else {
+                    format!("! {written}")
+                };
+                self.bench.strike(&line)?;
+                self.struck = true;
+                json!({})
+            }
+            Request::Recover => json!({"found": self.bench.recover()?}),
+            // What they break off has been broken off.
+            Request::Cancel { .. } | Request::End => json!({}),
+            Request::Run { scenario, path } => {
+                return self.run(scenario.as_deref(), path.as_deref());
+            }
+            _ => {
+                let words = request.words().unwrap_or_default();
+                let exit = self.command(&words, output)?;
+                return Ok((exit, data(request, output)));
+            }
+        };
+        Ok((Exit::Passed, done))
+    }
+
+    /// Runs a command by its words.
+    fn command(&mut self, words: &[String], output: &mut Output) -> Result<Exit, Failure> {
+        let name = words.first().map_or("", String::as_str);
+        if !COMMANDS.contains(&name) {
+            return Err(Failure::refused(format!(
+                "`{name}` is no command of a session: {} expected",
+                COMMANDS.join(", ")
+            )));
+        }
+        let is = |word: &String, option: &str| {
+            word == option
+                || word
+                    .strip_prefix(option)
+                    .is_some_and(|rest| rest.starts_with('='))
+        };
+        if let Some(word) = words
+            .iter()
+            .find(|word| SETTLED.iter().any(|own| is(word, own)))
+        {
+            return Err(Failure::refused(format!(
+                "{word}: the session has settled it; leave it out"
+            )));
+        }
+        let moves = |word: &String| word == "--move" || word == "--allow-motion";
+        if !self.motion && words.iter().any(moves) {
+            return Err(Failure::refused(
+                "this session was opened without --move: open it with --move to let motors turn",
+            ));
+        }
+        let program = command();
+        let own = program.find_subcommand(name);
+        let has = |long: &str| {
+            own.is_some_and(|own| {
+                own.get_arguments()
+                    .any(|argument| argument.get_long() == Some(long))
+            })
+        };
+        let mut line = vec!["drivebench".to_owned(), name.to_owned()];
+        if self.motion && has("move") && !words.iter().any(moves) {
+            line.push("--move".to_owned());
+        }
+        // `--hold` of the cyclic commands waits for Ctrl-C.
+        if has("hold") && !has("for") {
+            line.push("--hold".to_owned());
+        }
+        line.extend(words.iter().skip(1).cloned());
+        let wrong = |error: clap::Error| {
+            let text = error.render().to_string();
+            let text = text
+                .trim_start_matches("error: ")
+                .split("\n\n")
+                .next()
+                .unwrap_or_default()
+                .to_owned();
+            Failure::refused(text)
+        };
+        let matches = program.try_get_matches_from(&line).map_err(wrong)?;
+        match Arguments::from_arg_matches(&matches)
+            .map_err(wrong)?
+            .command
+        {
+            Some(Command::Drive(command)) => self.bench.perform(*command, output),
+            _ => Err(Failure::refused("no command on drives")),
+        }
+    }
+
+    /// Plays scenarios.
+    fn run(&mut self, text: Option<&str>, path: Option<&str>) -> Result<(Exit, Value), Failure> {
+        let sources = match (text, path) {
+            (Some(text), None) => {
+                let source = Source::from_bytes("scenario".to_owned(), text.as_bytes().to_vec());
+                vec![source.map_err(|error| Failure::refused(error.to_string()))?]
+            }
+            (None, Some(path)) => sources(&[PathBuf::from(path)])?,
+            _ => {
+                return Err(Failure::refused(
+                    "`scenario` (a text) or `path` expected, one of them",
+                ));
+            }
+        };
+        let size = Some(self.rig.ring_size()).filter(|own| *own > 0);
+        let mut entries = Vec::new();
+        for source in sources {
+            let entry = Entry::fitting(source, size);
+            entries.push(entry.map_err(|problems| Failure::refused(problems.lines()))?);
+        }
+        let mut verdicts = Vec::new();
+        let mut all = Vec::new();
+        for entry in &entries {
+            let outcome = self.play(entry)?;
+            verdicts.push(outcome.verdict);
+            all.push(object(entry, &outcome));
+            if self.bench.trouble().is_some() || self.interrupt.load(Ordering::Relaxed) {
+                break;
+            }
+        }
+        let mut counts = BTreeMap::<&str, usize>::new();
+        for verdict in &verdicts {
+            *counts.entry(verdict.name()).or_default() += 1;
+        }
+        let exit = match all.len() == entries.len() {
+            true => Exit::of(&verdicts, false),
+            false => Exit::of(&verdicts, false).max(Exit::Incomplete),
+        };
+        let worst = verdicts.iter().max().map_or("", |own| own.name());
+        let result = json!({
+            "code": exit as u8, "verdict": worst, "counts": counts, "scenarios": all, "not_played": entries.len() - all.len(),
+        });
+        Ok((exit, result))
+    }
+
+    fn play(&mut self, entry: &Entry) -> Result<Outcome, Failure> {
+        if !self.rig.is_bare() {
+            return Ok(self.bench.play(entry)?.outcome);
+        }
+        match self.struck {
+            true => Err(Failure::refused(
+                "on this simulated bench a scenario gets drives of its own, which the faults of this session do not reach: write them into the \
+                 scenario",
+            )),
+            false => Ok(play_entry(entry, AtMismatch::Stop).outcome),
+        }
+    }
+}
+
+/// What came of a scenario.
+fn object(entry: &Entry, outcome: &Outcome) -> Value {
+    let finding = outcome.finding.as_ref().map(|found| {
+        json!({"line": line_number(&entry.source.text, found.span.start), "what": found.message})
+    });
+    json!({
+        "name": entry.short_name(), "title": entry.scenario.title, "verdict": outcome.verdict.name(),
+        "took_ms": outcome.took.as_millis_f64(), "finding": finding, "notes": outcome.remarks,
+    })
+}
+
+/// The result of a command: values that were read, or the JSON that it prints.
+fn data(request: &Request, output: &Output) -> Value {
+    let text = output.collected_result();
+    match request {
+        Request::Read { .. } => json!({"values": values(text)}),
+        Request::State { .. } => {
+            json!({"data": serde_json::from_str::<Value>(text.trim()).unwrap_or_default()})
+        }
+        _ => json!({}),
+    }
+}
+
+/// The columns of `watch --format csv`: `0 nist [rpm]`, and below each its value.
+fn values(text: &str) -> Vec<Value> {
+    let mut lines = text.lines().map(|line| line.split(',').skip(1));
+    let (Some(heading), Some(row)) = (lines.next(), lines.next()) else {
+        return Vec::new();
+    };
+    let value = |(column, digits): (&str, &str)| {
+        let (drive, rest) = column.split_once(' ').unwrap_or((column, ""));
+        let unit = rest
+            .rsplit_once(" [")
+            .and_then(|(name, unit)| Some((name, unit.strip_suffix(']')?)));
+        let (name, unit) = unit.unwrap_or((rest, ""));
+        let number = digits
+            .parse::<f64>()
+            .ok()
+            .filter(|_| unit != super::watch::HEX);
+        let value = match number {
+            Some(number) => json!(number),
+            None if digits.is_empty() => Value::Null,
+            None => json!(digits),
+        };
+        json!({"drive": drive, "name": name, "value": value, "unit": unit})
+    };
+    heading.zip(row).map(value).collect()
+}
