@@ -35,7 +35,7 @@ class OnRings(unittest.TestCase):
             rig.fault("2->1: flip 0")
             with self.assertRaises(drivebench.Error) as caught:
                 rig.run("9.7-parity-error")
-            self.assertIn("drives of its own", str(caught.exception))
+            self.assertIn("write them into the scenario", str(caught.exception))
 
     def test_a_fault_is_reported_with_its_place(self) -> None:
         with drivebench.Rig("sim:3") as rig:
@@ -43,6 +43,14 @@ class OnRings(unittest.TestCase):
             rig.wait(0.1)
             rig.drive(0)["nist"]
             self.assertTrue(any(event["event"] == "bus" for event in rig.events), list(rig.log))
+
+    def test_a_byte_is_counted_from_now_on(self) -> None:
+        with drivebench.Rig("sim:3") as rig:
+            rig.wait(0.1)
+            rig.fault("2->1 byte 10: flip 0")
+            rig.wait(0.1)
+            rig.drive(0)["nist"]
+            self.assertTrue(any("drive 1" in event.get("what", "") for event in rig.events), list(rig.log))
 
     def test_no_such_rig(self) -> None:
         with self.assertRaises(drivebench.Error) as caught:

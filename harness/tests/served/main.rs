@@ -27,4 +27,5 @@ mod ring;
 mod scenarios;
 mod ser2net;
 mod serve;
+mod session;
 mod top;

@@ -169,7 +169,7 @@ struct Session {
     bench: Box<dyn HeldBench>,
     out: Outbox,
     motion: bool,
-    /// A fault was injected: a scenario with drives of its own would not show it.
+    /// A fault was injected. A scenario begins anew, without it, and would pass in spite of it.
     struck: bool,
     ended: Arc<AtomicBool>,
     interrupt: Arc<AtomicBool>,
@@ -200,7 +200,7 @@ impl Session {
                     self.out
                         .error(id, Exit::Interrupted, "cancelled before it began")
                 }
-                Some(Item::Ask(id, Request::End)) => {
+                Some(Item::Ask(id, Request::End {})) => {
                     self.out.put(&Line::Result {
                         id,
                         result: json!({}),
@@ -289,7 +289,7 @@ impl Session {
         output: &mut Output,
     ) -> Result<(Exit, Value), Failure> {
         let done = match request {
-            Request::Info => json!({
+            Request::Info {} => json!({
                 "rig": self.rig.id(), "bus": self.bus.name(), "drives": self.bench.drives(), "simulated": self.rig.is_simulated(),
                 "motion": self.motion, "commands": COMMANDS,
             }),
@@ -316,9 +316,9 @@ impl Session {
                 self.struck = true;
                 json!({})
             }
-            Request::Recover => json!({"found": self.bench.recover()?}),
+            Request::Recover {} => json!({"found": self.bench.recover()?}),
             // What they break off has been broken off.
-            Request::Cancel { .. } | Request::End => json!({}),
+            Request::Cancel { .. } | Request::End {} => json!({}),
             Request::Run { scenario, path } => {
                 return self.run(scenario.as_deref(), path.as_deref());
             }
@@ -443,15 +443,15 @@ impl Session {
     }
 
     fn play(&mut self, entry: &Entry) -> Result<Outcome, Failure> {
-        if !self.rig.is_bare() {
-            return Ok(self.bench.play(entry)?.outcome);
+        if self.struck {
+            return Err(Failure::refused(
+                "a scenario does not meet the faults of this session: write them into the scenario",
+            ));
         }
-        match self.struck {
-            true => Err(Failure::refused(
-                "on this simulated bench a scenario gets drives of its own, which the faults of this session do not reach: write them into the \
-                 scenario",
-            )),
-            false => Ok(play_entry(entry, AtMismatch::Stop).outcome),
+        match self.rig.is_bare() {
+            // Drives of its own.
+            true => Ok(play_entry(entry, AtMismatch::Stop).outcome),
+            false => Ok(self.bench.play(entry)?.outcome),
         }
     }
 }

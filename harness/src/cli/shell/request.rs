@@ -31,7 +31,8 @@ impl Which {
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum Request {
     /// The bench and its drives.
-    Info,
+    // Not `Info`: of a variant without braces serde does not refuse unknown fields.
+    Info {},
     /// Reads cells, registers or parameters by their names.
     Read {
         /// Which drives.
@@ -77,7 +78,7 @@ pub(crate) enum Request {
         drive: Which,
     },
     /// Brings rings out of the error mode and counts their drives.
-    Recover,
+    Recover {},
     /// Lets time pass. Simulated time passes at once.
     Wait {
         /// Milliseconds, 0 to 60000.
@@ -90,7 +91,8 @@ pub(crate) enum Request {
         /// A file, a folder, or a built-in scenario by its name.
         path: Option<String>,
     },
-    /// Injects a fault into simulated drives, as a scenario writes it: `98->97: flip 0`, `drive 3 off`.
+    /// Injects a fault into simulated drives, as a scenario writes it: `98->97: flip 0`, `98->97 byte 10: flip 0`, `drive 3 off`. A byte is
+    /// counted from now on.
     Fault {
         /// The line.
         line: String,
@@ -101,7 +103,7 @@ pub(crate) enum Request {
         of: Option<Value>,
     },
     /// Ends the session in the safe state.
-    End,
+    End {},
 }
 
 impl Request {

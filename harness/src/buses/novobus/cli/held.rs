@@ -2,15 +2,16 @@
 
 use super::args::DriveCommand;
 use super::rig::{OpenBench, Use};
+use crate::buses::novobus::language::plan::RingAct;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::shell::HeldBench;
 use crate::library::Entry;
-use crate::link::{Line, Link, Trouble};
+use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
 use crate::scenario::parse::parse_step;
-use crate::scenario::plan::{Plan, plan_step};
+use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, plan_step};
 use crate::scenario::run::{Now, now};
 use crate::scenario::source::Source;
 use crate::serve::first;
@@ -89,6 +90,29 @@ impl HeldRings {
     }
 }
 
+/// A scenario counts bytes from its start; a session has none and counts from now. A time of a fault cannot be counted like this.
+fn from_now_on(step: &mut PlannedStep, link: &dyn Link) -> bool {
+    let PlannedAction::Own(RingAct::Fault(ring, fault, moment)) = &mut step.action else {
+        return true;
+    };
+    match moment {
+        Moment::Now => true,
+        Moment::At(_) => false,
+        Moment::Byte(byte) => {
+            let trace = link.trace(*ring);
+            let channel = match fault {
+                PlacedFault::Link(place, _) => trace.channels.get(*place),
+                PlacedFault::Drive(drive, _) => {
+                    trace.channels.iter().find(|own| own.to == Some(*drive))
+                }
+                _ => None,
+            };
+            *byte += channel.map_or(0, |own| own.octets().len() as u64);
+            true
+        }
+    }
+}
+
 impl HeldBench for HeldRings {
     fn drives(&self) -> Vec<String> {
         let axes = self.rig.with(|session| session.axes());
@@ -137,13 +161,19 @@ impl HeldBench for HeldRings {
         let source = Source::from_bytes("fault".to_owned(), line.as_bytes().to_vec());
         let source = source.map_err(|error| Failure::refused(error.to_string()))?;
         let step = parse_step(&source).and_then(|step| plan_step(&self.plan, &step, &source));
-        let step = step.map_err(|problems| Failure::refused(first(&source.text, &problems)))?;
+        let mut step = step.map_err(|problems| Failure::refused(first(&source.text, &problems)))?;
         let plan = &self.plan;
         let done = bench.with_rig(|session| {
             if !session.rig().is_simulated() {
                 return Now::Refused("faults are injected into simulated drives only");
             }
-            now(plan, session.link().inner_mut(), &step)
+            let link = session.link().inner_mut();
+            if !from_now_on(&mut step, link) {
+                return Now::Refused(
+                    "a time has no start to count from here: leave it out, or name a byte",
+                );
+            }
+            now(plan, link, &step)
         });
         match done {
             Some(Now::Done) => Ok(()),
