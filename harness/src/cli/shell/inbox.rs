@@ -1,6 +1,6 @@
 //! The two ends of a session: a thread reads requests, and a thread writes lines. Neither keeps the bus waiting.
 
-use super::request::{Line, Request, SessionFault, parse};
+use super::request::{SessionFault, SessionLine, SessionRequest, parse};
 use crate::cli::exit::Exit;
 use serde_json::Value;
 use std::collections::VecDeque;
@@ -21,9 +21,9 @@ const MOST_WAITING: usize = 64;
 const MOST_UNREAD: usize = 1024;
 
 /// What the session does next.
-pub(crate) enum Item {
+pub(crate) enum SessionItem {
     /// A request.
-    Ask(Value, Request),
+    Ask(Value, SessionRequest),
     /// A request that `cancel` or `stop` has taken back.
     Cancelled(Value),
     /// The input has ended.
@@ -31,8 +31,8 @@ pub(crate) enum Item {
 }
 
 #[derive(Default)]
-struct State {
-    waiting: VecDeque<Item>,
+struct Waiting {
+    waiting: VecDeque<SessionItem>,
     under_way: Option<Value>,
     /// `cancel` or `stop` has ended the request under way.
     cancelled: bool,
@@ -40,18 +40,18 @@ struct State {
 
 /// Requests that wait.
 #[derive(Clone)]
-pub(crate) struct Inbox {
-    state: Arc<(Mutex<State>, Condvar)>,
+pub(crate) struct RequestReader {
+    state: Arc<(Mutex<Waiting>, Condvar)>,
     /// Ends what is under way on the bus.
     interrupt: Arc<AtomicBool>,
 }
 
-impl Inbox {
+impl RequestReader {
     /// Reads requests from an input in a thread of its own.
     pub(crate) fn read(
         input: impl Read + Send + 'static,
         interrupt: Arc<AtomicBool>,
-        out: Outbox,
+        out: LineWriter,
     ) -> Self {
         let inbox = Self {
             state: Arc::default(),
@@ -63,17 +63,17 @@ impl Inbox {
             while let Ok(Some(line)) = next_line(&mut input) {
                 own.take_line(line, &out);
             }
-            own.lock().waiting.push_back(Item::End);
+            own.lock().waiting.push_back(SessionItem::End);
             own.state.1.notify_one();
         });
         inbox
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
         self.state.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn take_line(&self, line: Option<Vec<u8>>, out: &Outbox) {
+    fn take_line(&self, line: Option<Vec<u8>>, out: &LineWriter) {
         let Some(line) = line else {
             let what = format!("a line of more than {LONGEST} bytes was skipped");
             return out.error(Value::Null, Exit::Usage, what);
@@ -88,43 +88,46 @@ impl Inbox {
         };
         let mut state = self.lock();
         match &request {
-            Request::Stop { .. } => {
+            SessionRequest::Stop { .. } => {
                 self.break_off(&mut state, None);
-                state.waiting.push_front(Item::Ask(id, request));
+                state.waiting.push_front(SessionItem::Ask(id, request));
             }
-            Request::Cancel { of } => {
+            SessionRequest::Cancel { of } => {
                 self.break_off(&mut state, of.as_ref());
-                state.waiting.push_front(Item::Ask(id, request));
+                state.waiting.push_front(SessionItem::Ask(id, request));
             }
             _ if state.waiting.len() >= MOST_WAITING => {
                 drop(state);
                 let what = format!("{MOST_WAITING} requests wait already: wait for answers");
                 return out.error(id, Exit::Usage, what);
             }
-            _ => state.waiting.push_back(Item::Ask(id, request)),
+            _ => state.waiting.push_back(SessionItem::Ask(id, request)),
         }
         self.state.1.notify_one();
     }
 
     /// Ends the request under way and takes back those that wait, or one of them.
-    fn break_off(&self, state: &mut State, only: Option<&Value>) {
+    fn break_off(&self, state: &mut Waiting, only: Option<&Value>) {
         let meant = |id: &Value| only.is_none_or(|only| only == id);
         if state.under_way.as_ref().is_some_and(meant) {
             state.cancelled = true;
             self.interrupt.store(true, Ordering::Relaxed);
         }
         for item in &mut state.waiting {
-            if let Item::Ask(id, request) = item
+            if let SessionItem::Ask(id, request) = item
                 && meant(id)
-                && !matches!(request, Request::Stop { .. } | Request::Cancel { .. })
+                && !matches!(
+                    request,
+                    SessionRequest::Stop { .. } | SessionRequest::Cancel { .. }
+                )
             {
-                *item = Item::Cancelled(id.clone());
+                *item = SessionItem::Cancelled(id.clone());
             }
         }
     }
 
     /// The next thing to do, waited for at most this long. A request is under way from now on.
-    pub(crate) fn next(&self, patience: Duration) -> Option<Item> {
+    pub(crate) fn next(&self, patience: Duration) -> Option<SessionItem> {
         let (_, news) = &*self.state;
         let mut state = self.lock();
         if state.waiting.is_empty() && patience > Duration::ZERO {
@@ -132,8 +135,11 @@ impl Inbox {
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
         let item = state.waiting.pop_front();
-        if let Some(Item::Ask(id, request)) = &item
-            && !matches!(request, Request::Stop { .. } | Request::Cancel { .. })
+        if let Some(SessionItem::Ask(id, request)) = &item
+            && !matches!(
+                request,
+                SessionRequest::Stop { .. } | SessionRequest::Cancel { .. }
+            )
         {
             state.under_way = Some(id.clone());
         }
@@ -169,12 +175,12 @@ fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Option<Vec<u8>>
 
 /// Lines that wait to be written.
 #[derive(Clone)]
-pub(crate) struct Outbox {
+pub(crate) struct LineWriter {
     lines: SyncSender<String>,
     stuck: Arc<AtomicBool>,
 }
 
-impl Outbox {
+impl LineWriter {
     /// Writes lines to an output in a thread of its own. The second value is dropped by that thread when all is written.
     pub(crate) fn write(
         mut output: impl Write + Send + 'static,
@@ -203,7 +209,7 @@ impl Outbox {
     }
 
     /// Writes a line.
-    pub(crate) fn put(&self, line: &Line) {
+    pub(crate) fn put(&self, line: &SessionLine) {
         let Ok(text) = serde_json::to_string(line) else {
             return;
         };
@@ -217,7 +223,7 @@ impl Outbox {
 
     /// Writes an error.
     pub(crate) fn error(&self, id: Value, exit: Exit, what: impl Into<String>) {
-        self.put(&Line::Error {
+        self.put(&SessionLine::Error {
             id,
             error: SessionFault {
                 code: exit as u8,

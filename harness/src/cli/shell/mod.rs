@@ -24,8 +24,8 @@ use crate::scenario::source::{Source, line_number};
 use crate::signals::interrupt_flag;
 use clap::{Args, FromArgMatches};
 use harness_proto::time::Span;
-use inbox::{Inbox, Item, Outbox};
-use request::{Event, Line, Request, SCHEMA};
+use inbox::{LineWriter, RequestReader, SessionItem};
+use request::{SCHEMA, SessionEvent, SessionLine, SessionRequest};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -89,8 +89,8 @@ pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io:
     // Nothing else may write to standard output from now on: it becomes standard error for the rest of the program.
     let lines = File::from(rustix::io::dup(rustix::stdio::stdout())?);
     rustix::stdio::dup2_stdout(rustix::stdio::stderr())?;
-    let (out, writer) = Outbox::write(lines);
-    out.put(&Line::Event(Event::Hello {
+    let (out, writer) = LineWriter::write(lines);
+    out.put(&SessionLine::Event(SessionEvent::Hello {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
         rig: arguments.rig.clone(),
@@ -100,7 +100,7 @@ pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io:
     let [_, what] = told.take_collected();
     output.say(&what);
     let what = what.trim_end().to_owned();
-    out.put(&Line::Event(Event::End {
+    out.put(&SessionLine::Event(SessionEvent::End {
         code: exit as u8,
         what,
     }));
@@ -117,7 +117,7 @@ pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io:
     Ok(exit)
 }
 
-fn serve(arguments: &ShellArguments, out: &Outbox, told: &mut Output) -> Exit {
+fn serve(arguments: &ShellArguments, out: &LineWriter, told: &mut Output) -> Exit {
     let Some(rig) = find_any_rig(&arguments.rig, told) else {
         return Exit::Usage;
     };
@@ -138,14 +138,14 @@ fn serve(arguments: &ShellArguments, out: &Outbox, told: &mut Output) -> Exit {
         Err(failure) => return failure.tell(told),
     };
     let bus = rig.port().map_or(Bus::DEFAULT, |port| port.bus.bus());
-    out.put(&Line::Event(Event::Ready {
+    out.put(&SessionLine::Event(SessionEvent::Ready {
         bus: bus.name(),
         drives: bench.drives(),
         simulated: rig.is_simulated(),
         motion: arguments.leave,
     }));
-    let mut session = Session {
-        inbox: Inbox::read(std::io::stdin(), Arc::clone(&interrupt), out.clone()),
+    let mut session = HeldSession {
+        inbox: RequestReader::read(std::io::stdin(), Arc::clone(&interrupt), out.clone()),
         rig,
         bus,
         bench,
@@ -162,20 +162,20 @@ fn serve(arguments: &ShellArguments, out: &Outbox, told: &mut Output) -> Exit {
     tell_end(&end, exit, told)
 }
 
-struct Session {
-    inbox: Inbox,
+struct HeldSession {
+    inbox: RequestReader,
     rig: Rig,
     bus: Bus,
     bench: Box<dyn HeldBench>,
-    out: Outbox,
+    out: LineWriter,
     motion: bool,
-    /// A fault was injected. A scenario begins anew, without it, and would pass in spite of it.
+    /// A fault was injected. A scenario starts without it and would pass in spite of it.
     struck: bool,
     ended: Arc<AtomicBool>,
     interrupt: Arc<AtomicBool>,
 }
 
-impl Session {
+impl HeldSession {
     /// Does requests until the session ends; returns why as an exit code.
     fn work(&mut self, told: &mut Output) -> Exit {
         let patience = match self.rig.is_simulated() {
@@ -195,19 +195,19 @@ impl Session {
                 return Exit::RigError;
             }
             match self.inbox.next(patience) {
-                Some(Item::End) => return Exit::Passed,
-                Some(Item::Cancelled(id)) => {
+                Some(SessionItem::End) => return Exit::Passed,
+                Some(SessionItem::Cancelled(id)) => {
                     self.out
                         .error(id, Exit::Interrupted, "cancelled before it began")
                 }
-                Some(Item::Ask(id, Request::End {})) => {
-                    self.out.put(&Line::Result {
+                Some(SessionItem::Ask(id, SessionRequest::End {})) => {
+                    self.out.put(&SessionLine::Result {
                         id,
                         result: json!({}),
                     });
                     return Exit::Passed;
                 }
-                Some(Item::Ask(id, request)) => self.ask(id, &request),
+                Some(SessionItem::Ask(id, request)) => self.ask(id, &request),
                 None if self.rig.is_simulated() => {}
                 None => {
                     if let Err(failure) = self.bench.pass(KEPT)
@@ -216,7 +216,7 @@ impl Session {
                         let mut own = Output::collecting();
                         failure.tell(&mut own);
                         let [_, what] = own.take_collected();
-                        self.out.put(&Line::Event(Event::Bus {
+                        self.out.put(&SessionLine::Event(SessionEvent::Bus {
                             what: what.trim_end().to_owned(),
                         }));
                         if let Err(failure) = self.bench.resume() {
@@ -226,7 +226,8 @@ impl Session {
                 }
             }
             for what in self.bench.events() {
-                self.out.put(&Line::Event(Event::Bus { what }));
+                self.out
+                    .put(&SessionLine::Event(SessionEvent::Bus { what }));
             }
             if let Some(exit) = self.in_trouble(told) {
                 return exit;
@@ -252,7 +253,7 @@ impl Session {
     }
 
     /// Does a request and answers it.
-    fn ask(&mut self, id: Value, request: &Request) {
+    fn ask(&mut self, id: Value, request: &SessionRequest) {
         let mut output = Output::collecting();
         let done = self.perform(request, &mut output);
         let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
@@ -264,7 +265,7 @@ impl Session {
             Err(failure) => (failure.tell(&mut output), Value::Null),
         };
         let [text, notes] = output.take_collected();
-        let reading = matches!(request, Request::Run { .. });
+        let reading = matches!(request, SessionRequest::Run { .. });
         if exit == Exit::Passed || reading && !result.is_null() {
             let mut result = result;
             if let Value::Object(own) = &mut result {
@@ -275,7 +276,7 @@ impl Session {
                     own.insert("notes".to_owned(), json!(notes));
                 }
             }
-            return self.out.put(&Line::Result { id, result });
+            return self.out.put(&SessionLine::Result { id, result });
         }
         let exit = if cancelled { Exit::Interrupted } else { exit };
         let what = notes.trim_end();
@@ -285,24 +286,24 @@ impl Session {
 
     fn perform(
         &mut self,
-        request: &Request,
+        request: &SessionRequest,
         output: &mut Output,
     ) -> Result<(Exit, Value), Failure> {
         let done = match request {
-            Request::Info {} => json!({
+            SessionRequest::Info {} => json!({
                 "rig": self.rig.id(), "bus": self.bus.name(), "drives": self.bench.drives(), "simulated": self.rig.is_simulated(),
                 "motion": self.motion, "commands": COMMANDS,
             }),
-            Request::Wait { ms } if *ms > LONGEST_WAIT => {
+            SessionRequest::Wait { ms } if *ms > LONGEST_WAIT => {
                 return Err(Failure::refused(format!(
                     "`ms`: 0 to {LONGEST_WAIT} expected"
                 )));
             }
-            Request::Wait { ms } => {
+            SessionRequest::Wait { ms } => {
                 self.bench.pass(Span::from_millis(u64::from(*ms)))?;
                 json!({})
             }
-            Request::Fault { line } => {
+            SessionRequest::Fault { line } => {
                 let written = line.trim_start();
                 let bare = ["!", "drive", "slave", "?"]
                     .iter()
@@ -316,10 +317,10 @@ impl Session {
                 self.struck = true;
                 json!({})
             }
-            Request::Recover {} => json!({"found": self.bench.recover()?}),
+            SessionRequest::Recover {} => json!({"found": self.bench.recover()?}),
             // What they break off has been broken off.
-            Request::Cancel { .. } | Request::End {} => json!({}),
-            Request::Run { scenario, path } => {
+            SessionRequest::Cancel { .. } | SessionRequest::End {} => json!({}),
+            SessionRequest::Run { scenario, path } => {
                 return self.run(scenario.as_deref(), path.as_deref());
             }
             _ => {
@@ -468,11 +469,11 @@ fn object(entry: &Entry, outcome: &Outcome) -> Value {
 }
 
 /// The result of a command: values that were read, or the JSON that it prints.
-fn data(request: &Request, output: &Output) -> Value {
+fn data(request: &SessionRequest, output: &Output) -> Value {
     let text = output.collected_result();
     match request {
-        Request::Read { .. } => json!({"values": values(text)}),
-        Request::State { .. } => {
+        SessionRequest::Read { .. } => json!({"values": values(text)}),
+        SessionRequest::State { .. } => {
             json!({"data": serde_json::from_str::<Value>(text.trim()).unwrap_or_default()})
         }
         _ => json!({}),

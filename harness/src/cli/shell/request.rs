@@ -7,17 +7,17 @@ use serde_json::{Map, Value};
 /// The version of the session's JSON.
 pub(crate) const SCHEMA: u32 = 1;
 
-/// Which drives: a number, or a text as on the command line (`"2:3"`, `"0..2"`, `"all"`).
+/// DriveWords drives: a number, or a text as on the command line (`"2:3"`, `"0..2"`, `"all"`).
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
-pub(crate) enum Which {
+pub(crate) enum DriveWords {
     /// A drive by its number.
     Number(u8),
     /// Drives as on the command line.
     Text(String),
 }
 
-impl Which {
+impl DriveWords {
     fn word(&self) -> String {
         match self {
             Self::Number(number) => number.to_string(),
@@ -29,21 +29,21 @@ impl Which {
 /// A request: `do` says what is to be done. `id`, a number or a text, stands beside it and comes back in the answer.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
-pub(crate) enum Request {
+pub(crate) enum SessionRequest {
     /// The bench and its drives.
     // Not `Info`: of a variant without braces serde does not refuse unknown fields.
     Info {},
     /// Reads cells, registers or parameters by their names.
     Read {
-        /// Which drives.
-        drive: Which,
+        /// DriveWords drives.
+        drive: DriveWords,
         /// Their names or addresses.
         cells: Vec<String>,
     },
     /// Writes cells, registers or parameters and reads them back.
     Write {
-        /// Which drives.
-        drive: Which,
+        /// DriveWords drives.
+        drive: DriveWords,
         /// `name=value`, with units: `nsoll=100rpm`.
         values: Vec<String>,
     },
@@ -54,28 +54,28 @@ pub(crate) enum Request {
     },
     /// The drives' modes, errors and states, as `info --format json` has them.
     State {
-        /// Which drives; all by default.
-        drive: Option<Which>,
+        /// DriveWords drives; all by default.
+        drive: Option<DriveWords>,
     },
     /// Releases drives: their motors may turn.
     Go {
-        /// Which drives.
-        drive: Which,
+        /// DriveWords drives.
+        drive: DriveWords,
     },
     /// Stops drives; without a drive all of them. Overtakes: what is under way ends, and what waits is cancelled.
     Stop {
-        /// Which drives; all by default.
-        drive: Option<Which>,
+        /// DriveWords drives; all by default.
+        drive: Option<DriveWords>,
     },
     /// Blocks drives: no torque.
     Block {
-        /// Which drives.
-        drive: Which,
+        /// DriveWords drives.
+        drive: DriveWords,
     },
     /// Switches motors off on their ramps, on slaves with a cyclic master.
     Off {
-        /// Which drives.
-        drive: Which,
+        /// DriveWords drives.
+        drive: DriveWords,
     },
     /// Brings rings out of the error mode and counts their drives.
     Recover {},
@@ -106,10 +106,11 @@ pub(crate) enum Request {
     End {},
 }
 
-impl Request {
+impl SessionRequest {
     /// The words of the command line that does it; `None` for what is no command.
     pub(crate) fn words(&self) -> Option<Vec<String>> {
-        let all = |drive: &Option<Which>| drive.as_ref().map_or("all".to_owned(), Which::word);
+        let all =
+            |drive: &Option<DriveWords>| drive.as_ref().map_or("all".to_owned(), DriveWords::word);
         let (name, drive, rest): (&str, String, &[String]) = match self {
             Self::Command { words } => return Some(words.clone()),
             Self::Read { drive, cells } => ("watch", drive.word(), cells),
@@ -142,7 +143,7 @@ impl Request {
 /// A line of the session's output.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
-pub(crate) enum Line {
+pub(crate) enum SessionLine {
     /// The answer to a request.
     Result {
         /// The request's.
@@ -158,7 +159,7 @@ pub(crate) enum Line {
         error: SessionFault,
     },
     /// What no request asked for.
-    Event(Event),
+    Event(SessionEvent),
 }
 
 /// Why a request was not done.
@@ -173,7 +174,7 @@ pub(crate) struct SessionFault {
 /// What no request asked for.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "kebab-case")]
-pub(crate) enum Event {
+pub(crate) enum SessionEvent {
     /// The first line.
     Hello {
         /// The version of this schema.
@@ -210,8 +211,8 @@ pub(crate) enum Event {
 
 /// The JSON schema of the lines in both directions.
 pub(crate) fn schema() -> Value {
-    let request = schemars::schema_for!(Request).to_value();
-    let line = schemars::schema_for!(Line).to_value();
+    let request = schemars::schema_for!(SessionRequest).to_value();
+    let line = schemars::schema_for!(SessionLine).to_value();
     serde_json::json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "drivebench session",
@@ -224,7 +225,7 @@ pub(crate) fn schema() -> Value {
 const LONGEST_ID: usize = 256;
 
 /// Reads a line: its `id`, and the request.
-pub(crate) fn parse(line: &[u8]) -> (Value, Result<Request, String>) {
+pub(crate) fn parse(line: &[u8]) -> (Value, Result<SessionRequest, String>) {
     let mut object: Map<String, Value> = match serde_json::from_slice(line) {
         Ok(object) => object,
         Err(error) => {
