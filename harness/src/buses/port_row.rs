@@ -16,6 +16,9 @@ use crate::scenario::source::{Source, line_number};
 /// Takes a rig to play scenarios on it.
 type OpenRun = fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>;
 
+/// Takes a rig for a session.
+type OpenSession = fn(&Rig, &Options) -> Result<Box<dyn HeldBench>, SessionError>;
+
 /// Judges what was played on a rig again.
 type OpenJudge = fn(&Rig, bool, bool) -> Box<dyn SegmentJudge>;
 
@@ -50,7 +53,7 @@ pub(crate) struct PortRow {
     /// Runs a command on its drives.
     pub(crate) command: fn(&Rig, &DriveCommand, &mut Output) -> Result<Exit, Failure>,
     /// Takes a rig for a session.
-    pub(crate) hold: fn(&Rig, &Options) -> Result<Box<dyn HeldBench>, SessionError>,
+    pub(crate) hold: OpenSession,
     /// Runs `rig check`, as text or for tools.
     pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
     /// Explores its drives.

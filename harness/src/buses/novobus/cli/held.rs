@@ -147,13 +147,12 @@ impl HeldBench for HeldRings {
                 entry.short_name()
             )));
         };
-        let played = self.apart(|session| match Run::new(session) {
+        self.apart(|session| match Run::new(session) {
             Ok(mut run) => run.play(&plan, None).map_err(|error| {
                 Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
             }),
             Err(problems) => Err(problems.into()),
-        })?;
-        played
+        })?
     }
 
     fn strike(&mut self, line: &str) -> Result<(), Failure> {
