@@ -17,6 +17,12 @@ const AHEAD: Span = Span::from_millis(100);
 /// Bytes of a conversation that are recorded on each link; more are counted only.
 pub(crate) const MOST_RECORDED: usize = 4_000_000;
 
+/// Octets of a conversation that may come beyond what [`MOST_A_REPLY`] and the rate explain: far more than any buffer in between holds.
+const MOST_UNEXPLAINED: u64 = 1_000_000;
+
+/// Octets that may come for each octet that was sent, on any bus: a reply of PROFIBUS DP has at most 255.
+const MOST_A_REPLY: u64 = 300;
+
 /// What a bus knows of the octets that are under way at a port.
 pub(crate) trait Accounting: fmt::Debug + Send {
     /// Nothing is under way.
@@ -68,6 +74,9 @@ pub(crate) struct PortEnd<A> {
     pub(crate) incoming: Tamper,
     pub(crate) log: [Vec<LineByte>; 2],
     pub(crate) carried: u64,
+    /// Octets of this conversation that have come, and that were sent.
+    came: u64,
+    sent: u64,
     pub(crate) unplaced: u64,
 }
 
@@ -87,6 +96,8 @@ impl<A: Accounting> PortEnd<A> {
             incoming: Tamper::default(),
             log: [Vec::new(), Vec::new()],
             carried: 0,
+            came: 0,
+            sent: 0,
             unplaced: 0,
         }
     }
@@ -101,7 +112,7 @@ impl<A: Accounting> PortEnd<A> {
         self.received.clear();
         self.last_arrival = Instant::START;
         self.accounting.rest();
-        self.carried = 0;
+        (self.carried, self.came, self.sent) = (0, 0, 0);
         self.outgoing = Tamper::default();
         self.incoming = Tamper::default();
         self.log = [Vec::new(), Vec::new()];
@@ -143,6 +154,7 @@ impl<A: Accounting> PortEnd<A> {
         // A lost byte takes its byte time too.
         self.free = free.max(begun + byte_time);
         self.carried += 1;
+        self.sent += 1;
         if self.log[0].len() < MOST_RECORDED {
             self.log[0].extend(passed.seen(byte, begun + byte_time, byte_time));
         }
@@ -181,6 +193,15 @@ impl<A: Accounting> PortEnd<A> {
             self.last_arrival = self.last_arrival.max(told);
         }
         self.unplaced += self.wire.take_unplaced();
+        self.came += bytes.len() as u64;
+        if result.is_ok() && self.came > self.most_explained(now, byte_time) {
+            result = Err(Trouble::Garbled(format!(
+                "{}: {} bytes have come in {}, more than a line of this rate can carry: check `port` and `line`, or what is connected there",
+                self.wire.name(),
+                self.came,
+                now.since_start()
+            )));
+        }
         for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
             self.accounting.came(byte);
             self.carried += 1;
@@ -193,5 +214,13 @@ impl<A: Accounting> PortEnd<A> {
             }
         }
         result
+    }
+
+    /// How many octets can have come by now from anything that belongs on a line: a peer that floods the port would fill the memory.
+    fn most_explained(&self, now: Instant, byte_time: Span) -> u64 {
+        let at_rate = now.since_start().units() / byte_time.units().max(1);
+        let asked = self.sent.saturating_mul(MOST_A_REPLY);
+        // A clock may be wrong, never by half.
+        MOST_UNEXPLAINED + asked.saturating_add(at_rate.saturating_mul(2))
     }
 }

@@ -15,6 +15,9 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 /// What is read from the operating system at a time: a line brings few bytes between two looks at it.
 const CHUNK: usize = 256;
 
+/// How often the operating system is asked in one look: a peer that sends faster than it is read must not keep the caller.
+const MOST_CHUNKS: usize = 1_024;
+
 /// What may wait to be taken by the operating system.
 pub(super) const MOST_WAITING: usize = 65_536;
 
@@ -284,7 +287,7 @@ impl Wire {
     /// [`Trouble::Garbled`] where what came is not coded as it must be. What came before is in `into`.
     pub fn receive(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
         let mut buffer = [0; CHUNK];
-        loop {
+        for _ in 0..MOST_CHUNKS {
             let length = match rustix::io::read(&self.fd, &mut buffer) {
                 Ok(0) => {
                     return Err(Trouble::Lost(format!(
@@ -302,6 +305,7 @@ impl Wire {
                 return Ok(());
             }
         }
+        Ok(())
     }
 
     fn decode(&mut self, bytes: &[u8], into: &mut Vec<Received>) -> Result<(), Trouble> {

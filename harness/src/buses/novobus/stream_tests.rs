@@ -130,3 +130,22 @@ fn who_stands_still_while_awake_is_late() {
     let late = link.pump.lateness();
     assert!(late > Span::from_millis(15), "{late}");
 }
+
+/// A peer that sends without end is no line; its bytes must not fill the memory.
+#[test]
+fn a_flood_ends_the_link() {
+    let (mut link, mut ring) = link();
+    let flood = std::thread::spawn(move || while ring.write_all(&[0; 65_536]).is_ok() {});
+    let end = link.now() + Span::from_millis(60_000);
+    while link.trouble().is_none() && link.now() < end {
+        link.wait(end);
+        while link.receive_octet(0).is_some() {}
+    }
+    let trouble = link.trouble().map(ToString::to_string).unwrap_or_default();
+    assert!(
+        trouble.contains("more than a line of this rate"),
+        "{trouble}"
+    );
+    drop(link);
+    flood.join().expect("it ends with the socket");
+}
