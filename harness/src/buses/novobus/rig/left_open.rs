@@ -70,6 +70,9 @@ pub(crate) fn explanation(heard: &Heard<'_>) -> Option<Explanation> {
         for (choice, whose, more) in candidates(&open, &first, &header, heard) {
             let all = header.and(&more);
             match compare(&all, heard) {
+                // It moves the model's bytes so that they seem to be late, and explains nothing.
+                Ok(comparisons)
+                    if silence(&comparisons).is_some_and(|own| !own.is_behind(&first)) => {}
                 Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
                     let has_steps = |own: &Conversation| own.has_steps();
@@ -111,6 +114,15 @@ impl Place {
     }
 }
 
+/// Where a silence of the bench has ended the comparison.
+fn silence(comparisons: &[Comparison]) -> Option<Place> {
+    let last = comparisons.last().filter(|own| own.silenced)?;
+    Some(Place {
+        conversation: comparisons.len(),
+        divergence: last.divergence.clone(),
+    })
+}
+
 /// What is tried behind `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
 fn candidates<'c>(
     open: &'c [Choice],
@@ -131,7 +143,7 @@ fn candidates<'c>(
     for choice in open {
         let whole = header.and(&every(choice));
         let tells = match compare(&whole, heard) {
-            Ok(_) => false,
+            Ok(comparisons) => silence(&comparisons).is_some(),
             Err((place, _)) => place != *first,
         };
         if !tells {
