@@ -120,7 +120,7 @@ pub enum Command {
         /// The kind of file.
         of: SchemaName,
     },
-    /// Hold a bench for a program: JSON requests on standard input, answers on standard output.
+    /// Hold a bench for a program: JSON requests on standard input, JSON answers.
     ///
     /// The bus stays at work between two requests. The end of the input, a signal or a lost port ends in the safe state.
     Shell(ShellArguments),
