@@ -11,7 +11,7 @@ use super::follow::TwinBytes;
 use crate::link::HARMLESS;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::ZEROS;
+use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::time::{Instant, Span};
 
 /// A byte and when it came.
@@ -68,7 +68,8 @@ impl Sent<'_> {
     }
 
     /// The first byte of the zeros and addresses of drives that have missed their master (ND21 9.9): in front of the byte that it
-    /// answers, the bench left the line silent or was late.
+    /// answers, the bench left the line silent or was late. A check sequence behind it that comes back whole, with nothing other than
+    /// expected from there to its end, takes every drive out of the error mode (9.8): the drives have missed nothing then.
     fn timed_out(
         &self,
         size: RingSize,
@@ -99,12 +100,23 @@ impl Sent<'_> {
             let before = index == 0 && run > 0 && early(0);
             in_error_mode[index] = run > usize::from(ZEROS) || at_end || before;
         }
-        let same =
-            |index: &usize| expected.get(*index).map(|own| own.1) == Some(received[*index].1);
-        let first = (0..received.len()).find(|index| in_error_mode[*index] && begins(index))?;
-        (first..received.len())
-            .any(|index| !same(&index))
-            .then_some(first)
+        let same = |index: usize| expected.get(index).map(|own| own.1) == Some(received[index].1);
+        let sequence = SEQUENCE.map(Received::good);
+        // Whether a byte differs from a byte on, and whether a whole check sequence comes before the first that does.
+        let (mut differs, mut ended) = (false, false);
+        let mut first = None;
+        for index in (0..received.len()).rev() {
+            if !same(index) {
+                (differs, ended) = (true, false);
+            }
+            let behind = received[index..].iter().map(|heard| heard.1);
+            let whole = behind.take(sequence.len()).eq(sequence);
+            ended |= whole && (index..index + sequence.len()).all(same);
+            if in_error_mode[index] && differs && !ended && begins(&index) {
+                first = Some(index);
+            }
+        }
+        first
     }
 
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
