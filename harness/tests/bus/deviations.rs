@@ -281,6 +281,38 @@ fn every_wrong_master_is_named() {
     }
 }
 
+/// ND21 9.8: what breaks a check sequence off is tried on a rig that allows nothing, and shows a wrong drive wherever it stands: the drives in front
+/// of it count the bytes up (9.7).
+#[test]
+fn a_broken_sequence_is_tried_with_every_drive() {
+    let scenarios = scenarios();
+    let tried = ["9.8-sequence-with-gaps", "9.8-sequence-with-gaps-behind"];
+    let plans = scenarios.iter().filter(|s| tried.contains(&s.short_name()));
+    let plans: Vec<_> = plans.map(|s| s.plan.clone().expect("a plan")).collect();
+    assert_eq!(plans.len(), 2);
+    let judged = |setup: &str| -> Vec<Verdict> {
+        let text = format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [{setup}]\n"
+        );
+        let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
+        let rig = parse(&source.expect("a text")).expect("a rig");
+        let mut session = Session::open(&rig, &Options::default()).expect("a rig in use");
+        let mut on_rig = Run::new(&mut session).expect("a twin");
+        let played = plans.iter().map(|plan| {
+            let played = on_rig.play(plan, None).expect("a healthy rig");
+            played.outcome.verdict
+        });
+        let played = played.collect();
+        let _end = session.close();
+        played
+    };
+    assert_eq!(judged(""), [Verdict::Passed; 2]);
+    for drive in 0..3 {
+        let setup = format!("\"drive {drive} deviates broken-check-sequence-accepted\"");
+        assert!(judged(&setup).contains(&Verdict::Failed), "drive {drive}");
+    }
+}
+
 #[test]
 fn names_are_unique_and_sections_are_the_manuals() {
     let mut names: Vec<_> = deviations().map(|d| d.name).collect();

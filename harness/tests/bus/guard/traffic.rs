@@ -323,10 +323,6 @@ const RUBBISH: &[(&str, &str)] = &[
         "goes on without a recovery behind a drive that was switched on",
     ),
     (
-        "9.8-sequence-with-gaps",
-        "other bytes stand inside the check sequence",
-    ),
-    (
         "9.8-zeros-before-the-sequence",
         "goes on behind too few zeros",
     ),

@@ -17,6 +17,8 @@ use alloc::boxed::Box;
 const FIRST_ADDRESS: u8 = 6;
 /// The longest command without its checking byte (ND21 10.1).
 const LONGEST: usize = 5;
+/// The most bytes in the place of a check sequence, until the next 17 zeros.
+const MOST_FOREIGN: u8 = 8;
 
 /// Decides for each byte whether it may go onto one ring. See the module documentation.
 #[derive(Clone, Debug)]
@@ -65,6 +67,10 @@ struct Doubt {
     zeros: u8,
     /// Bytes of the check sequence.
     matched: u8,
+    /// It began with a bad sync byte, while every drive waited for a sync byte: every drive is in the error mode.
+    in_error_mode: bool,
+    /// Other bytes that may still pass: behind 17 zeros every drive in the error mode waits for the check sequence.
+    foreign: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -416,7 +422,8 @@ impl Guard {
                 return Ok(Next::to(State::Doubt(Doubt {
                     cleared: true,
                     zeros,
-                    matched: 0,
+                    in_error_mode: true,
+                    ..Doubt::default()
                 })));
             }
             Err(_) => return Ok(Next::to(in_doubt(byte))),
@@ -468,13 +475,15 @@ impl Guard {
             }
             return Ok(Parameter::Half(half));
         }
-        match DriveAct::of(sent) {
-            Some(act) if Checksum::over(sent).plus() == byte => {
-                act.judge(&self.limits, self.known(key))?;
-                Ok(Parameter::Complete(act))
-            }
-            _ => Ok(Parameter::Error),
-        }
+        let Some(act) = DriveAct::of(sent) else {
+            return Ok(Parameter::Error);
+        };
+        // With a wrong checking byte too: a wrong drive may execute it.
+        act.judge(&self.limits, self.known(key))?;
+        Ok(match Checksum::over(sent).plus() == byte {
+            true => Parameter::Complete(act),
+            false => Parameter::Error,
+        })
     }
 }
 
@@ -555,6 +564,11 @@ impl Doubt {
                     cleared: self.cleared || zeros == ZEROS,
                     zeros,
                     matched: 0,
+                    foreign: match self.in_error_mode && zeros == ZEROS {
+                        true => MOST_FOREIGN,
+                        false => self.foreign,
+                    },
+                    ..self
                 }
             }
             _ if !self.cleared => return Err(Cause::InDoubt),
@@ -573,16 +587,23 @@ impl Doubt {
                         ..Next::to(State::Sync)
                     });
                 } else {
+                    // Every drive may have left the error mode, or none.
                     Self {
-                        zeros: 0,
-                        matched: 0,
-                        ..self
+                        cleared: true,
+                        ..Self::default()
                     }
                 }
             }
             0xFF => Self {
                 zeros: 0,
                 matched: 1,
+                ..self
+            },
+            // ND21 9.7, 9.8: a drive that waits for the check sequence takes these for nothing else. Should it be wrong, they are no sync bytes.
+            1..=0x7F if self.foreign > 0 => Self {
+                zeros: 0,
+                matched: 0,
+                foreign: self.foreign - 1,
                 ..self
             },
             _ => return Err(Cause::InDoubt),

@@ -10,10 +10,13 @@
 //!   sequence. A zero completes no command: 00 is never a checking byte (9.6) and never a command byte (9.5).
 //! * Behind 17 zeros and the check sequence without a gap between them, a drive **waits for a sync byte** with half-received
 //!   commands forgotten, or is still in the error mode and sends zeros down the ring. From then on telegrams are read as a drive
-//!   reads them. A command is judged at its checking byte, the one without which it is not executed; process
+//!   reads them. A command is judged at its checking byte, the one without which it is not executed, and also where that is wrong; process
 //!   data at the sync byte that announces them, as half of them must never stand before a zero.
 //! * Every byte that puts a drive into the error mode brings doubt back: a bad sync byte, a wrong checking byte, a line error, eight zeros in
 //!   a row. So does `ResetH8`, because a drive does not listen for a time after it.
+//!
+//! Where a bad sync byte has put every drive into the error mode, and 17 zeros follow, every drive waits for the check sequence and takes
+//! nothing else (9.7, 9.8). Up to 8 bytes below 80 pass then in its place, which try what breaks a sequence off.
 //!
 //! A command is judged the same for every drive, so a wrong ring size or a neighbour that takes a short address
 //! does not weaken the guard. Incomplete commands are kept for each address byte; "next" counts up from the last one (9.2).

@@ -164,6 +164,54 @@ fn the_shifted_check_sequence() {
     }
 }
 
+/// ND21 9.7, 9.8: behind a bad sync byte and 17 zeros every drive waits for the check sequence, and what breaks it off may be tried. Where a drive
+/// may be elsewhere, and with what may be a sync byte, it may not.
+#[test]
+fn a_broken_check_sequence() {
+    let zeros = [0_u8; 17];
+    let broken = |byte: u8| [&zeros[..], &[0xFF, 0x44, byte, 0x72, 0x4C, 0x41, 0x80]].concat();
+    assert!(doubt(Limits::default(), &broken(0x00), false));
+    assert!(doubt(Limits::default(), &broken(0x01), false));
+    assert!(
+        passes(&[&[0x08][..], &broken(0x7F)].concat()),
+        "a bad sync byte"
+    );
+    assert!(!passes(&broken(0x82)), "a sync byte");
+    assert!(
+        !passes(&[&[0xC8][..], &broken(0x01)].concat()),
+        "perhaps no bad sync byte"
+    );
+    assert!(
+        !passes(&[&zeros[1..], &[0xFF, 0x44, 0x01]].concat()),
+        "16 zeros"
+    );
+    assert!(passes(&[&zeros[..], &[1; 8]].concat()));
+    assert!(!passes(&[&zeros[..], &[1; 9]].concat()), "too many");
+    assert!(passes(&[&zeros[..], &[1; 8], &zeros, &[1; 8]].concat()));
+    let whole = [&zeros[..], &[0x01, 0xFF, 0x44, 0x72, 0x4C, 0x41, 0x80]].concat();
+    assert!(doubt(Limits::default(), &whole, false), "without zeros");
+    assert!(
+        !passes(&[&whole[..], &[0x01]].concat()),
+        "out of the error mode"
+    );
+}
+
+/// ND21 9.6: no drive executes a command whose checking byte is wrong. A wrong one may, so it passes only where it may be executed.
+#[test]
+fn a_wrong_checking_byte_allows_nothing() {
+    for (address, permitted) in [(ram::EEPROM_BUFFER, true), (ram::NSOLL, false)] {
+        let mut bytes = write(address, 0x7F);
+        bytes[6] = bytes[6].wrapping_add(1);
+        assert_eq!(
+            passes(&bytes),
+            permitted,
+            "{address:04X} {:?}",
+            behind(Limits::default(), &bytes, false).err()
+        );
+        assert!(behind(Limits::unlimited(), &bytes, false).is_ok());
+    }
+}
+
 #[test]
 fn where_doubt_begins() {
     let none = Limits::default();
