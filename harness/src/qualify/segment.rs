@@ -152,7 +152,7 @@ pub(crate) fn qualified<A: Attempts>(
             .map(|own| format!("deviation: {own}\n"))
             .collect(),
         Named::None if inconclusive > 0 || tried == 0 || !whole => {
-            "deviations: not known; nothing is known to differ, but not everything was compared\n".to_owned()
+            "deviations: not known; no drive is known to be at fault, but not everything was compared and equal\n".to_owned()
         }
         Named::None if failed > 0 => {
             "deviations: not known; attempts failed, and correct drives with other values of what the manual leaves open explain each of them\n".to_owned()
