@@ -172,7 +172,7 @@ pub(super) fn is_silenced(last: &AnsweredCase, times: &ByteTimes, found: &Differ
         all: &all,
         way,
     };
-    let excused = sent.excused_from(size, (&expected, &received), (true, true));
+    let excused = sent.excused_from(size, (&expected, &received, index), (true, true));
     excused.is_some_and(|from| received.get(index).is_none_or(|(came, _)| *came >= from))
 }
 

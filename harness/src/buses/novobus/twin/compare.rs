@@ -66,13 +66,18 @@ impl Comparer<'_> {
         let race = || times.judge(size, (answer, received), self.exactness.tolerance);
         let unasked = real_time.then(race).flatten();
         let may = self.comparison.monitored || self.knowledge.may_monitor(ring, size);
-        let excused =
-            || times.excused_from(size, (expected, received), (may, self.comparison.monitored));
-        let excused = real_time.then(excused).flatten();
+        let monitored = self.comparison.monitored;
+        let whole = (expected, &received[..]);
+        let in_place = aligned || unasked.is_some() || !real_time;
+        // The bytes before a place that differs are right.
+        let excused = |index: usize| {
+            let right = if in_place { index } else { 0 };
+            times.excused_from(size, (whole.0, whole.1, right), (may, monitored))
+        };
         let (shorter, short);
         // A race of clocks is compared up to its first byte, and the long runs behind it do not matter.
-        let (expected, received) = if aligned || unasked.is_some() || !real_time {
-            (expected, &received[..])
+        let (expected, received) = if in_place {
+            whole
         } else {
             (shorter, short) = (collapsed(expected), collapsed(received));
             (&shorter[..], &short[..])
@@ -157,6 +162,7 @@ impl Comparer<'_> {
             }
             if self.comparison.divergence.is_none() {
                 let behind = |from| found.received.is_none_or(|(at, _)| at >= from);
+                let excused = real_time.then(|| excused(index)).flatten();
                 self.comparison.silenced = excused.is_some_and(behind);
                 self.comparison.divergence = Some(found);
             }
