@@ -1,10 +1,11 @@
-//! Verdicts of attempts on a port whose bytes come late.
+//! Verdicts of attempts on a port whose bytes come late or early.
 
-use super::tests::{READ, judged_on, link, plan};
+use super::tests::{READ, judged_early, judged_on, link, plan};
 use crate::buses::SimulatedLink;
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};
 use crate::rig::run::Way;
+use crate::scenario::verdict::Verdict;
 use crate::scenario::verdict::Verdict::{Failed, Inconclusive, Marginal, Passed};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -157,4 +158,49 @@ fn late_bytes_fail_no_drive() {
         // Longer than any computer holds it.
         assert_eq!(judged("", 60_000, scenario).verdict, Failed, "{scenario}");
     }
+}
+
+/// ND21 11.8: with drives that are silent in their self-test, the model expects bytes at other times. These times are no silence of the bench,
+/// and excuse no wrong byte. The bytes come early, as over a socket.
+#[test]
+fn a_choice_that_moves_the_model_excuses_no_wrong_byte() {
+    let judged = |wrong: &str, expected: Verdict| {
+        let plan =
+            plan("title x\nring 3\nwrite-byte 1 FE13 = 43\nread-byte 1 FE13 = 43\n".to_owned());
+        let way = Way {
+            rings: plan.rings.clone(),
+            attempts: None,
+            anew: true,
+        };
+        let ring = format!("drive 0..last property self-test-time = 0ms\n{wrong}");
+        let early = Span::from_micros(230);
+        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_| {}, early);
+        assert_eq!(outcome.verdict, expected, "{outcome:#?}");
+    };
+    judged("", Passed);
+    judged("drive 1 deviates writes-ignored\n", Failed);
+}
+
+/// ND21 9.8: a check sequence that comes back whole ends what a silence may have begun. Behind a fault of the scenario it is not known whether
+/// the drives monitor time-outs (14.3.6), and the zeros of the bench's own check sequences are no sign that they do.
+#[test]
+fn zeros_of_the_bench_excuse_no_wrong_byte() {
+    let judged = |wrong: &str, expected: Verdict| {
+        let plan = plan(
+            "title x\nring 3\nwrite-byte last DataIn = 4E\nwrite-word last FF4E = 1122\n> 85 (last-N) 33\n\
+             ! master->last: flip p\n> 44 00*30\nrecover\nread-word last FF4E = 1122\nexchange last 5566\n\
+             read-word last FF4E = 5566\n"
+                .to_owned(),
+        );
+        let way = Way {
+            rings: plan.rings.clone(),
+            attempts: None,
+            anew: true,
+        };
+        let early = Span::from_micros(230);
+        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_| {}, early);
+        assert_eq!(outcome.verdict, expected, "{outcome:#?}");
+    };
+    judged("", Passed);
+    judged("drive 2 deviates process-data-high-byte-early\n", Failed);
 }

@@ -71,7 +71,7 @@ pub(super) fn judged_on(
 }
 
 /// The same where each byte is stamped so much earlier: a ring behind a socket is not bound to the times of a line.
-fn judged_early(
+pub(super) fn judged_early(
     link: &mut dyn Link,
     rig: &str,
     (plan, way): (&Plan, &Way),
@@ -327,51 +327,6 @@ fn a_choice_that_shows_before_the_scenario_leaves_it_judged() {
     let resets = "> 86 FE DD 21 FE 80*3\n< 86 01 DD 21 02 80*3\n";
     judged("", resets, Passed);
     judged(&silent("0..last"), resets, Inconclusive);
-}
-
-/// ND21 11.8: with drives that are silent in their self-test, the model expects bytes at other times. These times are no silence of the bench,
-/// and excuse no wrong byte. The bytes come early, as over a socket.
-#[test]
-fn a_choice_that_moves_the_model_excuses_no_wrong_byte() {
-    let judged = |wrong: &str, expected: Verdict| {
-        let plan =
-            plan("title x\nring 3\nwrite-byte 1 FE13 = 43\nread-byte 1 FE13 = 43\n".to_owned());
-        let way = Way {
-            rings: plan.rings.clone(),
-            attempts: None,
-            anew: true,
-        };
-        let ring = format!("drive 0..last property self-test-time = 0ms\n{wrong}");
-        let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_| {}, early);
-        assert_eq!(outcome.verdict, expected, "{outcome:#?}");
-    };
-    judged("", Passed);
-    judged("drive 1 deviates writes-ignored\n", Failed);
-}
-
-/// ND21 9.8: a check sequence that comes back whole ends what a silence may have begun. Behind a fault of the scenario it is not known whether
-/// the drives monitor time-outs (14.3.6), and the zeros of the bench's own check sequences are no sign that they do.
-#[test]
-fn zeros_of_the_bench_excuse_no_wrong_byte() {
-    let judged = |wrong: &str, expected: Verdict| {
-        let plan = plan(
-            "title x\nring 3\nwrite-byte last DataIn = 4E\nwrite-word last FF4E = 1122\n> 85 (last-N) 33\n\
-             ! master->last: flip p\n> 44 00*30\nrecover\nread-word last FF4E = 1122\nexchange last 5566\n\
-             read-word last FF4E = 5566\n"
-                .to_owned(),
-        );
-        let way = Way {
-            rings: plan.rings.clone(),
-            attempts: None,
-            anew: true,
-        };
-        let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_| {}, early);
-        assert_eq!(outcome.verdict, expected, "{outcome:#?}");
-    };
-    judged("", Passed);
-    judged("drive 2 deviates process-data-high-byte-early\n", Failed);
 }
 
 /// ND21 13.3, 14.4: what the master has written to a cell of the drive's program is known as long as the manual does not let the drive
