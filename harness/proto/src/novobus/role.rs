@@ -2,9 +2,10 @@
 
 use super::address::RingSize;
 use super::check_sequence::{SEQUENCE, SequenceProgress, SequenceWatch};
-use super::command::{Field, Layout, Reply, layout};
+use super::command::{Command, CommandError, Field, Layout, Reply, layout};
 use super::properties::{Properties, ReadLongAnswer, ShortAddress};
 use super::sync::{Addressing, SyncByte};
+use crate::decode::Decoded;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
@@ -202,6 +203,15 @@ impl Reader {
             self.foreign = true;
             return Role::Foreign;
         };
+        // A byte that no drive accepts in this place puts it into the error mode: 00 comes back for it (9.7), and no data.
+        if let Decoded::Bad {
+            reason: CommandError::FixedByte { .. } | CommandError::UnknownOutput(_),
+            ..
+        } = Command::decode(begun)
+        {
+            self.foreign = true;
+            return Role::Foreign;
+        }
         let place = begun.len() - 1;
         let own = drive;
         let drive = Some(drive);
@@ -250,6 +260,14 @@ mod tests {
         let ring = RingSize::new(3).expect("a size");
         let sent: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
         roles(ring, &sent)
+    }
+
+    /// ND21 9.7, 10.1: in the place of a '?' that is wrong no data come back.
+    #[test]
+    fn a_wrong_fixed_byte_has_no_data() {
+        let roles = of(&[0x8A, 0xFE, 0xC1, 0x12, 0xFE, 0x3E, 0x00]);
+        assert!(matches!(roles[4], Role::Data { .. }), "{roles:?}");
+        assert_eq!(roles[5..], [Role::Foreign, Role::Foreign]);
     }
 
     /// ND21 9.3, 10.1: `88 FE C0 13 FE D1` reads byte FE13 of drive 1 in a ring of three.

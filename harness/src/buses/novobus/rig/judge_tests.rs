@@ -356,6 +356,17 @@ fn written_cells_of_the_drive_excuse_nothing() {
     check("", "", &started, Inconclusive);
 }
 
+/// ND21 10.1: in the place of a '?' that is wrong no data come back, also if they are those of the cell.
+#[test]
+fn data_behind_a_wrong_fixed_byte_fail() {
+    let scenario = "write-word 1 FE12 = 1234\n> 8A (1-N) C1 12 FE 3E 00*2\n< 8A 01 C1 12 34 00*3\n";
+    check("", "", scenario, Passed);
+    let outcome = judged("drive 1 deviates fixed-bytes-not-checked", "", scenario);
+    assert_eq!(outcome.verdict, Failed);
+    let remarks = outcome.remarks.join("\n");
+    assert!(remarks.contains("the model: byte "), "{remarks}");
+}
+
 /// ND21 10.3: And and Or leave bits of a cell that are the drive's choice.
 #[test]
 fn masks_on_cells_that_were_not_set_accuse_no_drive() {
