@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod busy;
+mod cause;
 mod condition;
 mod driven;
 pub mod figures;
@@ -15,9 +16,9 @@ pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;
 
+pub use cause::Cause;
 pub use condition::InterlockCondition;
 pub use driven::Driven;
 pub use health::{Health, Unhealthy, examine};
-pub use line_test::Cause;
 pub use run::{Keeper, Run, Way, play_one};
 pub use session::Session;

@@ -1,8 +1,9 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
+use super::cause::{self, Cause};
 use super::health::{self, Health, Unhealthy, examine};
 use super::interlock::Interlocks;
-use super::line_test::{self, Cause};
+use super::line_test;
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Watch, blind_stop, safe_state};
@@ -88,7 +89,7 @@ impl Session {
             allow_motion: false,
             ..options.clone()
         };
-        let mut neighbours = line_test::neighbours(rig).into_iter();
+        let mut neighbours = cause::neighbours(rig).into_iter();
         let opens = |other: &Rig| {
             !options.interrupt.load(Ordering::Relaxed)
                 && Self::open_as_stated(other, &plain)
@@ -289,7 +290,7 @@ impl Session {
                 rig: self.rig.id().to_owned(),
                 ring: ring + 1,
                 ill: Unhealthy::talking(&heard[ring]),
-                cause: Some(line_test::unasked(&heard[ring])),
+                cause: Some(cause::unasked(&heard[ring])),
             }),
             None => Ok(true),
         }
@@ -316,7 +317,7 @@ impl Session {
                 let cause = self.link.trouble().is_none().then(|| {
                     self.settle();
                     let heard = line_test::listen(&mut self.link, ring - 1);
-                    line_test::cause(&ill, &heard, self.rate())
+                    cause::cause(&ill, &heard, self.rate())
                 });
                 SessionError::Ill {
                     rig,

@@ -1,0 +1,315 @@
+//! Why a ring does not open: the likely cause and the next step, from what the health check and the line test heard.
+//!
+//! [`cause`] is a pure function of what was heard.
+
+use super::health::Unhealthy;
+use super::line_test::{Heard, Pass, SENT, faster, slower_in};
+use crate::buses::novobus::locate::locate;
+use crate::rig::Rig;
+use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::MAX_DRIVES;
+use harness_proto::novobus::sync::SYNCO;
+
+/// The likely cause of a ring that does not open, and what to do next.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Cause {
+    /// No byte came back.
+    #[error(
+        "the ring is open, a drive has no power, or this is another port. Next: check the power of every drive and the cable from drive 0 back to the bench; put the final connector on X4 of a drive in the middle to find the sound half (ND21 8.2)"
+    )]
+    Nobody,
+    /// Zeros come without being asked for.
+    #[error(
+        "drives with time-out monitoring miss their bytes and send zeros (ND21 9.9), or the transmitter of one drive is defective. Next: `drivebench recover`; if the zeros go on, switch the drives off and on"
+    )]
+    Babbling,
+    /// Bytes that differ each time.
+    #[error(
+        "noise on the cable, or another master on this line. Next: disconnect every other controller, then check shield, ground and connectors"
+    )]
+    Noise,
+    /// The ring works at another rate.
+    #[error(
+        "the drives run at {} bit/s. Next: set `line = \"{} 8O1\"` in the rig's file, or set the drives to {} bit/s (ND21 8.3)",
+        found.bits_per_second(), found.bits_per_second(), stated.bits_per_second()
+    )]
+    Rate {
+        /// The rate of the drives.
+        found: Rate,
+        /// The rate in the rig's file.
+        stated: Rate,
+    },
+    /// The bytes are damaged in the same way each time.
+    #[error(
+        "the drives run at another rate or with another parity. Next: try `line = \"19200 8O1\"` and `line = \"9600 8O1\"` in the rig's file (ND21 8.3)"
+    )]
+    RateOrParity,
+    /// The rig's file is wrong about in-band marks.
+    #[error(
+        "the other end of the port {}. Next: set `marks = \"{}\"` for this ring in the rig's file",
+        match right { Marks::InBand => "sends and expects in-band marks", Marks::None => "knows no in-band marks" },
+        match right { Marks::InBand => "in-band", Marks::None => "none" }
+    )]
+    Marks {
+        /// What the file should say.
+        right: Marks,
+    },
+    /// The number of drives in the rig's file is not that of the ring.
+    #[error(
+        "the rig's file is not about this ring, or a drive was added or taken out. Next: compare `drives = {stated}` with the cabinet; with {found} drives set `drives = {found}`"
+    )]
+    Count {
+        /// How many answer.
+        found: u8,
+        /// How many the file says.
+        stated: u8,
+    },
+    /// A drive spells out its address and does not leave the error mode.
+    #[error(
+        "the link in front of drive {0} damages bytes, or drive {0} is defective. Next: check the cable and the connectors in front of drive {0} (ND21 9.7)"
+    )]
+    LinkInFront(u8),
+    /// SYNCO comes back well, and no answer does.
+    #[error(
+        "SYNCO passes and commands do not: a drive may still be testing itself (ND21 11.8). Next: wait a second and try again; then switch the drives off and on"
+    )]
+    NoCommands,
+}
+
+/// The likely cause, from what the health check and the line test found.
+pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
+    if !heard.unasked.is_empty() {
+        return unasked(&heard.unasked);
+    }
+    let values = |pass: &Pass| -> Vec<Received> { pass.iter().map(|(_, byte)| *byte).collect() };
+    let [first, second] = [values(&heard.passes[0]), values(&heard.passes[1])];
+    let clean = |bytes: &[Received]| bytes.len() == SENT && bytes.iter().all(|b| b.is(SYNCO));
+    let damaged = |bytes: &[Received]| bytes.iter().filter(|byte| byte.error.is_some()).count();
+    if first.is_empty() && second.is_empty() {
+        return Cause::Nobody;
+    }
+    let slow: Vec<_> = heard
+        .passes
+        .iter()
+        .filter_map(|p| slower_in(p, stated))
+        .collect();
+    if let &[one, other] = slow.as_slice() {
+        return Cause::Rate {
+            found: faster(one, other),
+            stated,
+        };
+    }
+    if let (true, Unhealthy::Size { found, stated }) = (clean(&first) && clean(&second), ill) {
+        return Cause::Count {
+            found: *found,
+            stated: *stated,
+        };
+    }
+    let most = u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX);
+    let spelt = [&first, &second].map(|pass| locate(pass, most).map(|location| location.drive));
+    if let (&Unhealthy::Broken(drive), _) | (_, [_, Some(drive)]) = (ill, spelt) {
+        return Cause::LinkInFront(drive);
+    }
+    if clean(&first) && clean(&second) {
+        return Cause::NoCommands;
+    }
+    // The same damage each time follows from the bytes, and noise does not.
+    let mostly_damaged = 2 * damaged(&first) >= first.len();
+    if first == second || (mostly_damaged && 2 * damaged(&second) >= second.len()) {
+        Cause::RateOrParity
+    } else {
+        Cause::Noise
+    }
+}
+
+/// The likely cause of bytes that come although nothing was sent.
+pub(crate) fn unasked(bytes: &[Received]) -> Cause {
+    if bytes.iter().all(|byte| byte.is(0)) {
+        Cause::Babbling
+    } else {
+        Cause::Noise
+    }
+}
+
+/// Rigs that differ from this one in one setting of its line, each with the cause that it proves when it opens. None where power
+/// would be switched.
+pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
+    let Some(first) = rig.file.rings().next().map(|ring| &ring.endpoint) else {
+        return Vec::new();
+    };
+    if rig.is_simulated() || !rig.file.power.is_empty() {
+        return Vec::new();
+    }
+    let with = |change: &dyn Fn(&mut Endpoint)| {
+        let mut other = rig.clone();
+        // The hooks of the rig have run.
+        other.file.hooks = Hooks::default();
+        if let Some(rings) = &mut other.file.ring {
+            for ring in std::iter::once(&mut rings.first).chain(&mut rings.second) {
+                change(&mut ring.endpoint);
+            }
+        }
+        other
+    };
+    match first.transport {
+        Transport::Pty | Transport::Tcp => {
+            let right = match first.marks {
+                Marks::None => Marks::InBand,
+                Marks::InBand => Marks::None,
+            };
+            vec![(Cause::Marks { right }, with(&|end| end.marks = right))]
+        }
+        Transport::Serial | Transport::Rfc2217 => [
+            LineFormat::Baud38400,
+            LineFormat::Baud19200,
+            LineFormat::Baud9600,
+        ]
+        .into_iter()
+        .filter(|line| *line != first.line)
+        .map(|line| {
+            let cause = Cause::Rate {
+                found: line.into(),
+                stated: first.line.into(),
+            };
+            (cause, with(&|end| end.line = line))
+        })
+        .collect(),
+        Transport::Sim => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::line_test::listen;
+    use super::super::line_test::tests::ring;
+    use super::*;
+    use crate::scenario::source::Source;
+    use harness_proto::line::LineError;
+    use harness_proto::time::Instant;
+
+    fn source(name: &str, text: String) -> Source {
+        Source::from_bytes(name.to_owned(), text.into_bytes()).expect("a text")
+    }
+
+    fn pass_of(bytes: impl IntoIterator<Item = Received>) -> Pass {
+        let byte_time = Rate::Baud38400.byte_time();
+        (1..)
+            .zip(bytes)
+            .map(|(n, byte)| (Instant::START + byte_time * n, byte))
+            .collect()
+    }
+
+    fn heard(first: Vec<Received>, second: Vec<Received>) -> Heard {
+        Heard {
+            unasked: Vec::new(),
+            passes: [pass_of(first), pass_of(second)],
+        }
+    }
+
+    fn named(ill: &Unhealthy, heard: &Heard) -> Cause {
+        cause(ill, heard, Rate::Baud38400)
+    }
+
+    const FOREIGN: fn() -> Unhealthy = || Unhealthy::Foreign {
+        bytes: String::new(),
+    };
+
+    #[test]
+    fn a_ring_at_another_rate_is_told_its_rate() {
+        let heard = listen(&mut ring("19200"), 0);
+        let (found, stated) = (Rate::Baud19200, Rate::Baud38400);
+        assert_eq!(named(&FOREIGN(), &heard), Cause::Rate { found, stated });
+    }
+
+    #[test]
+    fn a_sound_ring_is_not_blamed_for_its_rate_or_for_noise() {
+        let heard = listen(&mut ring("38400"), 0);
+        assert_eq!(named(&FOREIGN(), &heard), Cause::NoCommands);
+        let ill = Unhealthy::Size {
+            found: 3,
+            stated: 4,
+        };
+        let (found, stated) = (3, 4);
+        assert_eq!(named(&ill, &heard), Cause::Count { found, stated });
+    }
+
+    #[test]
+    fn every_way_not_to_open_has_a_cause() {
+        let nothing = heard(Vec::new(), Vec::new());
+        assert_eq!(named(&Unhealthy::Silent, &nothing), Cause::Nobody);
+
+        let unasked = |bytes: &[u8]| Heard {
+            unasked: bytes.iter().copied().map(Received::good).collect(),
+            ..Heard::default()
+        };
+        assert_eq!(named(&FOREIGN(), &unasked(&[0; 9])), Cause::Babbling);
+        assert_eq!(named(&FOREIGN(), &unasked(&[0, 0x55, 0])), Cause::Noise);
+
+        let damaged = |byte: u8| vec![Received::bad(byte, LineError::Framing); SENT / 2];
+        let other_rate = heard(damaged(0x78), damaged(0x78));
+        assert_eq!(named(&FOREIGN(), &other_rate), Cause::RateOrParity);
+        // Without marks the same bytes come back each time, and they are not SYNCO.
+        let wrong = |byte: u8| vec![Received::good(byte); SENT / 2];
+        let unmarked = heard(wrong(0xE6), wrong(0xE6));
+        assert_eq!(named(&FOREIGN(), &unmarked), Cause::RateOrParity);
+
+        let noise = |seed: u8| -> Vec<Received> {
+            (0..200u8)
+                .map(|n| Received::good(n.wrapping_mul(seed) ^ 0x5A))
+                .collect()
+        };
+        let ill = Unhealthy::Size {
+            found: 124,
+            stated: 3,
+        };
+        assert_eq!(named(&ill, &heard(noise(37), noise(91))), Cause::Noise);
+
+        let address = |k: u8| {
+            let zeros = std::iter::repeat_n(Received::good(0), 20);
+            zeros
+                .chain(std::iter::repeat_n(Received::good(k), 100))
+                .collect::<Vec<_>>()
+        };
+        let spelt = heard(address(1), address(1));
+        assert_eq!(named(&FOREIGN(), &spelt), Cause::LinkInFront(1));
+        assert_eq!(named(&Unhealthy::Broken(2), &spelt), Cause::LinkInFront(2));
+    }
+
+    #[test]
+    fn neighbours_differ_in_one_setting_and_switch_nothing() {
+        let rig = |ring: &str, more: &str| {
+            let text =
+                format!("schema = 1\n[rig]\nid = \"x\"\n[ring.1]\ndrives = 3\n{ring}\n{more}");
+            crate::rig::parse(&source("x.toml", text)).expect("a rig")
+        };
+        let tcp = "transport = \"tcp\"\nport = \"127.0.0.1:4021\"";
+        let found = neighbours(&rig(tcp, "[hooks.before]\ncommand = [\"true\"]\n"));
+        let right = Marks::InBand;
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].0, Cause::Marks { right });
+        assert_eq!(
+            found[0]
+                .1
+                .file
+                .rings()
+                .next()
+                .map(|ring| ring.endpoint.marks),
+            Some(right)
+        );
+        assert_eq!(found[0].1.file.hooks, Hooks::default());
+        let serial = "transport = \"serial\"\nport = \"/dev/ttyUSB0\"\nline = \"19200 8O1\"";
+        let lines: Vec<_> = neighbours(&rig(serial, ""))
+            .iter()
+            .flat_map(|(_, rig)| {
+                rig.file
+                    .rings()
+                    .map(|ring| ring.endpoint.line)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        assert_eq!(lines, [LineFormat::Baud38400, LineFormat::Baud9600]);
+        let power = "[power.main]\non = [\"true\"]\noff = [\"true\"]\n";
+        assert!(neighbours(&rig(serial, power)).is_empty());
+    }
+}
