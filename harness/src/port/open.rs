@@ -81,7 +81,7 @@ pub enum OpenError {
         what: String,
     },
     /// No host, or it refuses.
-    #[error("failed to connect to {address}: {error}")]
+    #[error("failed to connect to {address}: {error}. {}", unconnected(error))]
     Connect {
         /// Where to.
         address: String,
@@ -104,6 +104,21 @@ pub enum OpenError {
         /// Why not.
         error: io::Error,
     },
+}
+
+/// The likely cause of a connection that cannot be made, and what to do next.
+fn unconnected(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::ConnectionRefused => {
+            "Likely cause: no server listens at this port. Next: start the server, or correct the address"
+        }
+        io::ErrorKind::TimedOut
+        | io::ErrorKind::HostUnreachable
+        | io::ErrorKind::NetworkUnreachable => {
+            "Likely cause: the host is switched off, or it is not on this network. Next: check its power and its cable, and the address"
+        }
+        _ => "Next: check the address",
+    }
 }
 
 impl OpenError {

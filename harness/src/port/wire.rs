@@ -3,6 +3,7 @@
 use super::last_words::LastWords;
 use super::rfc2217::Telnet;
 use super::serial::Serial;
+use crate::counted::counted;
 use crate::trouble::Trouble;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{Unmark, mark};
@@ -10,6 +11,7 @@ use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
 use rustix::io::Errno;
 use std::collections::VecDeque;
+use std::io::ErrorKind;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 /// What is read from the operating system at a time: a line brings few bytes between two looks at it.
@@ -67,6 +69,8 @@ pub struct Wire {
     bytes_waiting: usize,
     /// Line errors of which it is not known at which byte they were.
     unplaced: u64,
+    /// Bytes that were read, as coded.
+    read: u64,
     /// A serial port under plain bytes: its settings are put back with it.
     plain_serial: Option<Box<Serial>>,
 }
@@ -88,6 +92,7 @@ impl Wire {
             waiting: VecDeque::new(),
             bytes_waiting: 0,
             unplaced: 0,
+            read: 0,
             plain_serial: None,
         }
     }
@@ -276,8 +281,23 @@ impl Wire {
         Ok(())
     }
 
-    fn lost(&self, error: impl std::fmt::Display) -> Trouble {
-        Trouble::Lost(format!("{}: the port is lost: {error}", self.name))
+    fn lost(&self, error: impl Into<std::io::Error>) -> Trouble {
+        let error = error.into();
+        match error.kind() {
+            ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => self.closed(),
+            _ => Trouble::Lost(format!("{}: the port is lost: {error}", self.name)),
+        }
+    }
+
+    fn closed(&self) -> Trouble {
+        let when = match self.read {
+            0 => "before it sent a byte".to_owned(),
+            read => format!("after it sent {}", counted(read, "byte")),
+        };
+        Trouble::Lost(format!(
+            "{}: the other end has closed the connection {when}",
+            self.name
+        ))
     }
 
     /// Reads what has come.
@@ -289,17 +309,13 @@ impl Wire {
         let mut buffer = [0; CHUNK];
         for _ in 0..MOST_CHUNKS {
             let length = match rustix::io::read(&self.fd, &mut buffer) {
-                Ok(0) => {
-                    return Err(Trouble::Lost(format!(
-                        "{}: the other end has closed the connection",
-                        self.name
-                    )));
-                }
+                Ok(0) => return Err(self.closed()),
                 Ok(length) => length,
                 Err(Errno::AGAIN) => return Ok(()),
                 Err(Errno::INTR) => continue,
                 Err(error) => return Err(self.lost(error)),
             };
+            self.read += length as u64;
             self.decode(&buffer[..length], into)?;
             if length < CHUNK {
                 return Ok(());
