@@ -371,6 +371,7 @@ fn recovery_of_9_8() {
         before: None,
         missed_master: false,
         after: None,
+        zeros_unasked: false,
         drives: Some(size(4)),
     };
     assert_eq!(recover(&mut link, 0), fine);

@@ -245,7 +245,13 @@ fn a_wrong_drive_behind_a_socket_is_named() {
 fn what_is_no_ring_says_so() {
     // No server listens.
     let desk = Desk::new(2, "tcp", "127.0.0.1:1");
-    ended(&desk.run(&["run"]), 3, "failed to connect to 127.0.0.1:1");
+    let output = desk.run(&["run"]);
+    ended(&output, 3, "failed to connect to 127.0.0.1:1");
+    ended(
+        &output,
+        3,
+        "no server listens at this port. Next: start the server",
+    );
     // A port that is no tty, a pty where a serial port should be, nothing at all.
     let desk = Desk::new(2, "serial", "/dev/null");
     ended(&desk.run(&["run"]), 3, "is not a serial port");
@@ -298,6 +304,122 @@ fn a_silent_or_noisy_port_says_so() {
         "noise on the cable, or another master",
     );
     talker.join().expect("an end");
+}
+
+/// A port whose other end does this with each connection.
+fn port_of(other_end: fn(TcpStream)) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            other_end(stream.expect("a bench"));
+        }
+    });
+    address
+}
+
+/// What is no ring is named: a port that hears itself, zeros without end, a server that closes.
+#[test]
+fn what_answers_and_is_no_ring_is_named() {
+    let echo = port_of(|mut stream| {
+        let mut bytes = [0; 256];
+        while let Ok(length @ 1..) = stream.read(&mut bytes) {
+            if stream.write_all(&bytes[..length]).is_err() {
+                return;
+            }
+        }
+    });
+    let zeros = port_of(|mut stream| {
+        while stream.write_all(&[0; 8]).is_ok() {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    });
+    let closed = port_of(drop);
+    let closed_later = port_of(|mut stream| {
+        stream.write_all(&[0x80; 5]).expect("a bench");
+        let _first = stream.read(&mut [0; 1]);
+    });
+    for (port, words) in [
+        (
+            &echo,
+            &[
+                "every byte comes back as it was sent",
+                "Next: use an adapter with separate pairs",
+            ][..],
+        ),
+        (
+            &zeros,
+            &[
+                "bytes came although nothing was sent (00 00",
+                "drive 0 sends zeros by itself",
+                "Next: disconnect drive 0 from the bench",
+            ],
+        ),
+        (
+            &closed,
+            &[
+                "the other end has closed the connection before it sent a byte",
+                "Next: check that the server runs",
+            ],
+        ),
+        (
+            &closed_later,
+            &["after it sent 5 bytes", "Next: check that"],
+        ),
+    ] {
+        let output = Desk::new(3, "tcp", port).run(&["run"]);
+        for words in words {
+            ended(&output, 3, words);
+        }
+        assert!(
+            !said(&output).contains("reports a fault"),
+            "{}",
+            said(&output)
+        );
+    }
+    // `recover` blames no link of drive 0.
+    let output = Desk::new(3, "tcp", &zeros).run(&["recover"]);
+    ended(
+        &output,
+        3,
+        "zeros come without end although nothing is sent",
+    );
+    assert!(!said(&output).contains("spells out"), "{}", said(&output));
+}
+
+/// A ring whose bytes come back whole and two thirds later than they are sent is late, and no ring at half the rate.
+#[test]
+fn a_late_ring_is_told_no_rate() {
+    let port = port_of(|mut stream| {
+        stream.set_nodelay(true).expect("a socket");
+        let mut due = std::time::Instant::now();
+        let mut bytes = [0; 1];
+        // An echo with its address byte counted up is a ring of three as long as no drive is asked.
+        let mut before = 0;
+        while let Ok(1) = stream.read(&mut bytes) {
+            due = due.max(std::time::Instant::now()) + Duration::from_micros(480);
+            std::thread::sleep(due.saturating_duration_since(std::time::Instant::now()));
+            let is_address = std::mem::replace(&mut before, bytes[0]) == 0x82;
+            if stream
+                .write_all(&[bytes[0] + 3 * u8::from(is_address)])
+                .is_err()
+            {
+                return;
+            }
+        }
+    });
+    let desk = Desk::new(3, "tcp", &port);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig file");
+    std::fs::write(&path, text.replace("marks = \"in-band\"", "")).expect("room");
+    let output = desk.run(&["run"]);
+    ended(
+        &output,
+        3,
+        "bytes come back whole and later than they are sent",
+    );
+    ended(&output, 3, "Next: stop other programs");
+    assert!(!said(&output).contains("set `line"), "{}", said(&output));
 }
 
 /// A ring that does not open as its file says: the cause and the remedy are named (ND21 8.3, 9.9).

@@ -62,6 +62,7 @@ fn show(
                         "missed_master": recovery.before.filter(|_| recovery.missed_master),
                         "drives": recovery.drives.map(|size| size.drives()),
                         "still": recovery.after,
+                        "zeros_unasked": recovery.zeros_unasked,
                     })
                 })
                 .collect();
@@ -100,6 +101,11 @@ pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
             )
         }
         (None, Some(drive)) => format!("behind the check sequence still: {}", fault(drive)),
+        (None, None) if recovery.zeros_unasked => {
+            "zeros come without end although nothing is sent: drive 0 hears nothing on the link in \
+             front of it and monitors time-outs, or it is defective (ND21 9.9)"
+                .to_owned()
+        }
         (None, None) => "nothing comes back behind the check sequence: the ring is broken, or the \
              drive in front of the master has no power (ND21 9.9)"
             .to_owned(),

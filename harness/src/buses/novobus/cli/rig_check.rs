@@ -126,8 +126,9 @@ fn text(rig: &Rig, figures: &Figures) -> String {
         let _infallible = writeln!(text, "  {}", line_of(found));
         let _infallible = writeln!(
             text,
-            "  rate test: SYNCO without a gap comes back at {} bit/s",
-            found.rate.bits_per_second()
+            "  rate test: SYNCO without a gap comes back at {} bit/s{}",
+            found.rate.bits_per_second(),
+            late_of(found)
         );
     }
     for (ring, drive) in &figures.reported {
@@ -156,6 +157,15 @@ fn text(rig: &Rig, figures: &Figures) -> String {
     text
 }
 
+fn late_of(ring: &RingFigures) -> String {
+    ring.late.map_or(String::new(), |late| {
+        format!(
+            ", held up on the way: the last one came {} ms late, which `time_tolerance` permits",
+            ms(late)
+        )
+    })
+}
+
 fn line_of(ring: &RingFigures) -> String {
     let nominal = ms(ring.nominal);
     let errors = ring.line_errors;
@@ -181,6 +191,7 @@ fn object(rig: &Rig, figures: &Figures) -> serde_json::Value {
             json!({
                 "drives": ring.size.drives(),
                 "rate": ring.rate.bits_per_second(),
+                "late_ms": ring.late.map(Span::as_millis_f64),
                 "nominal_ms": ring.nominal.as_millis_f64(),
                 "least_ms": spread.map(|spread| spread[0]),
                 "middle_ms": spread.map(|spread| spread[1]),

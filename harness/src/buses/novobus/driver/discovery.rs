@@ -18,7 +18,7 @@ use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
 /// A telegram that addresses no drive: each of N drives adds 1 to the 00, and no sum is 0 (9.3). All drives pass the net byte on.
-const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
+pub(crate) const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 
 /// Counts the drives of a ring. If nothing sensible comes back, counts once more after the check sequence (9.8). Changes
 /// nothing in the drives.
@@ -93,6 +93,28 @@ fn listen<T>(
     }
 }
 
+/// For how long [`unasked`] listens for a byte.
+const SILENCE: Span = Span::from_millis(100);
+
+/// For how long bytes that were sent before may still come, also from a ring at a quarter of the rate.
+const REST: Span = Span::from_millis(1_000);
+
+/// Bytes that come for [`REST`] although nothing is sent; the last ones of them. Bytes that stop were sent before.
+pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
+    let rest = line.now() + REST;
+    loop {
+        let end = line.now() + SILENCE;
+        let mut heard = Vec::new();
+        while line.now() < end && line.trouble().is_none() {
+            line.wait(end);
+            heard.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
+        }
+        if heard.is_empty() || line.now() >= rest || line.trouble().is_some() {
+            return heard;
+        }
+    }
+}
+
 /// What a ring reported during its recovery (9.7, 9.8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
@@ -103,6 +125,9 @@ pub struct Recovery {
     pub missed_master: bool,
     /// The drive that does so behind the check sequence: the ring is not back.
     pub after: Option<u8>,
+    /// Zeros come without end although nothing is sent, also behind the check sequence. A drive in error mode answers each byte with one
+    /// (9.7), so these are no report of drive 0.
+    pub zeros_unasked: bool,
     /// How many drives answer; `None` where the ring is not back.
     pub drives: Option<RingSize>,
 }
@@ -121,6 +146,9 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     let before = reported(link, ring);
     let drives = count_behind(link, ring, &repair());
     let after = drives.map_or_else(|| reported(link, ring), |_| None);
+    let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
+    let own = |drive: &u8| !(zeros_unasked && *drive == 0);
+    let (before, after) = (before.filter(own), after.filter(own));
     let missed_master = before
         .zip(drives)
         .is_some_and(|(drive, size)| is_first_to_monitor(link, ring, drive, size));
@@ -128,6 +156,7 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
         before,
         missed_master,
         after,
+        zeros_unasked,
         drives,
     }
 }

@@ -337,6 +337,9 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
             (None, None, Some(drive)) => {
                 format!("the ring is broken in front of drive {drive} (ND21 9.7, 9.9)")
             }
+            (None, None, None) if recovery.zeros_unasked => {
+                "zeros come without end although nothing is sent (ND21 9.9)".to_owned()
+            }
             (None, None, None) => "the ring does not answer".to_owned(),
         };
     }

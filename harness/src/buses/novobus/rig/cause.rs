@@ -3,7 +3,7 @@
 //! [`cause`] is a pure function of what was heard.
 
 use super::health::Unhealthy;
-use super::line_test::{Heard, Pass, SENT, faster, slower_in};
+use super::line_test::{Heard, Pace, Pass, SENT, pace_of};
 use crate::buses::novobus::locate::locate;
 use crate::rig::Rig;
 use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
@@ -19,11 +19,24 @@ pub enum Cause {
         "the ring is open, a drive has no power, or this is another port. Next: check the power of every drive and the cable from drive 0 back to the bench; put the final connector on X4 of a drive in the middle to find the sound half (ND21 8.2)"
     )]
     Nobody,
-    /// Zeros come without being asked for.
+    /// Zeros come without end although nothing is sent.
     #[error(
-        "drives with time-out monitoring miss their bytes and send zeros (ND21 9.9), or the transmitter of one drive is defective. Next: `drivebench recover`; if the zeros go on, switch the drives off and on"
+        "drive 0 sends zeros by itself, because it monitors time-outs and hears nothing on the link in front of it (ND21 9.9) or because its transmitter is defective; or the cable leads to another device. Next: disconnect drive 0 from the bench: if zeros still come, check the port and its adapter; if not, check the link in front of drive 0, then switch the drives off and on"
     )]
     Babbling,
+    /// Zeros with line errors come without end although nothing is sent.
+    #[error(
+        "the line to the bench's receiver is held at 0: its two wires are swapped, open or short, or a device with a much lower rate sends. Next: check the wires between drive 0 and the bench (ND21 8.2), then the rate"
+    )]
+    HeldLine,
+    /// The port receives what it sends.
+    #[error(
+        "the adapter echoes what it sends (RS-485 with two wires), or a plug joins its transmitter to its receiver. Next: use an adapter with separate pairs for sending and receiving, or switch its echo off, and connect drive 0 to its receiver (ND21 8.2)"
+    )]
+    OwnBytes,
+    /// The other end of the port is gone.
+    #[error("{}", gone(*.0))]
+    Gone(Transport),
     /// Bytes that differ each time.
     #[error(
         "noise on the cable, or another master on this line. Next: disconnect every other controller, then check shield, ground and connectors"
@@ -40,6 +53,11 @@ pub enum Cause {
         /// The rate in the rig's file.
         stated: Rate,
     },
+    /// The bytes are whole and late, at no rate.
+    #[error(
+        "the computer, the network or the program at the other end is too slow, the adapter collects bytes, or a device server has another rate. Next: stop other programs, set the adapter's latency timer to 1 ms, and compare the rate of a device server with `line`; `time_tolerance` permits single late bytes only"
+    )]
+    HeldUp,
     /// The bytes are damaged in the same way each time.
     #[error(
         "the drives run at another rate or with another parity. Next: try `line = \"19200 8O1\"` and `line = \"9600 8O1\"` in the rig's file (ND21 8.3)"
@@ -82,6 +100,9 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     if !heard.unasked.is_empty() {
         return unasked(&heard.unasked);
     }
+    if let Unhealthy::HearsItself = ill {
+        return Cause::OwnBytes;
+    }
     let values = |pass: &Pass| -> Vec<Received> { pass.iter().map(|(_, byte)| *byte).collect() };
     let [first, second] = [values(&heard.passes[0]), values(&heard.passes[1])];
     let clean = |bytes: &[Received]| bytes.len() == SENT && bytes.iter().all(|b| b.is(SYNCO));
@@ -89,16 +110,10 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     if first.is_empty() && second.is_empty() {
         return Cause::Nobody;
     }
-    let slow: Vec<_> = heard
-        .passes
-        .iter()
-        .filter_map(|p| slower_in(p, stated))
-        .collect();
-    if let &[one, other] = slow.as_slice() {
-        return Cause::Rate {
-            found: faster(one, other),
-            stated,
-        };
+    let [one, other] = [0, 1].map(|pass: usize| pace_of(&heard.passes[pass], stated));
+    let pace = one.or_faster(other, stated);
+    if let Pace::Slower(found) = pace {
+        return Cause::Rate { found, stated };
     }
     if let (true, Unhealthy::Size { found, stated }) = (clean(&first) && clean(&second), ill) {
         return Cause::Count {
@@ -112,6 +127,9 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
         return Cause::LinkInFront(drive);
     }
     if clean(&first) && clean(&second) {
+        if let Pace::Late(_) = pace {
+            return Cause::HeldUp;
+        }
         return Cause::NoCommands;
     }
     // The same damage each time follows from the bytes, and noise does not.
@@ -123,10 +141,30 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     }
 }
 
+/// The cause of a lost port.
+const fn gone(transport: Transport) -> &'static str {
+    match transport {
+        Transport::Tcp => {
+            "the server ended, serves another client, or is no server of raw bytes. Next: check that the server runs and that no other program is connected; compare `port` and `transport` in the rig's file"
+        }
+        Transport::Rfc2217 => {
+            "the server ended, or serves another client. Next: check that the server runs and that no other program is connected"
+        }
+        Transport::Serial => {
+            "the adapter was unplugged or has no power. Next: check its cable; `drivebench rig scan` lists the ports"
+        }
+        Transport::Pty | Transport::Sim => {
+            "the program at the other end of the pseudo terminal ended. Next: start it again"
+        }
+    }
+}
+
 /// The likely cause of bytes that come although nothing was sent.
 pub(crate) fn unasked(bytes: &[Received]) -> Cause {
     if bytes.iter().all(|byte| byte.is(0)) {
         Cause::Babbling
+    } else if bytes.iter().all(|byte| byte.byte == 0) {
+        Cause::HeldLine
     } else {
         Cause::Noise
     }
@@ -186,7 +224,7 @@ mod tests {
     use super::*;
     use crate::scenario::source::Source;
     use harness_proto::line::LineError;
-    use harness_proto::time::Instant;
+    use harness_proto::time::{Instant, Span};
 
     fn source(name: &str, text: String) -> Source {
         Source::from_bytes(name.to_owned(), text.into_bytes()).expect("a text")
@@ -222,6 +260,18 @@ mod tests {
         assert_eq!(named(&FOREIGN(), &heard), Cause::Rate { found, stated });
     }
 
+    /// Bytes that come whole and in bursts are no sign of another rate.
+    #[test]
+    fn a_ring_that_is_held_up_is_told_no_rate() {
+        let mut heard = listen(&mut ring("38400"), 0);
+        for pass in &mut heard.passes {
+            for (n, (at, _)) in (0..).zip(pass) {
+                *at += Span::from_millis(8) * (n / 20);
+            }
+        }
+        assert_eq!(named(&FOREIGN(), &heard), Cause::HeldUp);
+    }
+
     #[test]
     fn a_sound_ring_is_not_blamed_for_its_rate_or_for_noise() {
         let heard = listen(&mut ring("38400"), 0);
@@ -245,6 +295,11 @@ mod tests {
         };
         assert_eq!(named(&FOREIGN(), &unasked(&[0; 9])), Cause::Babbling);
         assert_eq!(named(&FOREIGN(), &unasked(&[0, 0x55, 0])), Cause::Noise);
+        let held = Heard {
+            unasked: vec![Received::bad(0, LineError::Framing); 9],
+            ..Heard::default()
+        };
+        assert_eq!(named(&FOREIGN(), &held), Cause::HeldLine);
 
         let damaged = |byte: u8| vec![Received::bad(byte, LineError::Framing); SENT / 2];
         let other_rate = heard(damaged(0x78), damaged(0x78));

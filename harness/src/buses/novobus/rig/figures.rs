@@ -1,7 +1,7 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
-use super::line_test;
-use crate::buses::novobus::driver::{self, Axis, Identity, OpenRings, State};
+use super::line_test::{self, Pace};
+use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, State};
 use crate::link::Octets;
 use crate::rig::Rig;
 use crate::rig::shared::Shared;
@@ -9,13 +9,10 @@ use crate::rig::stated_rate;
 use crate::rig::{End, Session};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
 /// How many telegrams go round.
 const ROUNDS: usize = 64;
-/// A telegram to no drive; its address byte comes back with the number of drives (ND21 9.3).
-const PROBE: [u8; 3] = [0x82, 0x00, SYNCO];
 /// How much longer than the ring needs a byte may take before it counts as lost.
 const PATIENCE: Span = Span::from_millis(300);
 /// Number of drives whose EEPROM is read at a time.
@@ -28,6 +25,8 @@ pub struct RingFigures {
     pub size: RingSize,
     /// The rate at which SYNCO without a gap comes back (ND21 8.3, 9.2).
     pub rate: Rate,
+    /// How late the last one of 256 came, where they came late and at no rate.
+    pub late: Option<Span>,
     /// How long the ring itself needs for a byte, by the rule that each drive takes one byte time (ND21 8.2).
     pub nominal: Span,
     /// How long it took: from the shortest to the longest, sorted; what does not come back is missing.
@@ -107,16 +106,20 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let simulated = session.rig().is_simulated();
     let stated = stated_rate(session.rig());
     let link = session.link();
-    let rate = line_test::slower(link, ring, stated).unwrap_or(stated);
+    let (rate, late) = match line_test::pace(link, ring, stated) {
+        Pace::AsSent => (stated, None),
+        Pace::Slower(rate) => (rate, None),
+        Pace::Late(late) => (stated, Some(late)),
+    };
     let nominal = link.byte_time() * u64::from(size.drives());
-    let telegrams = PROBE.repeat(ROUNDS);
+    let telegrams = COUNT.repeat(ROUNDS);
     let before = link.send_octets(ring, &[]);
     let heard = line_test::answers(link, ring, &telegrams, nominal + PATIENCE);
-    let back = [PROBE[0], size.drives(), PROBE[2]];
+    let back = [COUNT[0], size.drives(), COUNT[2]];
     let mut rounds = Vec::new();
     // When the first byte of a telegram has left.
     let mut sent = before + link.byte_time();
-    for telegram in heard.chunks(PROBE.len()) {
+    for telegram in heard.chunks(COUNT.len()) {
         let sound = telegram.len() == back.len()
             && telegram
                 .iter()
@@ -125,7 +128,7 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
         if sound {
             rounds.push(telegram[0].0.since(sent));
         }
-        sent += link.byte_time() * PROBE.len() as u64;
+        sent += link.byte_time() * COUNT.len() as u64;
     }
     let lost = ROUNDS - rounds.len();
     let damaged = heard.iter().filter(|(_, byte)| byte.error.is_some());
@@ -137,6 +140,7 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     RingFigures {
         size,
         rate,
+        late,
         nominal,
         rounds,
         lost,

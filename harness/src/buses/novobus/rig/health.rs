@@ -1,11 +1,13 @@
 //! Checks whether a ring is healthy and has the size given in the rig's file.
 
-use crate::buses::novobus::driver::{Recovery, count_behind, recover};
+use super::line_test;
+use crate::buses::novobus::driver::{Recovery, count_behind, recover, unasked};
 use crate::link::{Link, Octets, Trouble, wait_keeping};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::Span;
 use std::fmt::Write as _;
 
 /// Maximum number of unexpected bytes shown.
@@ -30,6 +32,14 @@ pub enum Unhealthy {
         /// The rate of the rig's file, in bit/s.
         stated: u32,
     },
+    /// Bytes come back whole and late.
+    #[error(
+        "bytes come back whole and later than they are sent, at no rate of the line (ND21 8.3): the last one of 256 by {late}"
+    )]
+    Late {
+        /// How late the last byte of a row was.
+        late: Span,
+    },
     /// Nothing comes back.
     #[error("nothing comes back for the bytes that were sent")]
     Silent,
@@ -39,6 +49,11 @@ pub enum Unhealthy {
         /// The first bytes.
         bytes: String,
     },
+    /// What is sent comes back, and no drive has counted an address up.
+    #[error(
+        "every byte comes back as it was sent, and no drive counts the address of a telegram up (ND21 9.3)"
+    )]
+    HearsItself,
     /// A drive still spells out its address after the check sequence.
     #[error(
         "the ring does not leave the error mode: drive {0} reports a fault in front of it (ND21 9.7)"
@@ -118,17 +133,32 @@ fn examine_once(link: &mut dyn Link, ring: usize, stated: RingSize) -> Result<Re
             found: found.drives(),
             stated: stated.drives(),
         }),
-        _ => {
-            let bytes = link.probe(ring, &vec![SYNCO; 4 * usize::from(stated.drives()) + 8]);
-            Err(match (recovery.after, bytes.is_empty()) {
-                (Some(drive), _) => Unhealthy::Broken(drive),
-                (None, true) => Unhealthy::Silent,
-                (None, false) => Unhealthy::Foreign {
-                    bytes: shown(&bytes),
-                },
-            })
-        }
+        _ => Err(ill(link, ring, stated, &recovery)),
     }
+}
+
+/// What is wrong with a ring that cannot be counted.
+fn ill(link: &mut dyn Link, ring: usize, stated: RingSize, recovery: &Recovery) -> Unhealthy {
+    let found = match recovery.after {
+        Some(drive) => Unhealthy::Broken(drive),
+        None => {
+            let talk = unasked(link, ring);
+            let bytes = link.probe(ring, &vec![SYNCO; 4 * usize::from(stated.drives()) + 8]);
+            if !talk.is_empty() {
+                Unhealthy::talking(&talk)
+            } else if bytes.is_empty() {
+                Unhealthy::Silent
+            } else if line_test::hears_itself(link, ring) {
+                Unhealthy::HearsItself
+            } else {
+                Unhealthy::Foreign {
+                    bytes: shown(&bytes),
+                }
+            }
+        }
+    };
+    let trouble = link.trouble().cloned();
+    trouble.map_or(found, Unhealthy::Trouble)
 }
 
 /// Whether unasked bytes are those of drives that have missed their master (ND21 9.9): zeros, and then addresses that climb up to that of
@@ -170,7 +200,7 @@ fn shown(bytes: &[Received]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line_test;
+    use super::super::line_test::Pace;
     use super::*;
     use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options};
@@ -182,7 +212,6 @@ mod tests {
     use crate::scenario::source::Source;
     use harness_proto::line::Rate;
     use harness_proto::novobus::sync::SYNCO;
-    use harness_proto::time::Span;
 
     /// A ring some of whose drives monitor time-outs from power-up (ND21 14.3.6). Its self-tests are over.
     fn monitoring(drives: u8, monitor: &str) -> SimulatedLink {
@@ -208,7 +237,7 @@ mod tests {
             assert!(matches!(link.error_of(0, drives - 1), Some(Some(_))));
             let health = examine(&mut link, &[size], 1).expect("a healthy ring");
             assert_eq!(health.reported, []);
-            assert_eq!(line_test::slower(&mut link, 0, Rate::Baud38400), None);
+            assert_eq!(line_test::pace(&mut link, 0, Rate::Baud38400), Pace::AsSent);
             assert!(!line_test::lacks_marks(&mut link, 0));
             let recovery = recover(&mut link, 0);
             assert_eq!((recovery.before, recovery.drives), (None, Some(size)));

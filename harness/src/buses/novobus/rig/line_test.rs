@@ -1,5 +1,6 @@
 //! The line test: SYNCO without a gap on a ring, and what comes back (ND21 9.2). It changes nothing in a drive.
 
+use crate::buses::novobus::driver::{COUNT, unasked};
 use crate::link::{self, Octets, wait_keeping};
 use crate::rig::file::LineFormat;
 use harness_proto::line::{Rate, Received};
@@ -9,12 +10,6 @@ use harness_proto::time::{Instant, Span};
 /// SYNCO in one pass: long enough that an adapter that holds bytes for 16 ms does not look like another rate.
 pub(super) const SENT: usize = 256;
 
-/// How long the test listens before it sends.
-const LISTEN: Span = Span::from_millis(100);
-
-/// For how long bytes that were sent before may still come, also from a ring at a quarter of the rate.
-const REST: Span = Span::from_millis(1_000);
-
 /// Silence after which a pass has ended: a round of 250 drives at 38400 bit/s takes 72 ms (ND21 8.2).
 const PASS_ENDS: Span = Span::from_millis(200);
 
@@ -23,6 +18,12 @@ const FIRST_BYTE: Span = Span::from_millis(500);
 
 /// Passes whose spacing is measured before a ring counts as slower than its file says; the fastest one counts.
 const RATE_PASSES: usize = 3;
+
+/// Gaps between the bytes of a pass.
+const GAPS: u64 = SENT as u64 - 1;
+
+/// The bytes of a pass at a lower rate are off their places by at most this fraction of the pass.
+const UNEVEN: u64 = 16;
 
 /// The longest time for which an adapter holds bytes. A longer gap between two bytes of a pass is the computer's: at 9600 bit/s a byte
 /// takes 1.1 ms.
@@ -52,25 +53,9 @@ impl From<LineFormat> for Rate {
 
 /// Listens, and sends SYNCO twice.
 pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
-    let unasked = babble(line, ring);
+    let unasked = unasked(line, ring);
     let passes = [pass(line, ring), pass(line, ring)];
     Heard { unasked, passes }
-}
-
-/// Bytes that come for [`REST`] although nothing is sent. Bytes that stop were sent before.
-fn babble(line: &mut dyn link::Line, ring: usize) -> Vec<Received> {
-    let rest = line.now() + REST;
-    loop {
-        let end = line.now() + LISTEN;
-        let mut heard = Vec::new();
-        while line.now() < end && line.trouble().is_none() {
-            line.wait(end);
-            heard.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
-        }
-        if heard.is_empty() || line.now() >= rest || line.trouble().is_some() {
-            return heard;
-        }
-    }
 }
 
 /// The first bytes that come back for SYNCO without a gap.
@@ -110,6 +95,13 @@ pub(crate) fn answers(
     heard
 }
 
+/// Whether a telegram to no drive comes back with the address that was sent: no drive has counted it up (ND21 9.3), so the port hears
+/// what it sends itself.
+pub(crate) fn hears_itself(line: &mut dyn link::Line, ring: usize) -> bool {
+    let heard = answers(line, ring, &COUNT, FIRST_BYTE);
+    heard.len() == COUNT.len() && heard.iter().zip(COUNT).all(|((_, byte), own)| byte.is(own))
+}
+
 /// A telegram to no drive with a net byte FF (ND21 9.3), which in-band marks double.
 const WITH_FF: [u8; 5] = [0x82, 0x00, 0xFF, SYNCO, SYNCO];
 
@@ -121,44 +113,83 @@ pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
         if sync.is(WITH_FF[0]) && address.error.is_none() && damaged.byte == 0 && damaged.error.is_some())
 }
 
-/// The rate of a ring whose bytes come back slower than they were sent; `None` if they do not. The fastest of three passes counts, so
-/// that a computer that is late often does not look like a slow ring.
-pub(crate) fn slower(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Option<Rate> {
-    (0..RATE_PASSES)
-        .map(|_| slower_in(&pass(line, ring), stated))
-        .try_fold(None, |least: Option<Rate>, found| {
-            let found = found?;
-            Some(Some(least.map_or(found, |least| faster(least, found))))
-        })
-        .flatten()
+/// How fast the bytes of a pass came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// As fast as they were sent; or not all of them came back, which says nothing of the rate.
+    AsSent,
+    /// Evenly, at a lower rate.
+    Slower(Rate),
+    /// Whole, and evenly at no rate: something on the way holds bytes up. The last byte was late by this much.
+    Late(Span),
 }
 
-pub(super) fn faster(one: Rate, other: Rate) -> Rate {
-    if one.bits_per_second() > other.bits_per_second() {
-        one
-    } else {
-        other
+/// The pace of a ring. The fastest of three passes counts, so that a computer that is late often does not look like a slow ring.
+pub(crate) fn pace(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Pace {
+    let mut fastest = Pace::AsSent;
+    for number in 0..RATE_PASSES {
+        let found = pace_of(&pass(line, ring), stated);
+        fastest = match number {
+            0 => found,
+            _ => fastest.or_faster(found, stated),
+        };
+        if fastest == Pace::AsSent {
+            break;
+        }
+    }
+    fastest
+}
+
+impl Pace {
+    /// The faster one of two passes. A pass at a rate counts as fast as one that is a little faster.
+    pub(super) fn or_faster(self, other: Self, stated: Rate) -> Self {
+        let late = |pace: Self| match pace {
+            Self::AsSent => 0,
+            Self::Slower(rate) => {
+                let late = rate.byte_time().units() - stated.byte_time().units();
+                late * GAPS - rate.byte_time().units() * GAPS / UNEVEN
+            }
+            Self::Late(late) => late.units(),
+        };
+        if late(other) < late(self) {
+            other
+        } else {
+            self
+        }
     }
 }
 
-/// The rate below the stated one whose byte time is nearest to the spacing of a whole pass.
-pub(super) fn slower_in(pass: &Pass, stated: Rate) -> Option<Rate> {
+/// The pace of one pass. At a lower rate each byte is near its place in a row of such bytes. Lateness has another slope, or steps.
+pub(super) fn pace_of(pass: &Pass, stated: Rate) -> Pace {
     if pass.len() < SENT {
-        return None;
+        return Pace::AsSent;
     }
-    let gaps = pass.windows(2).map(|own| own[1].0.since(own[0].0));
-    let slow = gaps.map(|gap| match gap > HELD {
-        true => stated.byte_time().units(),
-        false => gap.units(),
-    });
-    let spacing = slow.sum::<u64>() / (pass.len() as u64 - 1);
-    let apart = |rate: &Rate| rate.byte_time().units().abs_diff(spacing);
+    let own = stated.byte_time().units();
+    let gaps = pass.windows(2).map(|pair| pair[1].0.since(pair[0].0));
+    let gaps: Vec<u64> = gaps
+        .map(|gap| if gap > HELD { own } else { gap.units() })
+        .collect();
+    let took: u64 = gaps.iter().sum();
     // Half as long again: nearer to half the rate than to the stated one.
-    if spacing < stated.byte_time().units() * 3 / 2 {
-        return None;
+    if took < own * GAPS * 3 / 2 {
+        return Pace::AsSent;
     }
+    let even = |rate: &Rate| {
+        let byte = rate.byte_time().units();
+        let (mut came, mut early, mut late) = (0, 0, 0);
+        for (n, gap) in (1..).zip(&gaps) {
+            came += gap;
+            early = early.max((byte * n).saturating_sub(came));
+            late = late.max(u64::saturating_sub(came, byte * n));
+        }
+        early + late <= byte * GAPS / UNEVEN
+    };
     let slower = |rate: &Rate| rate.bits_per_second() < stated.bits_per_second();
-    Rate::ALL.into_iter().filter(slower).min_by_key(apart)
+    let rate = Rate::ALL.into_iter().filter(slower).find(|rate| even(rate));
+    rate.map_or_else(
+        || Pace::Late(Span::from_units(took - own * GAPS)),
+        Pace::Slower,
+    )
 }
 
 #[cfg(test)]
@@ -182,32 +213,75 @@ pub(super) mod tests {
     #[test]
     fn a_slow_ring_is_found_by_the_spacing_of_its_bytes() {
         for (line, found) in [
-            ("38400", None),
-            ("19200", Some(Rate::Baud19200)),
-            ("9600", Some(Rate::Baud9600)),
+            ("38400", Pace::AsSent),
+            ("19200", Pace::Slower(Rate::Baud19200)),
+            ("9600", Pace::Slower(Rate::Baud9600)),
         ] {
             let mut link = ring(line);
-            assert_eq!(slower(&mut link, 0, Rate::Baud38400), found, "{line}");
+            assert_eq!(pace(&mut link, 0, Rate::Baud38400), found, "{line}");
         }
         let mut link = ring("19200");
-        assert_eq!(slower(&mut link, 0, Rate::Baud19200), None);
+        assert_eq!(pace(&mut link, 0, Rate::Baud19200), Pace::AsSent);
+    }
+
+    /// A pass whose n-th gap is so many microseconds long.
+    fn pass_of(gap: impl Fn(u64) -> u64) -> Pass {
+        let mut at = Instant::START;
+        let bytes = (0..SENT as u64).map(|n| {
+            at += Span::from_nanos(gap(n) * 1_000);
+            (at, Received::good(SYNCO))
+        });
+        bytes.collect()
+    }
+
+    /// A rate is named where each byte takes longer, and not where bytes are only late: by a third, by two thirds, or in bursts that come to
+    /// half the rate.
+    #[test]
+    fn late_bytes_are_no_other_rate() {
+        let stated = Rate::Baud38400;
+        let found = |gap: &dyn Fn(u64) -> u64| pace_of(&pass_of(gap), stated);
+        let half = Pace::Slower(Rate::Baud19200);
+        assert_eq!(found(&|_| 286), Pace::AsSent);
+        assert_eq!(found(&|_| 573), half);
+        assert_eq!(found(&|n| if n % 2 == 0 { 540 } else { 606 }), half);
+        // A server that collects bytes for some milliseconds.
+        let collected = |n: u64| if n % 8 == 0 { 8 * 573 } else { 0 };
+        assert_eq!(found(&collected), half);
+        assert_eq!(found(&|_| 1_146), Pace::Slower(Rate::Baud9600));
+        assert_eq!(found(&|_| 286 * 13 / 10), Pace::AsSent);
+        assert!(
+            matches!(found(&|_| 286 * 17 / 10), Pace::Late(late) if late > Span::from_millis(50))
+        );
+        let bursts = |n: u64| {
+            if n % 40 == 0 {
+                40 * 573 - 39 * 286
+            } else {
+                286
+            }
+        };
+        assert!(matches!(found(&bursts), Pace::Late(_)));
+        let stalls = |n: u64| if n % 32 == 0 { 18_000 } else { 286 };
+        assert!(matches!(found(&stalls), Pace::Late(_)));
     }
 
     #[test]
     fn one_stalled_pass_is_not_a_slow_ring() {
-        let slow = |rate: Rate| -> Pass {
-            let pass = (1..=SENT as u64)
-                .map(|n| (Instant::START + rate.byte_time() * n, Received::good(SYNCO)));
-            pass.collect()
-        };
         let stated = Rate::Baud38400;
-        assert_eq!(slower_in(&slow(stated), stated), None);
-        assert_eq!(
-            slower_in(&slow(Rate::Baud19200), stated),
-            Some(Rate::Baud19200)
-        );
+        let half = Pace::Slower(Rate::Baud19200);
+        let late = |ms| Pace::Late(Span::from_millis(ms));
+        for (one, other, faster) in [
+            (half, Pace::AsSent, Pace::AsSent),
+            (Pace::Slower(Rate::Baud9600), half, half),
+            // A pass at half the rate with a stall, and one that was faster than half the rate.
+            (late(90), half, half),
+            (late(75), half, half),
+            (late(50), half, late(50)),
+        ] {
+            assert_eq!(one.or_faster(other, stated), faster);
+            assert_eq!(other.or_faster(one, stated), faster);
+        }
         // A pass that is not whole says nothing of the rate.
-        let part = slow(Rate::Baud19200)[..SENT - 1].to_vec();
-        assert_eq!(slower_in(&part, stated), None);
+        let part = pass_of(|_| 573)[..SENT - 1].to_vec();
+        assert_eq!(pace_of(&part, stated), Pace::AsSent);
     }
 }

@@ -3,7 +3,7 @@
 use super::cause::{self, Cause};
 use super::health::{self, Health, Unhealthy, examine};
 use super::interlock::Interlocks;
-use super::line_test;
+use super::line_test::{self, Pace};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Watch, blind_stop, safe_state};
@@ -314,11 +314,17 @@ impl Session {
     fn with_cause(&mut self, error: SessionError) -> SessionError {
         match error {
             SessionError::Ill { rig, ring, ill, .. } => {
-                let cause = self.link.trouble().is_none().then(|| {
-                    self.settle();
-                    let heard = line_test::listen(&mut self.link, ring - 1);
-                    cause::cause(&ill, &heard, self.rate())
-                });
+                let transport = self.rig.file.rings().nth(ring - 1);
+                let transport = transport.map(|ring| ring.endpoint.transport);
+                let cause = match self.link.trouble() {
+                    Some(Trouble::Lost(_)) => transport.map(Cause::Gone),
+                    Some(_) => None,
+                    None => {
+                        self.settle();
+                        let heard = line_test::listen(&mut self.link, ring - 1);
+                        Some(cause::cause(&ill, &heard, self.rate()))
+                    }
+                };
                 SessionError::Ill {
                     rig,
                     ring,
@@ -330,7 +336,7 @@ impl Session {
         }
     }
 
-    /// Refuses a ring whose bytes come back slower than its file says.
+    /// Refuses a ring whose bytes come back slower than they are sent: what waits for its answers would wait longer each time.
     fn runs_at_its_rate(&mut self) -> Result<(), SessionError> {
         if self.rig.is_simulated() {
             return Ok(());
@@ -338,17 +344,24 @@ impl Session {
         let stated = self.rate();
         for ring in 0..self.rings.len() {
             self.link.begin();
-            let found = line_test::slower(&mut self.link, ring, stated);
+            let pace = line_test::pace(&mut self.link, ring, stated);
             self.link.begin();
-            let Some(found) = found else { continue };
+            let (ill, cause) = match pace {
+                Pace::Slower(found) => {
+                    let ill = Unhealthy::Slow {
+                        found: found.bits_per_second(),
+                        stated: stated.bits_per_second(),
+                    };
+                    (ill, Cause::Rate { found, stated })
+                }
+                Pace::Late(late) => (Unhealthy::Late { late }, Cause::HeldUp),
+                Pace::AsSent => continue,
+            };
             return Err(SessionError::Ill {
                 rig: self.rig.id().to_owned(),
                 ring: ring + 1,
-                ill: Unhealthy::Slow {
-                    found: found.bits_per_second(),
-                    stated: stated.bits_per_second(),
-                },
-                cause: Some(Cause::Rate { found, stated }),
+                ill,
+                cause: Some(cause),
             });
         }
         Ok(())
