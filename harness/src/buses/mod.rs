@@ -83,6 +83,7 @@ use harness_sim::record::{Carried, LineByte, Trace};
 use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -484,6 +485,16 @@ pub enum Stimulus {
     Unitek(harness_sim::unitek::Stimulus),
     /// To a NORDAC inverter, or on its line.
     Nordac(nordac::simulate::Happening),
+}
+
+impl fmt::Display for Stimulus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Novobus(stimulus) => f.write_str(&novobus::language::write::stimulus(stimulus)),
+            Self::Unitek(stimulus) => stimulus.fmt(f),
+            Self::Nordac(stimulus) => stimulus.fmt(f),
+        }
+    }
 }
 
 impl Stimulus {

@@ -32,6 +32,7 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
+use std::fmt;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -98,6 +99,18 @@ pub enum PlacedFault {
     Drive(u8, DriveFault),
     /// To a drive, from outside the bus; at a time only.
     Stimulus(u8, Stimulus),
+}
+
+impl fmt::Display for PlacedFault {
+    /// As a scenario writes it behind its place: `flip 0`, `drive 3 off`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(_, fault) => fault.fmt(f),
+            Self::Frame(fault) => fault.fmt(f),
+            Self::Drive(drive, fault) => write!(f, "drive {drive} {fault}"),
+            Self::Stimulus(drive, stimulus) => write!(f, "drive {drive} {stimulus}"),
+        }
+    }
 }
 
 /// A link as a scenario writes it: `98->97`, `2:0->master`; `place` counts from the master's outgoing link.

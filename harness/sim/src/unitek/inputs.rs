@@ -1,5 +1,7 @@
 //! What is connected to a simulated drive.
 
+use core::fmt;
+
 /// Inputs and sensors of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Inputs {
@@ -134,4 +136,16 @@ pub enum Stimulus {
     Register(u8, u32),
     /// Its CAN controller goes to bus-off.
     BusOff,
+}
+
+impl fmt::Display for Stimulus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(name, on) => write!(f, "input {name} {}", if *on { "on" } else { "off" }),
+            Self::Force(name, Some(raw)) => write!(f, "{name} forced to {raw}"),
+            Self::Force(name, None) => write!(f, "{name} no longer forced"),
+            Self::Register(number, raw) => write!(f, "register {number:02X} = {raw}"),
+            Self::BusOff => f.write_str("bus-off"),
+        }
+    }
 }

@@ -15,6 +15,7 @@ use harness_sim::octet_segment::{
 };
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
+use std::fmt;
 
 /// The bench's own place on its segment.
 pub(super) const BENCH: usize = 0;
@@ -33,6 +34,31 @@ pub enum Happening {
     Line(LineFaultAt),
     /// To the slave, from outside its bus.
     Outside(Stimulus),
+}
+
+impl fmt::Display for Happening {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(placed) => match placed.fault {
+                LineFault::Octet(fault) => fault.fmt(f),
+                LineFault::Telegram(fault) => fault.fmt(f),
+            },
+            Self::Outside(Stimulus::Link(found)) => {
+                write!(
+                    f,
+                    "link to the module {}",
+                    if *found { "found" } else { "lost" }
+                )
+            }
+            Self::Outside(Stimulus::Fault(number, there)) => {
+                write!(
+                    f,
+                    "fault {number} {}",
+                    if *there { "there" } else { "gone" }
+                )
+            }
+        }
+    }
 }
 
 /// What happens to a slave from outside its bus.
@@ -389,7 +415,7 @@ impl Link for Bench {
     fn unused_faults(&self) -> Vec<String> {
         let placed = self.line.unused_faults().iter().map(|own| self.words(own));
         let scheduled = self.clock.left_over();
-        let scheduled = scheduled.map(|(at, fault)| format!("{fault:?} at {at}"));
+        let scheduled = scheduled.map(|(at, fault)| format!("{fault} at {at}"));
         placed.chain(scheduled).collect()
     }
 

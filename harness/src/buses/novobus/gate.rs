@@ -168,7 +168,7 @@ impl Gate for RingGate {
             }
             Verdict::Open => {
                 let why = format!(
-                    "ring {}: the fault {fault:?} is not made: what drives take changed or lost bytes for cannot be \
+                    "ring {}: the fault `{fault}` is not made: what drives take changed or lost bytes for cannot be \
                      judged, so it needs everything allowed in the rig's [limits], --allow-motion, and no `max_speed`",
                     self.ring + 1
                 );

@@ -396,7 +396,7 @@ impl Link for SimulatedLink {
                 PlacedFault::Stimulus(_, buses::Stimulus::Novobus(Stimulus::Error(error))) => {
                     format!("{place} at {at}: error {error}")
                 }
-                PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus:?}"),
+                PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus}"),
             });
         }
         unused

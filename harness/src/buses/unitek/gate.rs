@@ -124,7 +124,7 @@ impl Gate for SegmentGate {
             }
             _ => Err(Denied {
                 why: format!(
-                    "the fault {fault:?} is not made: a drive could miss the frame that locks it, so it needs `allow_motion` in the \
+                    "the fault `{fault}` is not made: a drive could miss the frame that locks it, so it needs `allow_motion` in the \
                      rig's [limits] and --allow-motion"
                 ),
                 settings: vec![LimitSetting::Motion],

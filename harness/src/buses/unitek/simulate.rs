@@ -350,7 +350,7 @@ impl Link for Bench {
         let scheduled = self.clock.left_over().map(|(at, fault)| match fault {
             PlacedFault::Frame(fault) => format!("the next frame at {at}: {fault}"),
             PlacedFault::Drive(node, fault) => format!("drive {node} at {at}: {fault}"),
-            other => format!("{other:?} at {at}"),
+            other => format!("{other} at {at}"),
         });
         placed.chain(scheduled).collect()
     }

@@ -106,7 +106,8 @@ fn influence(influence: &Influence) -> String {
     stimuli.first().map_or_else(String::new, stimulus)
 }
 
-fn stimulus(stimulus: &Stimulus) -> String {
+/// `analogue 500mV`, `error 0504`
+pub(crate) fn stimulus(stimulus: &Stimulus) -> String {
     let on = |on: bool| if on { "on" } else { "off" };
     match *stimulus {
         Stimulus::Input(input, high) => {
