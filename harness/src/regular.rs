@@ -1,7 +1,7 @@
 //! Regular files, opened so that a FIFO, a device or a symbolic link in their place is refused and never waited for.
 
 use rustix::fs::OFlags;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -24,6 +24,23 @@ impl Links {
             Self::Refuse => flags | OFlags::NOFOLLOW,
         };
         flags.bits().cast_signed()
+    }
+}
+
+/// What a file is, in words.
+pub(crate) fn kind(of: FileType) -> &'static str {
+    if of.is_file() {
+        "a regular file"
+    } else if of.is_dir() {
+        "a folder"
+    } else if of.is_symlink() {
+        "a symbolic link"
+    } else if of.is_fifo() {
+        "a FIFO"
+    } else if of.is_socket() {
+        "a socket"
+    } else {
+        "a device"
     }
 }
 

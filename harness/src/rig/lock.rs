@@ -156,16 +156,27 @@ fn open(folder: &Path, id: &str) -> io::Result<File> {
     // In a folder for all users a link could lead to a file that this user must not change.
     options.custom_flags(Links::Refuse.flags());
     // In a folder for all users the kernel may refuse O_CREAT on the file of another user.
-    match options.open(&path) {
+    let file = match options.open(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let file = options.create(true).truncate(false).open(&path)?;
             // The umask has cleared permissions that other users need. If another user created the file, that process has set
             // them.
             let _not_ours = file.set_permissions(Permissions::from_mode(0o666));
-            Ok(file)
+            file
         }
-        other => other,
-    }
+        Err(error) => return Err(in_its_place(&path).unwrap_or(error)),
+        Ok(file) => file,
+    };
+    in_its_place(&path).map_or(Ok(file), Err)
+}
+
+/// What stands in place of a lock file and is no regular file.
+fn in_its_place(path: &Path) -> Option<io::Error> {
+    let kind = path.symlink_metadata().ok()?.file_type();
+    (!kind.is_file()).then(|| {
+        let (name, kind) = (path.display(), regular::kind(kind));
+        io::Error::other(format!("{name} is {kind} and no lock file; remove it"))
+    })
 }
 
 /// The file's content; empty if the file is new or truncated.

@@ -79,6 +79,30 @@ fn a_name_left_by_a_killed_process_is_stale() {
     }
 }
 
+/// What stands in place of a lock file is named, and not opened as one.
+#[test]
+fn what_is_no_lock_file_is_refused_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |id: &str| folder.path().join(format!("{id}.lock"));
+    let made = std::process::Command::new("mkfifo")
+        .arg(place("pipe"))
+        .status();
+    assert!(made.expect("mkfifo").success());
+    std::os::unix::fs::symlink("/dev/null", place("link")).expect("a link");
+    std::fs::create_dir(place("folder")).expect("a folder");
+    let me = someone("anna", 1);
+    for (id, kind) in [
+        ("pipe", "a FIFO"),
+        ("link", "a symbolic link"),
+        ("folder", "a folder"),
+    ] {
+        let taken = RigLock::acquire_in(folder.path(), id, &me, Duration::ZERO);
+        let text = taken.expect_err(id).to_string();
+        let words = format!("{id}.lock is {kind} and no lock file; remove it");
+        assert!(text.contains(&words), "{text}");
+    }
+}
+
 #[test]
 fn a_reservation_outlives_a_run_and_keeps_others_out() {
     let folder = tempfile::tempdir().expect("a folder");
