@@ -40,8 +40,9 @@ pub(crate) mod watch;
 pub use args::Arguments;
 pub use exit::Exit;
 
-use args::{Command, RunArguments};
+use args::{ColourWhen, Command, RunArguments, ShowProgress};
 use output::Output;
+use std::io::Write as _;
 use std::process::ExitCode;
 
 /// Runs the program with the arguments of the process.
@@ -50,15 +51,20 @@ pub fn main() -> ExitCode {
     crate::signals::fail_beyond_file_size_limit();
     let arguments = match help::parse() {
         Ok(arguments) => arguments,
-        Err(error) => {
-            let exit = if error.use_stderr() {
-                Exit::Usage
-            } else {
-                Exit::Passed
-            };
-            // Where neither stream can be written to, the exit code still tells.
+        Err(error) if error.use_stderr() => {
+            // The exit code tells it as well.
             let _unwritable = error.print();
-            return exit.into();
+            return Exit::Usage.into();
+        }
+        // What `--help` and `--version` print is a result.
+        Err(help) => {
+            let printed = help.print().and_then(|()| std::io::stdout().flush());
+            return match output::unless_closed(printed) {
+                Ok(()) => Exit::Passed.into(),
+                Err(error) => Output::new(ColourWhen::Auto, ShowProgress::None)
+                    .unwritable(&error)
+                    .into(),
+            };
         }
     };
     let mut output = Output::new(arguments.color, arguments.progress);

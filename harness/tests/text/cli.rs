@@ -555,3 +555,35 @@ fn fuzz_distil() {
     assert_eq!(code(&nothing), 2);
     assert!(stderr(&nothing).contains("/nowhere/at/all"));
 }
+
+/// What cannot be written is the bench's fault, whichever command prints it.
+#[test]
+fn a_full_disk_is_no_success() {
+    for command in [
+        "--version",
+        "--help",
+        "help",
+        "help run",
+        "list",
+        "manual",
+        "cells",
+        "deviations",
+        "schema rig",
+        "completions bash",
+        "man",
+        "rig list",
+        "run 9.2-synco",
+        "trace 9.2-synco",
+    ] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+        let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+            .args(command.split(' '))
+            .stdout(full.expect("the full device"))
+            .stderr(std::process::Stdio::piped())
+            .output()
+            .expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{command}: {said}");
+        assert!(said.contains("failed to write"), "{command}: {said}");
+    }
+}
