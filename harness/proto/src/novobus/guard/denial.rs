@@ -71,6 +71,8 @@ pub enum Cause {
     },
     /// The state of the drives is not known well enough to judge the byte.
     InDoubt,
+    /// The same behind `ResetH8`: a drive does not listen for a time after it (ND21 10.5).
+    BehindReset,
     /// A short address whose drive is not known (ND21 9.2).
     NoAddress,
     /// A check sequence, or bytes that become one by being counted up, where none is due (ND21 9.7, 9.8).
@@ -87,6 +89,16 @@ pub enum Cause {
     },
     /// An earlier byte was denied.
     Closed,
+}
+
+impl Cause {
+    /// What denies a byte in doubt.
+    pub(super) const fn of_doubt(behind_reset: bool) -> Self {
+        match behind_reset {
+            true => Self::BehindReset,
+            false => Self::InDoubt,
+        }
+    }
 }
 
 impl Denial {
@@ -163,6 +175,11 @@ impl fmt::Display for Denial {
             Cause::InDoubt => f.write_str(
                 "the position of the drives in a telegram is not known; send 17 zeros and the check sequence first \
                  (ND21 9.8), or allow everything in the rig's [limits] without `max_speed`",
+            ),
+            Cause::BehindReset => f.write_str(
+                "ResetH8 was sent, and a drive does not listen for a time after it (ND21 10.5), so its position in a telegram is not \
+                 known; send 17 zeros and the check sequence first (ND21 9.8), or allow everything in the rig's [limits] without \
+                 `max_speed`",
             ),
             Cause::NoAddress => f.write_str(
                 "a short telegram has no meaning before an address byte has been sent (ND21 9.2)",

@@ -71,6 +71,8 @@ struct Doubt {
     in_error_mode: bool,
     /// Other bytes that may still pass: behind 17 zeros every drive in the error mode waits for the check sequence.
     foreign: u8,
+    /// It began with `ResetH8`.
+    behind_reset: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -278,7 +280,7 @@ impl Guard {
         }
         match self.next(byte) {
             // If everything is allowed, bytes that the guard cannot interpret pass as well.
-            Err(_) if self.limits.allow_everything() => Ok(Next::to(in_doubt(byte))),
+            Err(_) if self.limits.allow_everything() => Ok(Next::to(in_doubt(byte, false))),
             next => next,
         }
     }
@@ -396,10 +398,10 @@ impl Guard {
                         half: Some((key, half)),
                         ..Next::to(state)
                     },
-                    Some(Parameter::Error) => Next::to(in_doubt(byte)),
+                    Some(Parameter::Error) => Next::to(in_doubt(byte, false)),
                     Some(Parameter::Complete(DriveAct::Reset)) => Next {
                         act: Some((key, DriveAct::Reset)),
-                        ..Next::to(in_doubt(byte))
+                        ..Next::to(in_doubt(byte, true))
                     },
                     Some(Parameter::Complete(act)) => Next {
                         half: Some((key, Half::default())),
@@ -426,7 +428,7 @@ impl Guard {
                     ..Doubt::default()
                 })));
             }
-            Err(_) => return Ok(Next::to(in_doubt(byte))),
+            Err(_) => return Ok(Next::to(in_doubt(byte, false))),
         };
         if header.process_data() {
             DriveAct::ProcessDataToCome.judge(&self.limits, &Known::default())?;
@@ -510,9 +512,10 @@ impl Next {
 }
 
 /// Doubt that begins with this byte.
-fn in_doubt(byte: u8) -> State {
+fn in_doubt(byte: u8, behind_reset: bool) -> State {
     State::Doubt(Doubt {
         zeros: u8::from(byte == 0),
+        behind_reset,
         ..Doubt::default()
     })
 }
@@ -571,7 +574,7 @@ impl Doubt {
                     ..self
                 }
             }
-            _ if !self.cleared => return Err(Cause::InDoubt),
+            _ if !self.cleared => return Err(Cause::of_doubt(self.behind_reset)),
             SYNCO | PAUSE => Self {
                 zeros: 0,
                 matched: 0,
@@ -606,7 +609,7 @@ impl Doubt {
                 foreign: self.foreign - 1,
                 ..self
             },
-            _ => return Err(Cause::InDoubt),
+            _ => return Err(Cause::of_doubt(self.behind_reset)),
         };
         Ok(Next::to(State::Doubt(next)))
     }

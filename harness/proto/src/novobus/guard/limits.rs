@@ -89,7 +89,9 @@ impl Limits {
         let need = match cause {
             Cause::NotAllowed { missing, .. } => missing,
             // If everything is allowed, bytes that the guard cannot interpret pass.
-            Cause::InDoubt | Cause::NoAddress | Cause::CheckSequence => Need::EVERYTHING,
+            Cause::InDoubt | Cause::BehindReset | Cause::NoAddress | Cause::CheckSequence => {
+                Need::EVERYTHING
+            }
             Cause::TooFast { .. }
             | Cause::HalfSpeed { .. }
             | Cause::Faster { .. }

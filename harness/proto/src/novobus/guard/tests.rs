@@ -234,6 +234,27 @@ fn where_doubt_begins() {
     assert!(doubt(reset, &[0x86, 0xFF, 0xDD, 0x21, 0xFE], false));
 }
 
+/// ND21 10.5: what follows a reset is denied because of the reset, until a check sequence.
+#[test]
+fn the_reason_of_a_doubt_is_named() {
+    let reset = Limits {
+        motion: true,
+        reset: true,
+        ..Limits::default()
+    };
+    let sent = [0x86, 0xFF, 0xDD, 0x21, 0xFE];
+    let cause = |limits, bytes: &[u8]| behind(limits, bytes, false).err();
+    assert_eq!(
+        cause(reset, &[&sent[..], &[0x80]].concat()),
+        Some(Cause::BehindReset)
+    );
+    assert_eq!(
+        cause(reset, &[&sent[..], &[0x00, 0x80]].concat()),
+        Some(Cause::BehindReset)
+    );
+    assert_eq!(cause(reset, &[0x22, 0x88]), Some(Cause::InDoubt));
+}
+
 /// ND21 14.10.3: `DataIn` may point at a cell where any word may be written, so that a drive can be given back the value that it held.
 #[test]
 fn data_in_needs_what_the_cell_needs_that_it_points_at() {

@@ -133,7 +133,7 @@ const fn why(cause: &Cause) -> &'static str {
         Cause::HalfSpeed { .. } => "half of a speed",
         Cause::Faster { .. } => "turns faster",
         Cause::NotKnown { .. } => "not known to be slow",
-        Cause::InDoubt => "in doubt",
+        Cause::InDoubt | Cause::BehindReset => "in doubt",
         Cause::NoAddress => "no address is known",
         Cause::CheckSequence => "a check sequence",
         Cause::TooMany { .. } => "too many a second",
