@@ -39,8 +39,8 @@ Exit codes:
   0  everything passed
   1  a drive failed a scenario or a command, or differs from a file; a figure of a campaign differs
      from the pinned one
-  2  wrong usage, a file with mistakes, a scenario that could not be played to its end (aborted), or something
-     that needs --move or --yes
+  2  wrong usage, a file with mistakes, a scenario that could not be played to its end (aborted) or that was
+     named and is denied by the rig's [limits], or something that needs --move or --yes
   3  the rig failed
   4  nothing was selected
   5  passed but incomplete: nothing was judged (every scenario was skipped), the run ended early, a scenario

@@ -42,6 +42,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         .unwrap_or_else(|| PathBuf::from(format!("evidence-{}-{stamp}", rig.id())));
     let job = PlayOrder {
         purpose: "qualify",
+        named: Vec::new(),
         allow_motion: arguments.allow_motion,
         wait: arguments.wait.unwrap_or_default(),
         evidence: Some(evidence),

@@ -100,6 +100,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     if let Some(rig) = in_use {
         let job = PlayOrder {
             purpose: "run",
+            named: arguments.selection.paths.clone(),
             allow_motion: arguments.allow_motion,
             wait: arguments.wait.unwrap_or_default(),
             evidence: arguments.evidence.clone(),

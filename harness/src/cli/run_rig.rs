@@ -25,6 +25,8 @@ use std::time::Duration;
 /// What is to be done.
 pub(crate) struct PlayOrder {
     pub(crate) purpose: &'static str,
+    /// The scenarios, files and folders that the user named, where a denied one is wrong usage.
+    pub(crate) named: Vec<PathBuf>,
     pub(crate) allow_motion: bool,
     pub(crate) wait: Duration,
     pub(crate) evidence: Option<PathBuf>,
@@ -277,7 +279,7 @@ pub(super) fn course_of(
     let bar = progress_bar(entries.len(), output.progress);
     let name = course.name();
     let mut cases = Cases::new(&name, job.junit.as_deref());
-    let mut tally = Tally::default();
+    let mut tally = Tally::of_named(&job.named);
     let mut left = entries.iter();
     for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());

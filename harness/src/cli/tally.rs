@@ -4,11 +4,12 @@
 use super::exit::Exit;
 use crate::counted::counted;
 use crate::library::Entry;
-use crate::scenario::run::{Outcome, Unlock, together};
+use crate::scenario::run::{Outcome, Unlock, Why, together};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// The verdicts of a run so far.
 #[derive(Debug, Default)]
@@ -23,9 +24,21 @@ pub(crate) struct Tally {
     unlocks: BTreeMap<BTreeSet<Unlock>, usize>,
     /// Some were selected and not reached.
     ended_early: bool,
+    /// The files and built-in scenarios that were named one by one.
+    named: Vec<PathBuf>,
+    /// The rig's limits deny one of those.
+    named_denied: bool,
 }
 
 impl Tally {
+    /// A run for which the user named these scenarios, files and folders. A scenario that is named itself and denied is the user's mistake.
+    pub(crate) fn of_named(named: &[PathBuf]) -> Self {
+        Self {
+            named: named.to_vec(),
+            ..Self::default()
+        }
+    }
+
     /// Counts a scenario, and the tables that it pins.
     pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
         let judged = outcome.verdict != Verdict::Skipped;
@@ -36,6 +49,12 @@ impl Tally {
         if let Some(unlocks) = unlocks.filter(|unlocks| !unlocks.is_empty()) {
             *self.unlocks.entry(unlocks.clone()).or_default() += 1;
         }
+        let why = outcome.skip.as_ref().map(|skip| &skip.why);
+        let is = |path: &PathBuf| {
+            let name = path.to_str();
+            name == Some(entry.name.as_str()) || name == Some(entry.short_name())
+        };
+        self.named_denied |= matches!(why, Some(Why::Denied(_))) && self.named.iter().any(is);
         self.count(outcome);
     }
 
@@ -56,9 +75,13 @@ impl Tally {
         self.ended_early = true;
     }
 
-    /// The exit code; `require_all` counts skipped scenarios as missing.
+    /// The exit code; `require_all` counts skipped scenarios as missing. A scenario that was named and is denied asks for what the rig's file
+    /// does not permit: wrong usage.
     pub(crate) fn exit(&self, require_all: bool) -> Exit {
-        Exit::of(&self.verdicts, require_all || self.ended_early)
+        match Exit::of(&self.verdicts, require_all || self.ended_early) {
+            Exit::Passed | Exit::Incomplete if self.named_denied => Exit::Usage,
+            exit => exit,
+        }
     }
 
     /// Which tables were covered, and what would unlock the rest.
@@ -120,6 +143,11 @@ mod tests {
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();
+        note(&mut tally, outcomes);
+        tally
+    }
+
+    fn note(tally: &mut Tally, outcomes: &[Outcome]) {
         let source = |n: usize| {
             let document = Manual::all()[0].document;
             let text = format!("title t\nsource {document} 9.{n}\nring 1\n> 80\n");
@@ -129,7 +157,6 @@ mod tests {
             let entry = Entry::new(source(n), None).expect("a scenario");
             tally.note(&entry, outcome);
         }
-        tally
     }
 
     fn lacks(missing: &[Capability], unlocks: impl IntoIterator<Item = Unlock>) -> Outcome {
@@ -171,9 +198,33 @@ mod tests {
              1 (it is for rings of another size), 1 (the rig's [limits] do not let it be played to its end)\n\
              covered: 1 of 6 tables and examples of the manual that the selected scenarios pin\n\
              more scenarios with: `allow_motion` and `allow_reset` in [limits] and --allow-motion (1), an interposer at 1->0 (1), \
-             an interposer at 2->1 (1), rings of other sizes (1), a simulated rig (1)\n"
+             an interposer at 2->1 (1), a ring of 100 drives (1), a simulated rig (1)\n"
         );
         assert_eq!(of(&[passed()]).summary().lines().count(), 1);
+    }
+
+    /// A scenario that was named itself is not skipped in silence where the rig's limits deny it; one of a folder or of all is.
+    #[test]
+    fn what_was_named_and_is_denied_is_wrong_usage() {
+        let denied = || Outcome::skipped(Why::Denied("ring 1: byte 4".to_owned()).into());
+        let failed = || Outcome {
+            verdict: Verdict::Failed,
+            ..passed()
+        };
+        let exit = |named: &str, outcomes: &[Outcome]| {
+            let mut tally = Tally::of_named(&[PathBuf::from(named)]);
+            note(&mut tally, outcomes);
+            tally.exit(false)
+        };
+        assert_eq!(exit("t.scn", &[denied()]), Exit::Usage);
+        assert_eq!(exit("t", &[denied(), passed()]), Exit::Usage);
+        assert_eq!(exit("t.scn", &[denied(), failed()]), Exit::Failed);
+        assert_eq!(exit("folder", &[denied()]), Exit::Incomplete);
+        assert_eq!(exit("folder", &[denied(), passed()]), Exit::Passed);
+        assert_eq!(
+            exit("t.scn", &[lacks(&[Capability::Tap], [])]),
+            Exit::Incomplete
+        );
     }
 
     #[test]

@@ -103,13 +103,13 @@ fn what_a_scenario_needs_follows_from_its_telegrams() {
         with(&careful, name, text);
     }
     ended(&run(&careful, &["looks.scn"]), 0, "1 passed");
-    ended(&run(&careful, &["moves.scn"]), 5, "needs `allow_motion`");
-    ended(&run(&careful, &["writes.scn"]), 5, "needs `allow_eeprom`");
+    ended(&run(&careful, &["moves.scn"]), 2, "needs `allow_motion`");
+    ended(&run(&careful, &["writes.scn"]), 2, "needs `allow_eeprom`");
     let stored = desk("", "allow_eeprom = true\n");
     with(&stored, "writes.scn", WRITES);
     ended(
         &run(&stored, &["writes.scn"]),
-        5,
+        2,
         "needs `allow_motor_data`",
     );
     let watched = desk(
@@ -118,7 +118,7 @@ fn what_a_scenario_needs_follows_from_its_telegrams() {
     );
     with(&watched, "moves.scn", MOVES);
     with(&watched, "ends.scn", ENDS);
-    ended(&run(&watched, &["moves.scn"]), 5, "bus time-out (1625)");
+    ended(&run(&watched, &["moves.scn"]), 2, "bus time-out (1625)");
     ended(&run(&watched, &["ends.scn"]), 0, "1 passed");
     let free = desk("", ALL);
     ended(
@@ -173,8 +173,8 @@ fn settings_of_the_bus_are_switched_for_a_scenario() {
     let fixed = desk("", &ALL.replace("allow_bus_settings = true\n", ""));
     let output =
         fixed.run(&[&["run", "--rig", "desk.toml", "--allow-motion"][..], &names].concat());
-    ended(&output, 5, "3 skipped");
-    ended(&output, 5, "`allow_bus_settings`");
+    ended(&output, 2, "3 skipped");
+    ended(&output, 2, "`allow_bus_settings`");
 }
 
 /// A slave that does not get into the exchange, or replies as no right slave does, is no error of the rig where it is simulated.

@@ -149,16 +149,16 @@ fn what_a_scenario_needs_follows_from_its_frames() {
     ended(&run(&careful, &["locked.scn"]), 0, "1 passed");
     ended(&run(&careful, &["mask.scn"]), 0, "1 passed");
     let skipped = run(&careful, &["moves.scn"]);
-    ended(&skipped, 5, "needs `allow_motion`");
+    ended(&skipped, 2, "needs `allow_motion`");
     ended(
         &skipped,
-        5,
+        2,
         "more scenarios with: `allow_motion` in [limits]",
     );
     ended(&run(&careful, &["native.scn"]), 5, "drive 1 has short");
     ended(
         &run(&careful, &["native.scn", "moves.scn", "--require-all"]),
-        5,
+        2,
         "2 skipped",
     );
     let free = desk("property map-reply = native", ALL);

@@ -334,8 +334,8 @@ fn a_run_that_judges_nothing_is_incomplete() {
     ended(&command.output().expect("the program"), 5, "1 skipped");
 }
 
-/// A scenario that the rig's limits do not permit to its end is skipped with the limit named, and nothing of it is sent. It spoils no run, and
-/// alone it is incomplete.
+/// A scenario that the rig's limits do not permit to its end is skipped with the limit named, and nothing of it is sent. Others are played, and
+/// where it was named itself, the exit code is 2.
 #[test]
 fn what_the_limits_deny_is_skipped() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -370,15 +370,15 @@ fn what_the_limits_deny_is_skipped() {
         let kept = folder.path().join(format!("kept-{number}"));
         let evidence = ["--evidence", kept.to_str().expect("a name")];
         let alone = run(folder.path(), &text, &[denied.as_str()]);
-        ended(&alone, 5, "0 passed, 0 failed, 1 skipped");
-        ended(&alone, 5, limit);
+        ended(&alone, 2, "0 passed, 0 failed, 1 skipped");
+        ended(&alone, 2, limit);
         let output = run(
             folder.path(),
             &text,
             &[&[denied.as_str(), after.as_str()], &evidence[..]].concat(),
         );
-        ended(&output, 0, "skipped denied");
-        ended(&output, 0, "passed after");
+        ended(&output, 2, "skipped denied");
+        ended(&output, 2, "passed after");
         let record = std::fs::read_to_string(kept.join("run.jsonl")).expect("a record");
         let case = record.find("\"denied\"").expect("its case");
         assert!(!record[..case].contains("\"sent\""), "{record}");
