@@ -9,6 +9,7 @@ use crate::guard::Limits;
 use crate::link::Capability;
 use crate::rig::segment::OnSegment;
 use crate::rig::{Rig, Way, limits, line_rate};
+use crate::scenario::run::sizes;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 
@@ -72,7 +73,9 @@ pub(super) fn header(
     let own = rig.sizes();
     if own != *drives {
         return Err(format!(
-            "the record is of rings of {drives:?} drives, {RIG} has {own:?}"
+            "the record is of rings of {} drives, {RIG} has {}",
+            sizes(drives),
+            sizes(&own)
         ));
     }
     let segment = match own_rings {

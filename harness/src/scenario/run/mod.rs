@@ -9,4 +9,5 @@ pub use crate::buses::run::*;
 pub use outcome::{ByteDifference, Mismatch, Outcome, Stop, Unready};
 pub use player::{AtMismatch, PortState, Runner, needs, play, run};
 pub(crate) use skip::DENIED;
-pub use skip::{Skip, Unlock, Why, lacks, together};
+pub(crate) use skip::sizes;
+pub use skip::{Skip, Unlock, Why, lacks, lacks_as_well, together};

@@ -1,6 +1,7 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
 use crate::buses::LimitSetting;
+use crate::counted::counted;
 use crate::link::{Capability, Link};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
@@ -51,8 +52,10 @@ pub enum Unlock {
     Interposer(String),
     /// Ports that send and show line errors.
     LineErrors,
-    /// Rings with other numbers of drives.
-    OtherSize,
+    /// Rings with these numbers of drives.
+    Rings(Vec<u8>),
+    /// A second ring.
+    SecondRing,
     /// Drives that are simulated in the program.
     Simulated,
     /// A rig with this bus.
@@ -79,8 +82,8 @@ impl Skip {
     #[must_use]
     pub fn other_size(own: Vec<u8>, rig: Vec<u8>) -> Self {
         Self {
+            unlocks: [Unlock::Rings(own.clone())].into(),
             why: Why::OtherSize(own, rig),
-            unlocks: [Unlock::OtherSize].into(),
         }
     }
 
@@ -128,10 +131,6 @@ pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to i
 
 impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sizes = |sizes: &[u8]| {
-            let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
-            sizes.join(" and ")
-        };
         match self {
             Self::Lacks(missing) => {
                 let names: Vec<_> = missing.iter().map(|own| own.name()).collect();
@@ -152,6 +151,12 @@ impl fmt::Display for Why {
             Self::RunEnded => f.write_str("the run ended before it"),
         }
     }
+}
+
+/// Numbers of drives: `3 and 2`.
+pub(crate) fn sizes(sizes: &[u8]) -> String {
+    let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
+    sizes.join(" and ")
 }
 
 /// What is needed together, in words.
@@ -185,7 +190,11 @@ impl fmt::Display for Unlock {
             Self::Tap(place) => write!(f, "a tap at {place}"),
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
-            Self::OtherSize => f.write_str("rings of other sizes"),
+            Self::Rings(drives) => match drives.as_slice() {
+                [drives] => write!(f, "a ring of {}", counted(*drives, "drive")),
+                all => write!(f, "rings of {} drives", sizes(all)),
+            },
+            Self::SecondRing => f.write_str("a second ring"),
             Self::Simulated => f.write_str("a simulated rig"),
             Self::Bus(bus) => write!(f, "a rig with the bus `{}`", name(*bus)),
         }
@@ -230,6 +239,34 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
     Some(Skip::from(why).and(unlocks.chain(interposers).chain(taps)))
 }
 
+/// What a plan for rings of other sizes needs beside them. Inner links are named as they are in its own rings.
+pub fn lacks_as_well<L: Language>(
+    plan: &Plan<L>,
+    link: &dyn Link,
+    is_inner: impl Fn(usize, usize) -> bool,
+) -> Vec<Unlock> {
+    let lacks = |need: &Capability| !link.capabilities().contains(need);
+    let inner = |links: Vec<(usize, usize)>| {
+        let inner = links
+            .into_iter()
+            .filter(|(ring, place)| is_inner(*ring, *place));
+        let names = inner.map(|(ring, place)| L::link_name(plan, ring, place));
+        names.collect::<Vec<_>>()
+    };
+    let missing: Vec<_> = plan.needs.iter().filter(|need| lacks(need)).collect();
+    let unlocks = missing.iter().filter_map(|own| unlock(**own));
+    let mut unlocks: Vec<_> = unlocks.filter(|own| *own != Unlock::SecondRing).collect();
+    if lacks(&Capability::Interposer) {
+        let places = inner(L::fault_links(plan).into_iter().collect());
+        unlocks.extend(places.into_iter().map(Unlock::Interposer));
+    }
+    if lacks(&Capability::Tap) && lacks(&Capability::Interposer) {
+        let places = inner(L::heard_links(plan).into_iter().collect());
+        unlocks.extend(places.into_iter().map(Unlock::Tap));
+    }
+    unlocks
+}
+
 /// What gives a rig a capability; `None` for taps and interposers, whose places are known.
 fn unlock(missing: Capability) -> Option<Unlock> {
     Some(match missing {
@@ -238,7 +275,7 @@ fn unlock(missing: Capability) -> Option<Unlock> {
         Capability::Eeprom => Unlock::Limit(LimitSetting::Eeprom),
         Capability::Reset => Unlock::Limit(LimitSetting::Reset),
         Capability::LineErrors => Unlock::LineErrors,
-        Capability::TwoRings => Unlock::OtherSize,
+        Capability::TwoRings => Unlock::SecondRing,
         Capability::Memory | Capability::Power | Capability::Simulator => Unlock::Simulated,
     })
 }

@@ -15,7 +15,8 @@ use crate::rig::{Again, Attempt, Played, Rig, SessionError, attempts_of};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{
-    AtMismatch, Outcome, Skip, Unlock, Why, come_home, lacks, play_over_bus, start_anew,
+    AtMismatch, Outcome, Skip, Unlock, Why, come_home, lacks, lacks_as_well, play_over_bus,
+    start_anew,
 };
 use crate::scenario::simulate;
 use harness_proto::novobus::address::RingSize;
@@ -268,10 +269,13 @@ impl<'s> Run<'s> {
 
     /// Why a plan is skipped that `lacks` something, or that the guard denies on the model; with all that would let it be played.
     fn denied(&self, plan: &Plan, lacks: Option<Skip>) -> Option<Skip> {
-        let within_reach = |skip: &Skip| {
-            let never = [Unlock::Simulated, Unlock::OtherSize];
-            !never.iter().any(|own| skip.unlocks.contains(own))
+        let elsewhere = |own: &Unlock| {
+            matches!(
+                own,
+                Unlock::Simulated | Unlock::Rings(_) | Unlock::SecondRing
+            )
         };
+        let within_reach = |skip: &Skip| !skip.unlocks.iter().any(elsewhere);
         if !self.rehearses || !lacks.as_ref().is_none_or(within_reach) {
             return lacks;
         }
@@ -418,7 +422,14 @@ pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Op
     // The size first: a link of another ring may have the number of one that there is.
     match plan.rings == rings {
         true => lacks(plan, link),
-        false => Some(Skip::other_size(sizes(&plan.rings), sizes(rings))),
+        false => {
+            let is_inner = |ring: usize, place: usize| {
+                let drives = plan.rings.get(ring).map_or(0, |size| size.drives());
+                (1..usize::from(drives)).contains(&place)
+            };
+            let skip = Skip::other_size(sizes(&plan.rings), sizes(rings));
+            Some(skip.and(lacks_as_well(plan, link, is_inner)))
+        }
     }
 }
 
