@@ -173,8 +173,8 @@ fn settings_of_the_bus_are_switched_for_a_scenario() {
     let fixed = desk("", &ALL.replace("allow_bus_settings = true\n", ""));
     let output =
         fixed.run(&[&["run", "--rig", "desk.toml", "--allow-motion"][..], &names].concat());
-    ended(&output, 2, "3 skipped");
-    ended(&output, 2, "`allow_bus_settings`");
+    ended(&output, 5, "3 skipped");
+    ended(&output, 5, "`allow_bus_settings`");
 }
 
 /// A slave that does not get into the exchange, or replies as no right slave does, is no error of the rig where it is simulated.

@@ -3,7 +3,7 @@
 //! [`cause`] is a pure function of what was heard.
 
 use super::health::Unhealthy;
-use super::line_test::{Heard, Pace, Pass, SENT, pace_of};
+use super::line_test::{Heard, Pass, RingPace, SENT, pace_of};
 use crate::buses::novobus::locate::locate;
 use crate::rig::Rig;
 use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
@@ -52,6 +52,15 @@ pub enum Cause {
         found: Rate,
         /// The rate in the rig's file.
         stated: Rate,
+    },
+    /// The bytes are whole, and as far apart as at another rate: no byte shows that this is the rate of the drives.
+    #[error(
+        "the drives, or a device server in front of them, run at {} bit/s, or the program at the other end is as slow as that. Next: look at the setting of the drives (ND21 8.3) and of the server; if it is {} bit/s, set `line = \"{} 8O1\"` in the rig's file; if it is not, stop other programs and try again",
+        found.bits_per_second(), found.bits_per_second(), found.bits_per_second()
+    )]
+    AsAtRate {
+        /// The rate at which bytes would be as far apart.
+        found: Rate,
     },
     /// The bytes are whole and late, at no rate.
     #[error(
@@ -112,8 +121,8 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     }
     let [one, other] = [0, 1].map(|pass: usize| pace_of(&heard.passes[pass], stated));
     let pace = one.or_faster(other, stated);
-    if let Pace::Slower(found) = pace {
-        return Cause::Rate { found, stated };
+    if let RingPace::Slower(found) = pace {
+        return Cause::AsAtRate { found };
     }
     if let (true, Unhealthy::Size { found, stated }) = (clean(&first) && clean(&second), ill) {
         return Cause::Count {
@@ -127,7 +136,7 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
         return Cause::LinkInFront(drive);
     }
     if clean(&first) && clean(&second) {
-        if let Pace::Late(_) = pace {
+        if let RingPace::Late(_) = pace {
             return Cause::HeldUp;
         }
         return Cause::NoCommands;
@@ -256,8 +265,8 @@ mod tests {
     #[test]
     fn a_ring_at_another_rate_is_told_its_rate() {
         let heard = listen(&mut ring("19200"), 0);
-        let (found, stated) = (Rate::Baud19200, Rate::Baud38400);
-        assert_eq!(named(&FOREIGN(), &heard), Cause::Rate { found, stated });
+        let found = Rate::Baud19200;
+        assert_eq!(named(&FOREIGN(), &heard), Cause::AsAtRate { found });
     }
 
     /// Bytes that come whole and in bursts are no sign of another rate.

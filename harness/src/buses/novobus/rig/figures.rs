@@ -1,6 +1,6 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
-use super::line_test::{self, Pace};
+use super::line_test::{self, RingPace};
 use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, State};
 use crate::link::Octets;
 use crate::rig::Rig;
@@ -107,9 +107,9 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let stated = stated_rate(session.rig());
     let link = session.link();
     let (rate, late) = match line_test::pace(link, ring, stated) {
-        Pace::AsSent => (stated, None),
-        Pace::Slower(rate) => (rate, None),
-        Pace::Late(late) => (stated, Some(late)),
+        RingPace::AsSent => (stated, None),
+        RingPace::Slower(rate) => (rate, None),
+        RingPace::Late(late) => (stated, Some(late)),
     };
     let nominal = link.byte_time() * u64::from(size.drives());
     let telegrams = COUNT.repeat(ROUNDS);

@@ -25,7 +25,9 @@ pub enum Unhealthy {
         bytes: String,
     },
     /// Bytes come back slower than they are sent.
-    #[error("bytes come back at {found} bit/s, they are sent at {stated} bit/s")]
+    #[error(
+        "bytes come back whole and at the pace of {found} bit/s, they are sent at {stated} bit/s"
+    )]
     Slow {
         /// The rate at which they come back, in bit/s.
         found: u32,
@@ -200,7 +202,7 @@ fn shown(bytes: &[Received]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line_test::Pace;
+    use super::super::line_test::RingPace;
     use super::*;
     use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options};
@@ -237,7 +239,10 @@ mod tests {
             assert!(matches!(link.error_of(0, drives - 1), Some(Some(_))));
             let health = examine(&mut link, &[size], 1).expect("a healthy ring");
             assert_eq!(health.reported, []);
-            assert_eq!(line_test::pace(&mut link, 0, Rate::Baud38400), Pace::AsSent);
+            assert_eq!(
+                line_test::pace(&mut link, 0, Rate::Baud38400),
+                RingPace::AsSent
+            );
             assert!(!line_test::lacks_marks(&mut link, 0));
             let recovery = recover(&mut link, 0);
             assert_eq!((recovery.before, recovery.drives), (None, Some(size)));

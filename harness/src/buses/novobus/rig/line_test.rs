@@ -115,7 +115,7 @@ pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
 
 /// How fast the bytes of a pass came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pace {
+pub(crate) enum RingPace {
     /// As fast as they were sent; or not all of them came back, which says nothing of the rate.
     AsSent,
     /// Evenly, at a lower rate.
@@ -125,22 +125,22 @@ pub(crate) enum Pace {
 }
 
 /// The pace of a ring. The fastest of three passes counts, so that a computer that is late often does not look like a slow ring.
-pub(crate) fn pace(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Pace {
-    let mut fastest = Pace::AsSent;
+pub(crate) fn pace(line: &mut dyn link::Line, ring: usize, stated: Rate) -> RingPace {
+    let mut fastest = RingPace::AsSent;
     for number in 0..RATE_PASSES {
         let found = pace_of(&pass(line, ring), stated);
         fastest = match number {
             0 => found,
             _ => fastest.or_faster(found, stated),
         };
-        if fastest == Pace::AsSent {
+        if fastest == RingPace::AsSent {
             break;
         }
     }
     fastest
 }
 
-impl Pace {
+impl RingPace {
     /// The faster one of two passes. A pass at a rate counts as fast as one that is a little faster.
     pub(super) fn or_faster(self, other: Self, stated: Rate) -> Self {
         let late = |pace: Self| match pace {
@@ -160,9 +160,9 @@ impl Pace {
 }
 
 /// The pace of one pass. At a lower rate each byte is near its place in a row of such bytes. Lateness has another slope, or steps.
-pub(super) fn pace_of(pass: &Pass, stated: Rate) -> Pace {
+pub(super) fn pace_of(pass: &Pass, stated: Rate) -> RingPace {
     if pass.len() < SENT {
-        return Pace::AsSent;
+        return RingPace::AsSent;
     }
     let own = stated.byte_time().units();
     let gaps = pass.windows(2).map(|pair| pair[1].0.since(pair[0].0));
@@ -172,7 +172,7 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> Pace {
     let took: u64 = gaps.iter().sum();
     // Half as long again: nearer to half the rate than to the stated one.
     if took < own * GAPS * 3 / 2 {
-        return Pace::AsSent;
+        return RingPace::AsSent;
     }
     let even = |rate: &Rate| {
         let byte = rate.byte_time().units();
@@ -187,8 +187,8 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> Pace {
     let slower = |rate: &Rate| rate.bits_per_second() < stated.bits_per_second();
     let rate = Rate::ALL.into_iter().filter(slower).find(|rate| even(rate));
     rate.map_or_else(
-        || Pace::Late(Span::from_units(took - own * GAPS)),
-        Pace::Slower,
+        || RingPace::Late(Span::from_units(took - own * GAPS)),
+        RingPace::Slower,
     )
 }
 
@@ -213,15 +213,15 @@ pub(super) mod tests {
     #[test]
     fn a_slow_ring_is_found_by_the_spacing_of_its_bytes() {
         for (line, found) in [
-            ("38400", Pace::AsSent),
-            ("19200", Pace::Slower(Rate::Baud19200)),
-            ("9600", Pace::Slower(Rate::Baud9600)),
+            ("38400", RingPace::AsSent),
+            ("19200", RingPace::Slower(Rate::Baud19200)),
+            ("9600", RingPace::Slower(Rate::Baud9600)),
         ] {
             let mut link = ring(line);
             assert_eq!(pace(&mut link, 0, Rate::Baud38400), found, "{line}");
         }
         let mut link = ring("19200");
-        assert_eq!(pace(&mut link, 0, Rate::Baud19200), Pace::AsSent);
+        assert_eq!(pace(&mut link, 0, Rate::Baud19200), RingPace::AsSent);
     }
 
     /// A pass whose n-th gap is so many microseconds long.
@@ -240,17 +240,17 @@ pub(super) mod tests {
     fn late_bytes_are_no_other_rate() {
         let stated = Rate::Baud38400;
         let found = |gap: &dyn Fn(u64) -> u64| pace_of(&pass_of(gap), stated);
-        let half = Pace::Slower(Rate::Baud19200);
-        assert_eq!(found(&|_| 286), Pace::AsSent);
+        let half = RingPace::Slower(Rate::Baud19200);
+        assert_eq!(found(&|_| 286), RingPace::AsSent);
         assert_eq!(found(&|_| 573), half);
         assert_eq!(found(&|n| if n % 2 == 0 { 540 } else { 606 }), half);
         // A server that collects bytes for some milliseconds.
         let collected = |n: u64| if n % 8 == 0 { 8 * 573 } else { 0 };
         assert_eq!(found(&collected), half);
-        assert_eq!(found(&|_| 1_146), Pace::Slower(Rate::Baud9600));
-        assert_eq!(found(&|_| 286 * 13 / 10), Pace::AsSent);
+        assert_eq!(found(&|_| 1_146), RingPace::Slower(Rate::Baud9600));
+        assert_eq!(found(&|_| 286 * 13 / 10), RingPace::AsSent);
         assert!(
-            matches!(found(&|_| 286 * 17 / 10), Pace::Late(late) if late > Span::from_millis(50))
+            matches!(found(&|_| 286 * 17 / 10), RingPace::Late(late) if late > Span::from_millis(50))
         );
         let bursts = |n: u64| {
             if n % 40 == 0 {
@@ -259,19 +259,19 @@ pub(super) mod tests {
                 286
             }
         };
-        assert!(matches!(found(&bursts), Pace::Late(_)));
+        assert!(matches!(found(&bursts), RingPace::Late(_)));
         let stalls = |n: u64| if n % 32 == 0 { 18_000 } else { 286 };
-        assert!(matches!(found(&stalls), Pace::Late(_)));
+        assert!(matches!(found(&stalls), RingPace::Late(_)));
     }
 
     #[test]
     fn one_stalled_pass_is_not_a_slow_ring() {
         let stated = Rate::Baud38400;
-        let half = Pace::Slower(Rate::Baud19200);
-        let late = |ms| Pace::Late(Span::from_millis(ms));
+        let half = RingPace::Slower(Rate::Baud19200);
+        let late = |ms| RingPace::Late(Span::from_millis(ms));
         for (one, other, faster) in [
-            (half, Pace::AsSent, Pace::AsSent),
-            (Pace::Slower(Rate::Baud9600), half, half),
+            (half, RingPace::AsSent, RingPace::AsSent),
+            (RingPace::Slower(Rate::Baud9600), half, half),
             // A pass at half the rate with a stall, and one that was faster than half the rate.
             (late(90), half, half),
             (late(75), half, half),
@@ -282,6 +282,6 @@ pub(super) mod tests {
         }
         // A pass that is not whole says nothing of the rate.
         let part = pass_of(|_| 573)[..SENT - 1].to_vec();
-        assert_eq!(pace_of(&part, stated), Pace::AsSent);
+        assert_eq!(pace_of(&part, stated), RingPace::AsSent);
     }
 }

@@ -3,7 +3,7 @@
 use super::cause::{self, Cause};
 use super::health::{self, Health, Unhealthy, examine};
 use super::interlock::Interlocks;
-use super::line_test::{self, Pace};
+use super::line_test::{self, RingPace};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Watch, blind_stop, safe_state};
@@ -347,15 +347,15 @@ impl Session {
             let pace = line_test::pace(&mut self.link, ring, stated);
             self.link.begin();
             let (ill, cause) = match pace {
-                Pace::Slower(found) => {
+                RingPace::Slower(found) => {
                     let ill = Unhealthy::Slow {
                         found: found.bits_per_second(),
                         stated: stated.bits_per_second(),
                     };
-                    (ill, Cause::Rate { found, stated })
+                    (ill, Cause::AsAtRate { found })
                 }
-                Pace::Late(late) => (Unhealthy::Late { late }, Cause::HeldUp),
-                Pace::AsSent => continue,
+                RingPace::Late(late) => (Unhealthy::Late { late }, Cause::HeldUp),
+                RingPace::AsSent => continue,
             };
             return Err(SessionError::Ill {
                 rig: self.rig.id().to_owned(),
