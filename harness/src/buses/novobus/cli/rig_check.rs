@@ -159,10 +159,7 @@ fn text(rig: &Rig, figures: &Figures) -> String {
 
 fn late_of(ring: &RingFigures) -> String {
     ring.late.map_or(String::new(), |late| {
-        format!(
-            ", held up on the way: the last one came {} ms late, which `time_tolerance` permits",
-            ms(late)
-        )
+        format!(", and the last one of 256 came {} ms late", ms(late))
     })
 }
 

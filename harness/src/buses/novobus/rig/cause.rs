@@ -121,8 +121,13 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     }
     let [one, other] = [0, 1].map(|pass: usize| pace_of(&heard.passes[pass], stated));
     let pace = one.or_faster(other, stated);
+    // The same damage each time follows from the bytes, and noise does not.
+    let mostly_damaged = [&first, &second].map(|bytes| 2 * damaged(bytes) >= bytes.len());
     if let RingPace::Slower(found) = pace {
-        return Cause::AsAtRate { found };
+        return match mostly_damaged {
+            [true, true] => Cause::Rate { found, stated },
+            _ => Cause::AsAtRate { found },
+        };
     }
     if let (true, Unhealthy::Size { found, stated }) = (clean(&first) && clean(&second), ill) {
         return Cause::Count {
@@ -141,9 +146,7 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
         }
         return Cause::NoCommands;
     }
-    // The same damage each time follows from the bytes, and noise does not.
-    let mostly_damaged = 2 * damaged(&first) >= first.len();
-    if first == second || (mostly_damaged && 2 * damaged(&second) >= second.len()) {
+    if first == second || mostly_damaged == [true, true] {
         Cause::RateOrParity
     } else {
         Cause::Noise
@@ -264,9 +267,15 @@ mod tests {
 
     #[test]
     fn a_ring_at_another_rate_is_told_its_rate() {
-        let heard = listen(&mut ring("19200"), 0);
+        let mut heard = listen(&mut ring("19200"), 0);
         let found = Rate::Baud19200;
         assert_eq!(named(&FOREIGN(), &heard), Cause::AsAtRate { found });
+        // Damaged bytes as far apart show that the rate is another one.
+        for (_, byte) in heard.passes.iter_mut().flatten() {
+            *byte = Received::bad(0x78, LineError::Framing);
+        }
+        let stated = Rate::Baud38400;
+        assert_eq!(named(&FOREIGN(), &heard), Cause::Rate { found, stated });
     }
 
     /// Bytes that come whole and in bursts are no sign of another rate.
