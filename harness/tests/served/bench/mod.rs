@@ -415,13 +415,14 @@ fn a_late_ring_is_told_no_rate() {
     let text = std::fs::read_to_string(&path).expect("a rig file");
     std::fs::write(&path, text.replace("marks = \"in-band\"", "")).expect("room");
     let output = desk.run(&["run"]);
-    ended(
-        &output,
-        3,
-        "bytes come back whole and later than they are sent",
+    // On a busy computer it may be as late as a ring at half the rate; then the rate is one of two causes.
+    ended(&output, 3, "bytes come back whole and");
+    ended(&output, 3, "stop other programs");
+    assert!(
+        !said(&output).contains("Next: set `line"),
+        "{}",
+        said(&output)
     );
-    ended(&output, 3, "Next: stop other programs");
-    assert!(!said(&output).contains("set `line"), "{}", said(&output));
 }
 
 /// A ring that does not open as its file says: the cause and the remedy are named (ND21 8.3, 9.9).
