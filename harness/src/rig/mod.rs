@@ -47,6 +47,6 @@ pub use watchdog::Alarm;
 
 /// Rigs with rings in use, and how they are examined and judged.
 pub use crate::buses::rings::rig::{
-    Cause, Driven, Health, Keeper, Run, Session, Unhealthy, Way, examine, figures, play_one,
+    Driven, Health, Keeper, LikelyCause, Run, Session, Unhealthy, Way, examine, figures, play_one,
 };
 pub(crate) use crate::buses::rings::rig::{judge, left_open, run, sim};

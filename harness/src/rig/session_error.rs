@@ -4,7 +4,7 @@ use super::hook::HookError;
 use super::in_use::End;
 use super::lock::LockError;
 use super::open::OpenRigError;
-use crate::rig::{Cause, Unhealthy};
+use crate::rig::{LikelyCause, Unhealthy};
 
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -82,10 +82,10 @@ pub enum SessionError {
         /// What is wrong.
         ill: Unhealthy,
         /// The likely cause, and what to do next; only known when a rig is opened.
-        cause: Option<Cause>,
+        cause: Option<LikelyCause>,
     },
 }
 
-fn likely(cause: Option<&Cause>) -> String {
+fn likely(cause: Option<&LikelyCause>) -> String {
     cause.map_or(String::new(), |cause| format!(". Likely cause: {cause}"))
 }

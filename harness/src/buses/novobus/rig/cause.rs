@@ -13,7 +13,7 @@ use harness_proto::novobus::sync::SYNCO;
 
 /// The likely cause of a ring that does not open, and what to do next.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Cause {
+pub enum LikelyCause {
     /// No byte came back.
     #[error(
         "the ring is open, a drive has no power, or this is another port. Next: check the power of every drive and the cable from drive 0 back to the bench; put the final connector on X4 of a drive in the middle to find the sound half (ND21 8.2)"
@@ -105,19 +105,19 @@ pub enum Cause {
 }
 
 /// The likely cause, from what the health check and the line test found.
-pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
+pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> LikelyCause {
     if !heard.unasked.is_empty() {
         return unasked(&heard.unasked);
     }
     if let Unhealthy::HearsItself = ill {
-        return Cause::OwnBytes;
+        return LikelyCause::OwnBytes;
     }
     let values = |pass: &Pass| -> Vec<Received> { pass.iter().map(|(_, byte)| *byte).collect() };
     let [first, second] = [values(&heard.passes[0]), values(&heard.passes[1])];
     let clean = |bytes: &[Received]| bytes.len() == SENT && bytes.iter().all(|b| b.is(SYNCO));
     let damaged = |bytes: &[Received]| bytes.iter().filter(|byte| byte.error.is_some()).count();
     if first.is_empty() && second.is_empty() {
-        return Cause::Nobody;
+        return LikelyCause::Nobody;
     }
     let [one, other] = [0, 1].map(|pass: usize| pace_of(&heard.passes[pass], stated));
     let pace = one.or_faster(other, stated);
@@ -125,12 +125,12 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     let mostly_damaged = [&first, &second].map(|bytes| 2 * damaged(bytes) >= bytes.len());
     if let RingPace::Slower(found) = pace {
         return match mostly_damaged {
-            [true, true] => Cause::Rate { found, stated },
-            _ => Cause::AsAtRate { found },
+            [true, true] => LikelyCause::Rate { found, stated },
+            _ => LikelyCause::AsAtRate { found },
         };
     }
     if let (true, Unhealthy::Size { found, stated }) = (clean(&first) && clean(&second), ill) {
-        return Cause::Count {
+        return LikelyCause::Count {
             found: *found,
             stated: *stated,
         };
@@ -138,18 +138,18 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     let most = u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX);
     let spelt = [&first, &second].map(|pass| locate(pass, most).map(|location| location.drive));
     if let (&Unhealthy::Broken(drive), _) | (_, [_, Some(drive)]) = (ill, spelt) {
-        return Cause::LinkInFront(drive);
+        return LikelyCause::LinkInFront(drive);
     }
     if clean(&first) && clean(&second) {
         if let RingPace::Late(_) = pace {
-            return Cause::HeldUp;
+            return LikelyCause::HeldUp;
         }
-        return Cause::NoCommands;
+        return LikelyCause::NoCommands;
     }
     if first == second || mostly_damaged == [true, true] {
-        Cause::RateOrParity
+        LikelyCause::RateOrParity
     } else {
-        Cause::Noise
+        LikelyCause::Noise
     }
 }
 
@@ -172,19 +172,19 @@ const fn gone(transport: Transport) -> &'static str {
 }
 
 /// The likely cause of bytes that come although nothing was sent.
-pub(crate) fn unasked(bytes: &[Received]) -> Cause {
+pub(crate) fn unasked(bytes: &[Received]) -> LikelyCause {
     if bytes.iter().all(|byte| byte.is(0)) {
-        Cause::Babbling
+        LikelyCause::Babbling
     } else if bytes.iter().all(|byte| byte.byte == 0) {
-        Cause::HeldLine
+        LikelyCause::HeldLine
     } else {
-        Cause::Noise
+        LikelyCause::Noise
     }
 }
 
 /// Rigs that differ from this one in one setting of its line, each with the cause that it proves when it opens. None where power
 /// would be switched.
-pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
+pub(crate) fn neighbours(rig: &Rig) -> Vec<(LikelyCause, Rig)> {
     let Some(first) = rig.file.rings().next().map(|ring| &ring.endpoint) else {
         return Vec::new();
     };
@@ -208,7 +208,7 @@ pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
                 Marks::None => Marks::InBand,
                 Marks::InBand => Marks::None,
             };
-            vec![(Cause::Marks { right }, with(&|end| end.marks = right))]
+            vec![(LikelyCause::Marks { right }, with(&|end| end.marks = right))]
         }
         Transport::Serial | Transport::Rfc2217 => [
             LineFormat::Baud38400,
@@ -218,7 +218,7 @@ pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
         .into_iter()
         .filter(|line| *line != first.line)
         .map(|line| {
-            let cause = Cause::Rate {
+            let cause = LikelyCause::Rate {
                 found: line.into(),
                 stated: first.line.into(),
             };
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    fn named(ill: &Unhealthy, heard: &Heard) -> Cause {
+    fn named(ill: &Unhealthy, heard: &Heard) -> LikelyCause {
         cause(ill, heard, Rate::Baud38400)
     }
 
@@ -269,13 +269,16 @@ mod tests {
     fn a_ring_at_another_rate_is_told_its_rate() {
         let mut heard = listen(&mut ring("19200"), 0);
         let found = Rate::Baud19200;
-        assert_eq!(named(&FOREIGN(), &heard), Cause::AsAtRate { found });
+        assert_eq!(named(&FOREIGN(), &heard), LikelyCause::AsAtRate { found });
         // Damaged bytes as far apart show that the rate is another one.
         for (_, byte) in heard.passes.iter_mut().flatten() {
             *byte = Received::bad(0x78, LineError::Framing);
         }
         let stated = Rate::Baud38400;
-        assert_eq!(named(&FOREIGN(), &heard), Cause::Rate { found, stated });
+        assert_eq!(
+            named(&FOREIGN(), &heard),
+            LikelyCause::Rate { found, stated }
+        );
     }
 
     /// Bytes that come whole and in bursts are no sign of another rate.
@@ -287,45 +290,48 @@ mod tests {
                 *at += Span::from_millis(8) * (n / 20);
             }
         }
-        assert_eq!(named(&FOREIGN(), &heard), Cause::HeldUp);
+        assert_eq!(named(&FOREIGN(), &heard), LikelyCause::HeldUp);
     }
 
     #[test]
     fn a_sound_ring_is_not_blamed_for_its_rate_or_for_noise() {
         let heard = listen(&mut ring("38400"), 0);
-        assert_eq!(named(&FOREIGN(), &heard), Cause::NoCommands);
+        assert_eq!(named(&FOREIGN(), &heard), LikelyCause::NoCommands);
         let ill = Unhealthy::Size {
             found: 3,
             stated: 4,
         };
         let (found, stated) = (3, 4);
-        assert_eq!(named(&ill, &heard), Cause::Count { found, stated });
+        assert_eq!(named(&ill, &heard), LikelyCause::Count { found, stated });
     }
 
     #[test]
     fn every_way_not_to_open_has_a_cause() {
         let nothing = heard(Vec::new(), Vec::new());
-        assert_eq!(named(&Unhealthy::Silent, &nothing), Cause::Nobody);
+        assert_eq!(named(&Unhealthy::Silent, &nothing), LikelyCause::Nobody);
 
         let unasked = |bytes: &[u8]| Heard {
             unasked: bytes.iter().copied().map(Received::good).collect(),
             ..Heard::default()
         };
-        assert_eq!(named(&FOREIGN(), &unasked(&[0; 9])), Cause::Babbling);
-        assert_eq!(named(&FOREIGN(), &unasked(&[0, 0x55, 0])), Cause::Noise);
+        assert_eq!(named(&FOREIGN(), &unasked(&[0; 9])), LikelyCause::Babbling);
+        assert_eq!(
+            named(&FOREIGN(), &unasked(&[0, 0x55, 0])),
+            LikelyCause::Noise
+        );
         let held = Heard {
             unasked: vec![Received::bad(0, LineError::Framing); 9],
             ..Heard::default()
         };
-        assert_eq!(named(&FOREIGN(), &held), Cause::HeldLine);
+        assert_eq!(named(&FOREIGN(), &held), LikelyCause::HeldLine);
 
         let damaged = |byte: u8| vec![Received::bad(byte, LineError::Framing); SENT / 2];
         let other_rate = heard(damaged(0x78), damaged(0x78));
-        assert_eq!(named(&FOREIGN(), &other_rate), Cause::RateOrParity);
+        assert_eq!(named(&FOREIGN(), &other_rate), LikelyCause::RateOrParity);
         // Without marks the same bytes come back each time, and they are not SYNCO.
         let wrong = |byte: u8| vec![Received::good(byte); SENT / 2];
         let unmarked = heard(wrong(0xE6), wrong(0xE6));
-        assert_eq!(named(&FOREIGN(), &unmarked), Cause::RateOrParity);
+        assert_eq!(named(&FOREIGN(), &unmarked), LikelyCause::RateOrParity);
 
         let noise = |seed: u8| -> Vec<Received> {
             (0..200u8)
@@ -336,7 +342,10 @@ mod tests {
             found: 124,
             stated: 3,
         };
-        assert_eq!(named(&ill, &heard(noise(37), noise(91))), Cause::Noise);
+        assert_eq!(
+            named(&ill, &heard(noise(37), noise(91))),
+            LikelyCause::Noise
+        );
 
         let address = |k: u8| {
             let zeros = std::iter::repeat_n(Received::good(0), 20);
@@ -345,8 +354,11 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let spelt = heard(address(1), address(1));
-        assert_eq!(named(&FOREIGN(), &spelt), Cause::LinkInFront(1));
-        assert_eq!(named(&Unhealthy::Broken(2), &spelt), Cause::LinkInFront(2));
+        assert_eq!(named(&FOREIGN(), &spelt), LikelyCause::LinkInFront(1));
+        assert_eq!(
+            named(&Unhealthy::Broken(2), &spelt),
+            LikelyCause::LinkInFront(2)
+        );
     }
 
     #[test]
@@ -360,7 +372,7 @@ mod tests {
         let found = neighbours(&rig(tcp, "[hooks.before]\ncommand = [\"true\"]\n"));
         let right = Marks::InBand;
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].0, Cause::Marks { right });
+        assert_eq!(found[0].0, LikelyCause::Marks { right });
         assert_eq!(
             found[0]
                 .1

@@ -16,7 +16,7 @@ pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;
 
-pub use cause::Cause;
+pub use cause::LikelyCause;
 pub use condition::InterlockCondition;
 pub use driven::Driven;
 pub use health::{Health, Unhealthy, examine};

@@ -1,6 +1,6 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
-use super::cause::{self, Cause};
+use super::cause::{self, LikelyCause};
 use super::health::{self, Health, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
@@ -83,7 +83,7 @@ impl Session {
     }
 
     /// The cause that a rig file with one other setting proves by opening the ring.
-    fn cause_by_neighbour(rig: &Rig, options: &Options) -> Option<Cause> {
+    fn cause_by_neighbour(rig: &Rig, options: &Options) -> Option<LikelyCause> {
         let plain = Options {
             ill_as_well: false,
             allow_motion: false,
@@ -317,7 +317,7 @@ impl Session {
                 let transport = self.rig.file.rings().nth(ring - 1);
                 let transport = transport.map(|ring| ring.endpoint.transport);
                 let cause = match self.link.trouble() {
-                    Some(Trouble::Lost(_)) => transport.map(Cause::Gone),
+                    Some(Trouble::Lost(_)) => transport.map(LikelyCause::Gone),
                     Some(_) => None,
                     None => {
                         self.settle();
@@ -352,9 +352,9 @@ impl Session {
                         found: found.bits_per_second(),
                         stated: stated.bits_per_second(),
                     };
-                    (ill, Cause::AsAtRate { found })
+                    (ill, LikelyCause::AsAtRate { found })
                 }
-                RingPace::Late(late) => (Unhealthy::Late { late }, Cause::HeldUp),
+                RingPace::Late(late) => (Unhealthy::Late { late }, LikelyCause::HeldUp),
                 RingPace::AsSent => continue,
             };
             return Err(SessionError::Ill {
