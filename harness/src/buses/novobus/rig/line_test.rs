@@ -224,7 +224,7 @@ pub(super) mod tests {
         assert_eq!(pace(&mut link, 0, Rate::Baud19200), RingPace::AsSent);
     }
 
-    /// A pass whose n-th gap is so many microseconds long.
+    /// A pass with gaps of this length, in microseconds.
     fn pass_of(gap: impl Fn(u64) -> u64) -> Pass {
         let mut at = Instant::START;
         let bytes = (0..SENT as u64).map(|n| {
