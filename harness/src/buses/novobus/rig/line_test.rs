@@ -243,9 +243,12 @@ pub(super) mod tests {
         let half = RingPace::Slower(Rate::Baud19200);
         assert_eq!(found(&|_| 286), RingPace::AsSent);
         assert_eq!(found(&|_| 573), half);
-        assert_eq!(found(&|n| if n % 2 == 0 { 540 } else { 606 }), half);
+        assert_eq!(
+            found(&|n| if n.is_multiple_of(2) { 540 } else { 606 }),
+            half
+        );
         // A server that collects bytes for some milliseconds.
-        let collected = |n: u64| if n % 8 == 0 { 8 * 573 } else { 0 };
+        let collected = |n: u64| if n.is_multiple_of(8) { 8 * 573 } else { 0 };
         assert_eq!(found(&collected), half);
         assert_eq!(found(&|_| 1_146), RingPace::Slower(Rate::Baud9600));
         assert_eq!(found(&|_| 286 * 13 / 10), RingPace::AsSent);
@@ -253,14 +256,14 @@ pub(super) mod tests {
             matches!(found(&|_| 286 * 17 / 10), RingPace::Late(late) if late > Span::from_millis(50))
         );
         let bursts = |n: u64| {
-            if n % 40 == 0 {
+            if n.is_multiple_of(40) {
                 40 * 573 - 39 * 286
             } else {
                 286
             }
         };
         assert!(matches!(found(&bursts), RingPace::Late(_)));
-        let stalls = |n: u64| if n % 32 == 0 { 18_000 } else { 286 };
+        let stalls = |n: u64| if n.is_multiple_of(32) { 18_000 } else { 286 };
         assert!(matches!(found(&stalls), RingPace::Late(_)));
     }
 
