@@ -32,7 +32,7 @@ macro_rules! counters {
         static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
             [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
 
-        #[derive(Debug, Default)]
+        #[derive(Clone, Debug, Default)]
         struct Counters;
 
         impl harness_sim::novobus::transitions::Notes for Counters {

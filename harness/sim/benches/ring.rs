@@ -95,6 +95,7 @@ fn repeater(bencher: divan::Bencher<'_, '_>, drives: u64) {
     measure(bencher, drives, &[], &bytes, |_| Repeater);
 }
 
+#[derive(Clone)]
 struct Repeater;
 
 impl Device for Repeater {

@@ -5,6 +5,7 @@
 //! [`BusEnd::deadline`], and call [`BusEnd::handle_deadline`] when it has come. The
 //! line carries one byte at a time; the caller keeps the outgoing bytes in order.
 
+mod relay;
 mod view;
 
 use super::address::{ADDRESSED, passed_on};
@@ -20,6 +21,7 @@ use crate::nd21;
 use crate::time::Instant;
 
 pub use super::parameter_channel::Parameter;
+pub use relay::Relay;
 pub use view::{Remaining, Silent};
 
 /// What a drive does about a byte or a deadline.

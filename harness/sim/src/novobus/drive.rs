@@ -7,7 +7,7 @@ use crate::novobus::device::Device;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::witness::Witness;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction, Relay};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::time::{Instant, Span};
@@ -233,5 +233,17 @@ impl Device for Drive {
 
     fn head_start(&self) -> Span {
         each!(self, drive => drive.head_start())
+    }
+
+    fn relay(&self) -> Option<Relay> {
+        each!(self, drive => drive.relay())
+    }
+
+    fn answer(&mut self, now: Instant, byte: u8) -> Reaction {
+        each!(self, drive => drive.answer(now, byte))
+    }
+
+    fn has_relayed(&mut self, at: Instant, relay: Relay) {
+        each!(self, drive => drive.has_relayed(at, relay));
     }
 }

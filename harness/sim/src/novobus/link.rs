@@ -69,10 +69,14 @@ impl Link {
         };
     }
 
-    /// Everything that this link has carried, in order; empty where nothing is recorded.
-    #[must_use]
-    pub fn log(&self) -> impl ExactSizeIterator<Item = LineByte> + Clone + '_ {
-        self.bytes.log()
+    /// How many bytes it has carried that are recorded.
+    pub(crate) fn logged(&self) -> usize {
+        self.bytes.logged()
+    }
+
+    /// One of them, in order.
+    pub(crate) fn logged_byte(&self, index: usize) -> Option<LineByte> {
+        self.bytes.logged_byte(index)
     }
 
     /// Reserves room for this number of bytes.
@@ -91,7 +95,9 @@ impl Link {
 
     /// Returns the bytes recorded since the last call.
     pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
-        let log = self.bytes.log().collect();
+        let log = (0..self.logged())
+            .filter_map(|index| self.logged_byte(index))
+            .collect();
         self.bytes.forget_arrived();
         log
     }
@@ -382,5 +388,67 @@ impl Link {
         let byte = self.bytes.take()?;
         self.arrived += 1;
         Some(byte.unpack())
+    }
+
+    /// The next byte to arrive.
+    #[inline]
+    pub(crate) fn peek(&self) -> Option<UnderWay> {
+        self.bytes.peek()
+    }
+
+    /// Takes the next byte and keeps it, so that it can be [given back](Self::give_back) until [`Self::forget_spent`].
+    #[inline]
+    pub(crate) fn take_and_keep(&mut self) {
+        self.bytes.advance(1);
+        self.arrived += 1;
+    }
+
+    /// Puts the last bytes that were taken back on the wire.
+    pub(crate) fn give_back(&mut self, count: usize) {
+        self.bytes.give_back(count);
+        self.arrived -= count as u64;
+    }
+
+    /// Forgets bytes that were kept.
+    pub(crate) fn forget_spent(&mut self) {
+        self.bytes.forget_spent();
+    }
+
+    pub(crate) const fn is_recording(&self) -> bool {
+        self.bytes.is_recording()
+    }
+
+    pub(crate) const fn byte_time(&self) -> Span {
+        self.byte_time
+    }
+
+    /// Whether a byte sent from `now` on arrives a byte time later, and none is under way.
+    pub(crate) fn is_idle(&self, now: Instant) -> bool {
+        self.sound
+            && !self.cut
+            && self.line_free <= now
+            && self.last_arrival <= now
+            && self.held_until <= now
+            && self.bytes.under_way().is_empty()
+    }
+
+    /// Makes up for bytes that it has carried meanwhile: those of `bytes` that have arrived are recorded, the others are under way.
+    /// Of all, `sent` were sent and `arrived` have arrived; the line is free from `line_free` on.
+    pub(crate) fn catch_up(
+        &mut self,
+        bytes: impl Iterator<Item = UnderWay>,
+        (sent, arrived): (usize, usize),
+        line_free: Option<Instant>,
+    ) {
+        bytes.for_each(|byte| self.bytes.push(byte));
+        if self.is_recording() {
+            self.bytes.advance(arrived);
+        }
+        self.transmitted += sent as u64;
+        self.arrived += arrived as u64;
+        if let Some(at) = line_free {
+            self.line_free = at;
+            self.last_arrival = at;
+        }
     }
 }

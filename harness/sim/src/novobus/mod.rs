@@ -13,6 +13,7 @@ pub mod deviation;
 pub mod device;
 pub mod drive;
 pub mod fuzz;
+mod group;
 pub mod link;
 pub mod mark;
 pub mod master;

@@ -5,7 +5,7 @@ use crate::novobus::device::Device;
 use crate::novobus::link::Link;
 use crate::novobus::mark::bits;
 use crate::record::Remark;
-use harness_proto::novobus::bus_end::{Deadline, Reaction};
+use harness_proto::novobus::bus_end::{Deadline, Reaction, Relay};
 use harness_proto::time::{Instant, Span};
 
 /// A device in its place in the ring.
@@ -182,7 +182,7 @@ impl<D: Device> Node<D> {
         self.finish(step, now, solicited, received, outbound);
     }
 
-    #[inline]
+    #[inline(always)]
     fn finish(
         &mut self,
         step: Reaction,
@@ -194,14 +194,43 @@ impl<D: Device> Node<D> {
         if let Some(byte) = step.byte {
             outbound.transmit(now - self.head_start, self.stuck.unwrap_or(byte), solicited);
         }
+        self.remark(step, now, received, outbound.transmitted());
+    }
+
+    #[inline(always)]
+    fn remark(&mut self, step: Reaction, now: Instant, received: u64, sent: u64) {
         if self.recording && !step.marks.is_empty() {
             self.remarks.push(Remark {
                 station: self.drive,
                 piece: received,
-                answered_as: step.byte.map(|_| outbound.transmitted()),
+                answered_as: step.byte.map(|_| sent),
                 at: now,
                 bits: bits(step.marks, self.device.cause()),
             });
         }
+    }
+
+    /// What the device keeps of bytes that it only passes on; `None` where something of this place must see each byte.
+    pub(crate) fn relay(&self) -> Option<Relay> {
+        let whole = self.powered && self.stuck.is_none() && self.head_start == Span::ZERO;
+        if !whole || self.plan.waiting().next().is_some() {
+            return None;
+        }
+        self.device.relay()
+    }
+
+    /// The answer to a byte that arrives at `now`, the `received`-th; the answer is the `sent`-th that goes out. The caller transmits it.
+    #[inline(never)]
+    pub(crate) fn answer(
+        &mut self,
+        now: Instant,
+        byte: u8,
+        received: u64,
+        sent: u64,
+    ) -> Option<u8> {
+        self.device.advance(now);
+        let step = self.device.answer(now, byte);
+        self.remark(step, now, received, sent);
+        step.byte
     }
 }

@@ -3,7 +3,8 @@
 use crate::novobus::cells::Cells;
 use crate::novobus::device::Device;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction, Relay};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
@@ -96,5 +97,23 @@ impl Device for PlainDrive {
 
     fn cause(&self) -> Option<BusError> {
         self.bus_end.cause()
+    }
+
+    fn relay(&self) -> Option<Relay> {
+        if self.memory.monitors_time_out() {
+            return None;
+        }
+        self.bus_end.relay(self.memory.peek(ram::BUS_ADDR))
+    }
+
+    fn answer(&mut self, now: Instant, byte: u8) -> Reaction {
+        self.bus_end.answer(now, byte, &mut self.memory)
+    }
+
+    fn has_relayed(&mut self, at: Instant, relay: Relay) {
+        self.bus_end.has_relayed(at, relay);
+        if let Some(sum) = relay.sum() {
+            self.memory.write(ram::BUS_ADDR, sum);
+        }
     }
 }

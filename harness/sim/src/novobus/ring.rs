@@ -2,10 +2,12 @@
 //!
 //! A drive sees nothing but what the one before it sends. So there is no queue of events for the whole
 //! ring: [`Ring::run_until`] walks it once, drive after drive, and each does everything that is due on
-//! its inbound link up to that time.
+//! its inbound link up to that time. Drives in a row that only pass bytes on are advanced together, as a [`Group`]; nothing but
+//! the cost shows it.
 
 use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
+use crate::novobus::group::Group;
 use crate::novobus::link::Link;
 use crate::novobus::node::Node;
 use crate::record::{Channel, LineByte, Trace};
@@ -13,9 +15,25 @@ use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
+use std::sync::OnceLock;
 
 /// How many byte times one walk covers at most: what is under way then stays in the processor's cache.
 const BYTES_A_WALK: u64 = 64;
+
+/// A byte that was neither sent nor received.
+const NO_BYTE: LineByte = LineByte {
+    at: Instant::START,
+    sent: None,
+    received: None,
+    error: None,
+    solicited: false,
+};
+
+/// Byte times between attempts to form groups. An attempt looks at each drive once, which must not show beside advancing them.
+const BYTES_AN_ATTEMPT: u64 = 256;
+
+/// Drives of groups as of now, as far as they were looked at.
+type Views<D> = OnceLock<Vec<OnceLock<Box<D>>>>;
 
 /// A ring of drives of one kind.
 #[derive(Clone, Debug)]
@@ -32,6 +50,11 @@ pub struct Ring<D> {
     now: Instant,
     /// When the master will have sent everything that it has to send.
     sent_by: Instant,
+    /// Drives that are advanced together, in the order of the ring.
+    groups: Vec<Group>,
+    /// When to look for more of them; `None` where each drive is advanced by itself.
+    next_groups: Option<Instant>,
+    views: Views<D>,
 }
 
 impl<D: Device> Ring<D> {
@@ -47,12 +70,85 @@ impl<D: Device> Ring<D> {
             inbox: VecDeque::new(),
             now: Instant::START,
             sent_by: Instant::START,
+            groups: Vec::new(),
+            next_groups: Some(Instant::START),
+            views: OnceLock::new(),
+        }
+    }
+
+    /// Advances each drive by itself from now on: the reference for the tests of groups, and much slower on a long ring.
+    pub fn advance_each(&mut self) {
+        self.end_groups(|_| true);
+        self.next_groups = None;
+    }
+
+    /// How many drives are advanced together with others at present.
+    #[must_use]
+    pub fn grouped(&self) -> usize {
+        self.groups.iter().map(|group| group.places().len()).sum()
+    }
+
+    /// Ends the groups of which this is true.
+    fn end_groups(&mut self, mut which: impl FnMut(&Group) -> bool) {
+        self.keep_views();
+        let (nodes, links, now) = (&mut self.nodes, &mut self.links, self.now);
+        self.groups.retain(|group| {
+            let ends = which(group);
+            if ends {
+                let places = group.places();
+                group.end(&mut nodes[places.clone()], &mut links[places], now);
+            }
+            !ends
+        });
+    }
+
+    /// Ends the group inside of which this link is.
+    fn free_link(&mut self, link: usize) {
+        self.end_groups(|group| group.places().skip(1).any(|place| place == link));
+    }
+
+    /// Ends the group of the drive in this place.
+    fn free_place(&mut self, place: usize) {
+        self.end_groups(|group| group.places().contains(&place));
+    }
+
+    /// Goes on with the drives as they were looked at: what they had to make up for is done once.
+    fn keep_views(&mut self) {
+        let views = self.views.take().unwrap_or_default();
+        for (node, view) in self.nodes.iter_mut().zip(views) {
+            if let Some(device) = view.into_inner() {
+                *node.device_mut() = *device;
+            }
+        }
+    }
+
+    /// Forms groups of drives that are in none.
+    #[cold]
+    fn form_groups(&mut self) {
+        let now = self.now;
+        self.next_groups = Some(now + self.byte_time() * BYTES_AN_ATTEMPT);
+        let (mut place, mut index) = (0, 0);
+        while place < self.nodes.len() {
+            let next = self.groups.get(index).map(Group::places);
+            if let Some(places) = next.clone().filter(|next| next.start == place) {
+                (place, index) = (places.end, index + 1);
+                continue;
+            }
+            let end = next.map_or(self.nodes.len(), |next| next.start);
+            let (nodes, links) = (&self.nodes[place..end], &self.links[place..=end]);
+            match Group::form(place, nodes, links, self.nodes.len(), now) {
+                Some(group) => self.groups.insert(index, group),
+                None => place += 1,
+            }
         }
     }
 
     /// Is as new again once `restart` has made each device so, but keeps room, and what is recorded and what is not: a run of many short
     /// cases does not ask for memory in each.
     pub fn restart(&mut self, mut restart: impl FnMut(&mut D)) {
+        self.groups.clear();
+        self.views = OnceLock::new();
+        self.next_groups = self.next_groups.map(|_| Instant::START);
         self.links.iter_mut().for_each(Link::restart);
         for node in &mut self.nodes {
             restart(node.device_mut());
@@ -78,17 +174,29 @@ impl<D: Device> Ring<D> {
         &self,
         link: usize,
     ) -> Option<impl ExactSizeIterator<Item = LineByte> + Clone + '_> {
-        self.links.get(link).map(Link::log)
+        let own = self.links.get(link)?;
+        let inside = |group: &&Group| group.places().skip(1).any(|place| place == link);
+        let group = self.groups.iter().find(inside);
+        let first = own.logged();
+        let count = first + group.map_or(0, |group| group.logged(link, self.now));
+        let byte = move |index: usize| match index.checked_sub(first) {
+            None => own.logged_byte(index),
+            Some(index) => group?.logged_byte(link, index),
+        };
+        // Each index is that of a byte.
+        Some((0..count).map(move |index| byte(index).unwrap_or(NO_BYTE)))
     }
 
     /// Keeps no record of bytes and marks from now on: for runs that are too long for one.
     pub fn stop_recording(&mut self) {
+        self.end_groups(|_| true);
         self.links.iter_mut().for_each(Link::stop_recording);
         self.nodes.iter_mut().for_each(Node::stop_recording);
     }
 
     /// Records what link `link` carries from now on, for [`Self::take_record`]: a tap.
     pub fn record_link(&mut self, link: usize) {
+        self.free_link(link);
         if let Some(link) = self.links.get_mut(link) {
             link.record_anew();
         }
@@ -96,6 +204,7 @@ impl<D: Device> Ring<D> {
 
     /// What link `link` has carried since the last call, as far as it was recorded.
     pub fn take_record(&mut self, link: usize) -> Vec<LineByte> {
+        self.free_link(link);
         self.links
             .get_mut(link)
             .map(Link::take_log)
@@ -105,6 +214,7 @@ impl<D: Device> Ring<D> {
     /// Cuts link `link` open: what its transmitter sends is to be fetched, and its receiver hears what is fed. Faults
     /// of the link act in front of the cut.
     pub fn open_link(&mut self, link: usize) {
+        self.free_link(link);
         if let Some(link) = self.links.get_mut(link) {
             link.open();
         }
@@ -112,6 +222,7 @@ impl<D: Device> Ring<D> {
 
     /// Feeds the receiver of an open link a byte, behind those fed before; says when it arrives.
     pub fn feed_link(&mut self, link: usize, byte: Received) -> Instant {
+        self.free_link(link);
         let now = self.now;
         let link = self.links.get_mut(link);
         link.map_or(now, |link| link.feed(now, byte))
@@ -140,6 +251,7 @@ impl<D: Device> Ring<D> {
     /// Begins another conversation. It resets the byte counts and discards records, faults whose byte has not come,
     /// and received bytes that were not fetched. Time and drives go on.
     pub fn begin(&mut self) {
+        self.end_groups(|_| true);
         self.links.iter_mut().for_each(Link::begin);
         self.nodes.iter_mut().for_each(Node::begin);
         self.inbox.clear();
@@ -172,12 +284,25 @@ impl<D: Device> Ring<D> {
     /// Drive `k`, if the ring has it.
     #[must_use]
     pub fn drive(&self, k: u8) -> Option<&D> {
-        Some(self.nodes.get(self.place(k)?)?.device())
+        let place = self.place(k)?;
+        let device = self.nodes.get(place)?.device();
+        let inside = |group: &&Group| group.places().contains(&place);
+        let Some(group) = self.groups.iter().find(inside) else {
+            return Some(device);
+        };
+        let views = || vec![OnceLock::new(); self.nodes.len()];
+        let view = self.views.get_or_init(views).get(place)?;
+        Some(view.get_or_init(|| {
+            let mut device = Box::new(device.clone());
+            group.show(place, self.now, &mut *device);
+            device
+        }))
     }
 
     /// Drive `k`, if the ring has it.
     pub fn drive_mut(&mut self, k: u8) -> Option<&mut D> {
         let place = self.place(k)?;
+        self.free_place(place);
         Some(self.nodes.get_mut(place)?.device_mut())
     }
 
@@ -214,6 +339,7 @@ impl<D: Device> Ring<D> {
 
     /// Arms a fault for the `byte`-th byte on link `link` (0 is the master's outgoing one).
     pub fn arm_link(&mut self, link: usize, byte: u64, fault: LinkFault) {
+        self.free_link(link);
         if let Some(link) = self.links.get_mut(link) {
             link.arm(byte, fault);
         }
@@ -222,6 +348,7 @@ impl<D: Device> Ring<D> {
     /// Arms a fault for the `byte`-th byte on drive `k`'s inbound link, lost ones included.
     pub fn arm_drive(&mut self, k: u8, byte: u64, fault: DriveFault) {
         if let Some(place) = self.place(k) {
+            self.free_place(place);
             self.nodes[place].arm(byte, fault);
         }
     }
@@ -237,6 +364,7 @@ impl<D: Device> Ring<D> {
     /// Lets a fault happen to link `link` now. A fault that needs a byte waits for the next one.
     pub fn suffer_link(&mut self, link: usize, fault: LinkFault) {
         let now = self.now;
+        self.free_link(link);
         let Some(link) = self.links.get_mut(link) else {
             return;
         };
@@ -251,6 +379,7 @@ impl<D: Device> Ring<D> {
     /// Lets a fault happen to drive `k` now.
     pub fn suffer_drive(&mut self, k: u8, fault: DriveFault) {
         if let Some(place) = self.place(k) {
+            self.free_place(place);
             self.nodes[place].suffer(fault, self.now, &mut self.links[place + 1]);
         }
     }
@@ -275,7 +404,24 @@ impl<D: Device> Ring<D> {
     /// Whether something is still under way that goes back to a byte of the master's.
     #[must_use]
     pub fn busy(&self) -> bool {
-        !self.outbox.is_empty() || self.links.iter().any(Link::carries_solicited)
+        let grouped = self.groups.iter().any(Group::busy);
+        grouped
+            || !self.outbox.is_empty()
+            || self
+                .outer()
+                .any(|link| self.links[link].carries_solicited())
+    }
+
+    /// The links that are not inside of a group, by the place to which they lead.
+    fn outer(&self) -> impl Iterator<Item = usize> + '_ {
+        let mut groups = self.groups.iter().map(Group::places).peekable();
+        let mut place = 0;
+        std::iter::from_fn(move || {
+            let own = place;
+            let group = groups.next_if(|group| group.start == own);
+            place = group.map_or(own + 1, |group| group.end);
+            (own < self.links.len()).then_some(own)
+        })
     }
 
     /// When something happens next; `None` when nothing ever will unless the master sends.
@@ -285,17 +431,23 @@ impl<D: Device> Ring<D> {
             (*at).max(self.links[0].line_free()).max(self.now)
         });
         let to_master = self.links.last().map_or(Instant::NEVER, Link::next_arrival);
-        let next = self
-            .nodes
-            .iter()
-            .zip(self.links.windows(2))
-            .map(|(node, links)| node.next_event(&links[0], &links[1]))
+        // A drive in a group has no deadline.
+        let of_nodes = self.outer().filter_map(|place| {
+            let [inbound, outbound] = self.links.get(place..place + 2)? else {
+                return None;
+            };
+            Some(self.nodes[place].next_event(inbound, outbound))
+        });
+        let of_groups = self.groups.iter().map(|group| group.next_arrival(self.now));
+        let next = of_nodes
+            .chain(of_groups)
             .fold(master.min(to_master), Instant::min);
         (next < Instant::NEVER).then_some(next)
     }
 
     /// Lets everything happen up to and including `until`.
     pub fn run_until(&mut self, until: Instant) {
+        self.keep_views();
         let mut walked = self.now;
         while let Some(next) = self.next_event().filter(|&next| next <= until) {
             walked = until.min(next + self.byte_time() * BYTES_A_WALK);
@@ -310,10 +462,26 @@ impl<D: Device> Ring<D> {
 
     /// Walks the ring once: every drive does all that is due up to `until`.
     fn walk(&mut self, until: Instant) {
+        if self.next_groups.is_some_and(|at| at <= self.now) {
+            self.form_groups();
+        }
         self.feed(until);
-        for i in 0..self.nodes.len() {
-            if let [inbound, outbound] = &mut self.links[i..i + 2] {
-                self.nodes[i].run(inbound, outbound, until);
+        let (mut place, mut index) = (0, 0);
+        while place < self.nodes.len() {
+            let group = self.groups.get_mut(index);
+            if let Some(group) = group.filter(|group| group.places().start == place) {
+                let places = group.places();
+                let nodes = &mut self.nodes[places.clone()];
+                let links = &mut self.links[place..=places.end];
+                match group.run(nodes, links, until) {
+                    Ok(()) => (place, index) = (places.end, index + 1),
+                    Err(end) => self.groups.remove(index).end(nodes, links, end),
+                }
+            } else {
+                if let [inbound, outbound] = &mut self.links[place..place + 2] {
+                    self.nodes[place].run(inbound, outbound, until);
+                }
+                place += 1;
             }
         }
         if let Some(last) = self.links.last_mut() {
@@ -341,7 +509,8 @@ impl<D: Device> Ring<D> {
     /// How many bytes all links together have carried.
     #[must_use]
     pub fn carried(&self) -> u64 {
-        self.links.iter().map(Link::arrived).sum()
+        let grouped = self.groups.iter().map(|group| group.carried(self.now));
+        self.links.iter().map(Link::arrived).chain(grouped).sum()
     }
 
     /// What has happened so far.
@@ -349,9 +518,10 @@ impl<D: Device> Ring<D> {
     pub fn trace(&self) -> Trace {
         let drives = self.size.drives();
         let end = |place: usize| u8::try_from(place).ok().and_then(|p| drives.checked_sub(p));
-        let channels = self.links.iter().enumerate().map(|(i, link)| {
+        let channels = (0..self.links.len()).map(|i| {
             let from = end(i).filter(|&k| k < drives);
-            Channel::of_octets(from, end(i + 1), link.log().collect())
+            let carried = self.carried_by(i).into_iter().flatten();
+            Channel::of_octets(from, end(i + 1), carried.collect())
         });
         let remarks = self.nodes.iter().flat_map(|node| node.remarks().to_vec());
         let mut remarks: Vec<_> = remarks.collect();

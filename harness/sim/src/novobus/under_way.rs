@@ -68,6 +68,13 @@ impl UnderWay {
         }
     }
 
+    /// The byte, where it arrives as it was sent and goes back to one of the master's.
+    #[inline]
+    pub(crate) fn plain(self) -> Option<u8> {
+        let [_, received, ..] = self.word.to_le_bytes();
+        (self.word == Self::whole(self.at, received, true).word).then_some(received)
+    }
+
     #[inline]
     pub(crate) fn solicited(self) -> bool {
         self.word & Self::SOLICITED != 0
@@ -119,10 +126,15 @@ impl Bytes {
         self.arrived = 0;
     }
 
-    /// Those that have arrived, as far as they are recorded.
-    pub(crate) fn log(&self) -> impl ExactSizeIterator<Item = LineByte> + Clone + '_ {
-        let recorded = if self.recording { self.arrived } else { 0 };
-        self.bytes[..recorded].iter().map(|byte| byte.unpack())
+    /// How many that have arrived are recorded.
+    pub(crate) const fn logged(&self) -> usize {
+        if self.recording { self.arrived } else { 0 }
+    }
+
+    /// One of them.
+    #[inline]
+    pub(crate) fn logged_byte(&self, index: usize) -> Option<LineByte> {
+        self.bytes.get(index).map(|byte| byte.unpack())
     }
 
     /// Makes room.
@@ -167,9 +179,37 @@ impl Bytes {
     pub(crate) fn take(&mut self) -> Option<UnderWay> {
         let byte = *self.bytes.get(self.arrived)?;
         self.arrived += 1;
+        self.forget_spent();
+        Some(byte)
+    }
+
+    /// The next one that arrives.
+    #[inline]
+    pub(crate) fn peek(&self) -> Option<UnderWay> {
+        self.bytes.get(self.arrived).copied()
+    }
+
+    /// Counts this many more as arrived, without forgetting any.
+    #[inline]
+    pub(crate) fn advance(&mut self, count: usize) {
+        self.arrived += count;
+    }
+
+    /// The last ones to arrive have not arrived after all. They must not have been forgotten.
+    pub(crate) fn give_back(&mut self, count: usize) {
+        self.arrived -= count;
+    }
+
+    /// Forgets those that have arrived where no record is kept and there are many.
+    #[inline]
+    pub(crate) fn forget_spent(&mut self) {
         if !self.recording && self.arrived >= Self::SPENT && self.arrived * 2 >= self.bytes.len() {
             self.forget_arrived();
         }
-        Some(byte)
+    }
+
+    /// Whether those that arrive are recorded.
+    pub(crate) const fn is_recording(&self) -> bool {
+        self.recording
     }
 }

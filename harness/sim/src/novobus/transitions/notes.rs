@@ -3,7 +3,7 @@
 use super::{Reached, Transition};
 
 /// Takes down the cells of the matrix that a drive goes through.
-pub trait Notes: Default {
+pub trait Notes: Clone + Default {
     /// A cell has been reached.
     fn note(&mut self, cell: Transition);
 

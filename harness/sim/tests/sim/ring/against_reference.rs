@@ -131,7 +131,7 @@ fn compare(random: &mut Random, case: u64) -> Option<bool> {
     Some(trace.remarks.iter().any(|mark| mark.cause().is_some()))
 }
 
-fn fault(random: &mut Random) -> (LinkFault, reference::Fault) {
+pub(crate) fn fault(random: &mut Random) -> (LinkFault, reference::Fault) {
     let byte = random.below(256) as u8;
     match random.below(8) {
         0 => (LinkFault::Replace(byte), reference::Fault::Replace(byte)),

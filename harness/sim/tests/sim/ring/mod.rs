@@ -2,5 +2,6 @@
 
 mod against_reference;
 mod common;
+mod grouped;
 mod recovery;
 mod single_faults;

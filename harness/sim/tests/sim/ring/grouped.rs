@@ -1,0 +1,211 @@
+//! Drives that are advanced together against the same drives, each advanced by itself: the same records, times, remarks, states
+//! and cells, on random rings, telegrams, faults, silences, cuts and looks (ND21 9.1-9.9).
+
+use super::against_reference::{fault, telegram};
+use super::common::{Random, repeat, seed};
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::time::Span;
+use harness_sim::fault::{DriveFault, LinkFault};
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
+
+struct Pair {
+    grouped: Ring<PlainDrive>,
+    each: Ring<PlainDrive>,
+    drives: u8,
+}
+
+impl Pair {
+    fn new(random: &mut Random) -> Self {
+        let most = if random.below(8) == 0 { 250 } else { 24 };
+        let drives = 1 + random.below(most) as u8;
+        let monitored = random.below(10) == 0;
+        let size = RingSize::new(u64::from(drives)).expect("1 to 250");
+        let mut grouped = Ring::new(size, Rate::Baud38400, |k| {
+            let mut eeprom = [0; 256];
+            eeprom[0x47] = if monitored || k == 7 { 0x80 } else { 0 };
+            PlainDrive::new(
+                harness_proto::novobus::properties::Properties::default(),
+                eeprom,
+            )
+        });
+        if random.below(3) == 0 {
+            grouped.stop_recording();
+        }
+        let mut each = grouped.clone();
+        each.advance_each();
+        Self {
+            grouped,
+            each,
+            drives,
+        }
+    }
+
+    fn both(&mut self, act: impl Fn(&mut Ring<PlainDrive>)) {
+        act(&mut self.grouped);
+        act(&mut self.each);
+    }
+
+    fn run(&mut self, random: &mut Random) {
+        let now = self.each.now();
+        let next = self.each.next_event().unwrap_or(now);
+        let until = match random.below(5) {
+            0 | 1 => next,
+            2 => now + Span::from_units(random.below(5_000_000)),
+            3 => now + self.each.byte_time() * random.below(40),
+            _ => now + self.each.byte_time() * random.below(2 * u64::from(self.drives) + 30),
+        };
+        self.both(|ring| ring.run_until(until));
+    }
+
+    fn act(&mut self, random: &mut Random) {
+        let now = self.each.now();
+        let link = random.below(u64::from(self.drives) + 1) as usize;
+        let k = random.below(u64::from(self.drives)) as u8;
+        let byte = 1 + random.below(60);
+        match random.below(40) {
+            0..=11 => {
+                let bytes: Vec<u8> = (0..1 + random.below(6))
+                    .flat_map(|_| telegram(random, self.drives))
+                    .collect();
+                self.both(|ring| ring.send(now, &bytes));
+            }
+            12 => self.both(|ring| ring.send(now, &CHECK_SEQUENCE)),
+            13 => {
+                let bytes = [0; 30]
+                    .into_iter()
+                    .chain(CHECK_SEQUENCE)
+                    .collect::<Vec<_>>();
+                self.both(|ring| ring.send(now, &bytes));
+            }
+            14 => {
+                let fault = fault(random).0;
+                self.both(|ring| ring.arm_link(link, byte, fault));
+            }
+            15 => {
+                let faults = [
+                    LinkFault::Cut,
+                    LinkFault::Join,
+                    LinkFault::Join,
+                    LinkFault::Break(Span::from_micros(700)),
+                ];
+                let fault = faults[random.below(4) as usize];
+                self.both(|ring| ring.suffer_link(link, fault));
+            }
+            16 => {
+                let faults = [
+                    DriveFault::Off,
+                    DriveFault::On,
+                    DriveFault::Stuck(0x80),
+                    DriveFault::Unstuck,
+                ];
+                let fault = faults[random.below(4) as usize];
+                if random.below(2) == 0 {
+                    self.both(|ring| ring.suffer_drive(k, fault));
+                } else {
+                    self.both(|ring| ring.arm_drive(k, byte, fault));
+                }
+            }
+            17 if random.below(4) == 0 => self.both(Ring::begin),
+            18 => self.both(|ring| {
+                let cells = ring.drive_mut(k).expect("a drive").memory_mut();
+                assert!(cells.poke(0xFF36, 0x55));
+            }),
+            19 if random.below(4) == 0 => {
+                self.both(|ring| {
+                    ring.open_link(link);
+                    ring.feed_link(link, Received::good(0x80));
+                });
+                while let (Some(ours), theirs) =
+                    (self.grouped.fetch_link(link), self.each.fetch_link(link))
+                {
+                    assert_eq!(Some(ours), theirs);
+                }
+            }
+            20 => assert_eq!(self.grouped.take_record(link), self.each.take_record(link)),
+            21 => {
+                let mut faults = (Vec::new(), Vec::new());
+                faults.0.extend(self.grouped.unused_link_faults());
+                faults.1.extend(self.each.unused_link_faults());
+                assert_eq!(faults.0, faults.1);
+            }
+            22 => self.look(k),
+            23 => self.both(|ring| ring.record_link(link)),
+            24 if random.below(4) == 0 => self.same(),
+            25 if random.below(4) == 0 => {
+                let delay = LinkFault::Delay(Span::from_micros(random.below(2_000)));
+                self.both(|ring| ring.arm_link(link, byte, delay));
+            }
+            26 => {
+                // A loop's silence, and everything home.
+                let until =
+                    now + self.each.byte_time() * (u64::from(self.drives) + 60 + random.below(60));
+                self.both(|ring| ring.run_until(until));
+            }
+            _ => self.run(random),
+        }
+    }
+
+    fn look(&self, k: u8) {
+        let (ours, theirs) = (self.grouped.drive(k), self.each.drive(k));
+        let (ours, theirs) = (ours.expect("a drive"), theirs.expect("a drive"));
+        assert_eq!(
+            format!("{:?}", ours.bus_end()),
+            format!("{:?}", theirs.bus_end()),
+            "drive {k}"
+        );
+        assert!(ours.memory() == theirs.memory(), "cells of drive {k}");
+    }
+
+    fn same(&mut self) {
+        (0..self.drives).for_each(|k| self.look(k));
+        assert_eq!(self.grouped.trace(), self.each.trace());
+    }
+
+    fn compare(&mut self) {
+        assert_eq!(self.grouped.next_event(), self.each.next_event());
+        assert_eq!(self.grouped.next_home(), self.each.next_home());
+        assert_eq!(self.grouped.busy(), self.each.busy());
+        assert_eq!(self.grouped.carried(), self.each.carried());
+        loop {
+            let (ours, theirs) = (self.grouped.receive(), self.each.receive());
+            assert_eq!(ours, theirs);
+            if ours.is_none() {
+                return;
+            }
+        }
+    }
+}
+
+fn play(cases: u64) {
+    let mut grouped = 0;
+    for case in 0..cases {
+        let mut random = Random(seed().wrapping_mul(cases).wrapping_add(case));
+        let mut pair = Pair::new(&mut random);
+        let played = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            for _ in 0..20 + random.below(60) {
+                pair.act(&mut random);
+                pair.compare();
+                grouped += u64::from(pair.grouped.grouped() > 0);
+                assert_eq!(pair.each.grouped(), 0);
+            }
+            pair.same();
+        }));
+        assert!(played.is_ok(), "case {case}; {}", repeat("grouped"));
+    }
+    // A test without groups would show nothing.
+    assert!(grouped > 5 * cases, "{grouped} steps with groups");
+}
+
+#[test]
+fn grouped_drives_do_what_each_does_by_itself() {
+    play(1_000);
+}
+
+#[test]
+#[ignore = "minutes; the nightly run plays it"]
+fn grouped_drives_do_what_each_does_in_a_million_rings() {
+    play(1_000_000);
+}
