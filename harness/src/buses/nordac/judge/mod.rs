@@ -7,10 +7,11 @@
 mod channel;
 mod diagnosis;
 mod follower;
+mod line;
 mod symptom;
 #[cfg(test)]
 mod tests;
 
-pub(in crate::buses::nordac) use follower::judge_runs;
-pub use follower::{Breach, JudgedSlaves, judge};
+pub(in crate::buses::nordac) use line::judge_runs;
+pub use line::{Breach, JudgedSlaves, judge};
 pub use symptom::{Place, Symptom};

@@ -5,11 +5,13 @@
 //! replies are, and what a register reads that was written.
 
 mod cycle;
+mod drives;
 mod follower;
 mod held;
 mod symptom;
 #[cfg(test)]
 mod tests;
 
-pub use follower::{Breach, Follower, JudgedDrives, judge};
+pub use drives::{Breach, JudgedDrives, judge};
+pub use follower::Follower;
 pub use symptom::FrameSymptom;

@@ -1,0 +1,274 @@
+//! Follows the telegrams of a line, and judges those of its slaves.
+
+use super::follower::{Follower, Record, Way};
+use super::symptom::Place;
+use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
+use crate::buses::nordac::report::{TelegramRun, runs};
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::Image;
+use harness_proto::profibus::Telegram;
+use harness_proto::profibus::dp::Service;
+use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu};
+use harness_sim::record::Trace;
+use std::collections::BTreeMap;
+
+/// Differences that are kept at most.
+const MOST_BREACHES: usize = 50;
+
+/// What a reply to no request is about.
+const NO_REQUEST: &str = "octets that are no request";
+
+/// Something that a slave does, and that no value of what the manual leaves open explains.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Breach {
+    /// How it differs.
+    pub what: Symptom,
+    /// The number of the telegram where it shows, counted from 1 over all stations.
+    pub telegram: usize,
+    /// The slave.
+    pub slave: u8,
+    /// The service, or what it was that asked for the reply.
+    pub part: String,
+    /// The section, such as `EN 2` or `3.4.1`.
+    pub section: &'static str,
+    /// What was expected and what has come.
+    pub about: String,
+}
+
+/// What came of judging telegrams.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct JudgedSlaves {
+    /// What differs, in order.
+    pub breaches: Vec<Breach>,
+    /// Replies of slaves that were compared.
+    pub compared: usize,
+    /// What was not compared, in sentences.
+    pub remarks: Vec<String>,
+}
+
+/// A request that was understood, and its number.
+#[derive(Debug)]
+struct Asked {
+    number: usize,
+    /// `None` for octets to which no slave may reply.
+    pdu: Option<Pdu>,
+    /// Whether a slave may have read something else: two telegrams in a row.
+    doubtful: bool,
+}
+
+/// Judges what the slaves of a line sent, in a capture that may begin in mid-conversation: its first octets may be the end of a telegram,
+/// or the reply to a request that was not heard.
+#[must_use]
+pub fn judge(trace: &Trace) -> JudgedSlaves {
+    judge_from(true, runs(trace))
+}
+
+/// The same of octets that stations sent without a pause, from the first telegram of the line on.
+pub(in crate::buses::nordac) fn judge_runs(
+    runs: impl IntoIterator<Item = TelegramRun>,
+) -> JudgedSlaves {
+    judge_from(false, runs)
+}
+
+fn judge_from(midway: bool, runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
+    let mut judge = Judge {
+        midway,
+        ..Judge::default()
+    };
+    for (number, run) in (1..).zip(runs) {
+        match run.from {
+            None => judge.asks(number, &run),
+            Some(_) => judge.replies(number, &run),
+        }
+        judge.midway = false;
+    }
+    judge.finished();
+    judge.judged
+}
+
+#[derive(Debug, Default)]
+struct Judge {
+    /// Whether something was sent that was not heard, right before the next telegram.
+    midway: bool,
+    followers: BTreeMap<u8, Follower>,
+    asked: Option<Asked>,
+    judged: JudgedSlaves,
+}
+
+impl Judge {
+    fn breach(
+        &mut self,
+        (telegram, slave): (usize, u8),
+        (what, section): (Symptom, &'static str),
+        (part, about): (&str, String),
+    ) {
+        if self.judged.breaches.len() < MOST_BREACHES {
+            self.judged.breaches.push(Breach {
+                what,
+                telegram,
+                slave,
+                part: part.to_owned(),
+                section,
+                about,
+            });
+        }
+    }
+
+    fn follower(&mut self, address: u8) -> &mut Follower {
+        self.followers
+            .entry(address)
+            .or_insert_with(|| Follower::new(address))
+    }
+
+    /// A master sends.
+    fn asks(&mut self, number: usize, run: &TelegramRun) {
+        self.silent();
+        let said = run.said();
+        let decoded = said.as_ref().map(|own| Telegram::decode(&own.octets));
+        let whole = |used: usize| said.as_ref().is_some_and(|own| used == own.octets.len());
+        let sound = said.as_ref().is_some_and(|own| own.error.is_none());
+        let (pdu, doubtful) = match decoded {
+            Some(Decoded::Value { value, used }) if sound && whole(used) => {
+                (value.pdu().copied(), false)
+            }
+            Some(Decoded::Value { used, .. }) => (None, self.midway || !whole(used)),
+            _ => (None, self.midway),
+        };
+        if let Some(pdu) = &pdu {
+            self.sent(pdu);
+        } else {
+            // What was damaged may have been heard by some.
+            self.followers
+                .values_mut()
+                .for_each(|own| own.fresh = false);
+        }
+        self.asked = Some(Asked {
+            number,
+            pdu,
+            doubtful,
+        });
+    }
+
+    /// A right request: what it does before it is answered.
+    fn sent(&mut self, pdu: &Pdu) {
+        let service = Service::of(pdu.dsap());
+        if pdu.da() == BROADCAST {
+            self.followers
+                .values_mut()
+                .for_each(|own| own.fresh = false);
+            return;
+        }
+        let follower = self.follower(pdu.da());
+        let exchanges = pdu.dsap().is_none() && service == Some(Service::DataExchange);
+        let (Way::Configured { ppo: Some(ppo), .. }, true) = (follower.way, exchanges) else {
+            return;
+        };
+        if let Some(image) = Image::decode(ppo, pdu.data()) {
+            follower.tasks.push(image.pkw);
+        }
+    }
+
+    /// The last request has found no reply.
+    fn silent(&mut self) {
+        let Some(Asked {
+            number,
+            pdu: Some(pdu),
+            ..
+        }) = self.asked.take()
+        else {
+            return;
+        };
+        let answered = match pdu.fc().function() {
+            Some(Function::FdlStatus) => pdu.form() == Shape::Plain,
+            Some(function) => function.is_srd(),
+            None => false,
+        };
+        if !answered || pdu.da() == BROADCAST {
+            let counts = pdu.fc().function().is_some_and(|own| !own.is_sdn());
+            if let Some(own) = self.followers.get_mut(&pdu.da()) {
+                own.fresh = false;
+                if counts {
+                    own.record = Record::Unknown;
+                }
+            }
+            return;
+        }
+        let name = Place::of(Some(&Telegram::Pdu(pdu))).part;
+        let follower = self.follower(pdu.da());
+        follower.record = Record::Unknown;
+        follower.fresh = false;
+        // What sets the slave up may have been lost, or not.
+        if matches!(
+            Service::of(pdu.dsap()),
+            Some(Service::SetPrm | Service::ChkCfg)
+        ) {
+            follower.way = Way::Unknown;
+            follower.unanswered = None;
+            follower.exchanging = false;
+        } else if follower.exchanging && follower.unanswered.is_none() {
+            follower.unanswered = Some((number, name));
+        }
+    }
+
+    fn finished(&mut self) {
+        self.asked = None;
+        if self.judged.compared == 0 {
+            self.judged
+                .remarks
+                .push("no reply of a slave was compared".to_owned());
+        }
+    }
+
+    /// A slave sends.
+    fn replies(&mut self, number: usize, run: &TelegramRun) {
+        let asked = self.asked.take();
+        let Some(said) = run.said() else {
+            return;
+        };
+        let damaged = run
+            .octets
+            .iter()
+            .any(|own| own.sent != own.received || own.error.is_some());
+        let from = said.from.unwrap_or(0);
+        let Some(asked) = asked else {
+            if self.midway {
+                return;
+            }
+            let about = "it sends again without a request in between".to_owned();
+            return self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
+        };
+        if damaged {
+            // On the way to the master: nothing is known of it.
+            if let Some(own) = asked.pdu.and_then(|pdu| self.followers.get_mut(&pdu.da())) {
+                (own.record, own.way, own.fresh) = (Record::Unknown, Way::Unknown, false);
+            }
+            return;
+        }
+        self.judged.compared += 1;
+        let Some(request) = asked.pdu else {
+            if !asked.doubtful {
+                let about = format!(
+                    "it replies to telegram {}, which is no request",
+                    asked.number
+                );
+                self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
+            }
+            return;
+        };
+        let address = request.da();
+        let found = match said.telegram() {
+            None => Some((NoTelegram, "EN 1", "its reply is no telegram".to_owned())),
+            Some(reply) => self.follower(address).judge(&request, &reply, &said.octets),
+        };
+        let shown = self.follower(address).shown();
+        if let Some((earlier, what)) = shown {
+            let about = format!("{what} is not answered, and the slave goes on exchanging");
+            self.breach((earlier, address), (Missing, "EN 1"), (&what, about));
+        }
+        if let Some((what, section, why)) = found {
+            let place = Place::of(Some(&Telegram::Pdu(request))).part;
+            let about = format!("{place}: {why}");
+            self.breach((number, from), (what, section), (&place, about));
+        }
+    }
+}
