@@ -70,9 +70,12 @@ pub(crate) fn judged(traces: &[Trace]) -> JudgedFrames {
         differences: Vec::new(),
         remarks: Vec::new(),
     };
+    let mut in_doubt = false;
     for trace in traces {
         let judged = judge(trace);
         all.compared += judged.compared;
+        in_doubt |= !judged.doubts.is_empty();
+        all.remarks.extend(judged.doubts);
         all.remarks.extend(judged.remarks);
         let breaches = judged.breaches.into_iter();
         all.differences.extend(breaches.map(|own| {
@@ -85,6 +88,7 @@ pub(crate) fn judged(traces: &[Trace]) -> JudgedFrames {
     all.verdict = match (all.differences.is_empty(), all.compared) {
         (false, _) => Verdict::Failed,
         (true, 0) => Verdict::Inconclusive,
+        (true, _) if in_doubt => Verdict::Inconclusive,
         (true, _) => Verdict::Passed,
     };
     all

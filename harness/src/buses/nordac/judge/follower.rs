@@ -7,11 +7,14 @@ use harness_proto::nordac::{IDENT, Image, PpoType};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
 use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
+use harness_proto::time::Instant;
 
 /// The way of a slave into the exchange, as far as it was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
     Unknown,
+    /// It was switched on, and Set_Prm has not come since then.
+    Waits,
     /// Set_Prm of this master was confirmed; whether the slave must take it, and whether it has the watchdog on.
     Parametrised {
         master: u8,
@@ -37,7 +40,7 @@ pub(super) enum Record {
 }
 
 /// What the telegrams show of one slave.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Follower {
     address: u8,
     pub(super) way: Way,
@@ -49,6 +52,8 @@ pub(super) struct Follower {
     pub(super) exchanging: bool,
     /// Whether the last telegram to the slave was the one before.
     pub(super) fresh: bool,
+    /// When its last reply had ended.
+    pub(super) sent: Option<Instant>,
 }
 
 /// What differs, the section, and what was expected.
@@ -68,7 +73,25 @@ impl Follower {
             unanswered: None,
             exchanging: false,
             fresh: false,
+            sent: None,
         }
+    }
+
+    /// The same slave, switched off and on.
+    pub(super) fn restarted(&self) -> Self {
+        Self {
+            way: Way::Waits,
+            record: Record::Nothing,
+            sent: self.sent,
+            ..Self::new(self.address)
+        }
+    }
+
+    /// What sets the slave up may have been lost, or not.
+    pub(super) fn may_be_set_up(&mut self) {
+        self.way = Way::Unknown;
+        self.unanswered = None;
+        self.exchanging = false;
     }
 
     /// A request whose missing reply is proven.
@@ -264,6 +287,7 @@ impl Follower {
             {
                 same
             }
+            Way::Waits => Way::Waits,
             _ => Way::Unknown,
         };
         (!confirmed && !refused)
@@ -281,6 +305,9 @@ impl Follower {
             }
             return None;
         };
+        if self.way == Way::Waits {
+            return Some((Form, "EN 2", "RS is expected before Set_Prm".to_owned()));
+        }
         let early = matches!(self.way, Way::Parametrised { master, .. } if master == request.sa() && self.fresh);
         if early {
             return Some((Form, "EN 2", "RS is expected before Chk_Cfg".to_owned()));
@@ -347,6 +374,7 @@ impl Follower {
         }
         let of = |master: u8| own.master == Some(master);
         match self.way {
+            Way::Waits if !waits => value("Prm_Req is expected before Set_Prm".to_owned()),
             Way::Parametrised { right: false, .. }
                 if self.fresh && waits && !own.has(Diagnosis::PRM_FAULT) =>
             {

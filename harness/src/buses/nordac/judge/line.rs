@@ -1,19 +1,24 @@
 //! Follows the telegrams of a line, and judges those of its slaves.
 
+use super::doubt::Sender;
 use super::follower::{Follower, Record, Way};
 use super::symptom::Place;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
-use crate::buses::nordac::report::{TelegramRun, runs};
+use crate::buses::nordac::report::{Said, TelegramRun, runs};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::Image;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu};
+use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::BTreeMap;
 
-/// Differences that are kept at most.
+/// Differences and doubts that are kept at most.
 const MOST_BREACHES: usize = 50;
+
+/// In this time a slave can be switched off and be back.
+const RESTART: Span = Span::from_millis(300);
 
 /// What a reply to no request is about.
 const NO_REQUEST: &str = "octets that are no request";
@@ -44,6 +49,9 @@ pub struct JudgedSlaves {
     pub compared: usize,
     /// What was not compared, in sentences.
     pub remarks: Vec<String>,
+    /// What differs and may have another cause than a wrong slave, in sentences with their places: it accuses no slave, and nothing has
+    /// passed.
+    pub doubts: Vec<String>,
 }
 
 /// A request that was understood, and its number.
@@ -60,22 +68,26 @@ struct Asked {
 /// or the reply to a request that was not heard.
 #[must_use]
 pub fn judge(trace: &Trace) -> JudgedSlaves {
-    judge_from(true, runs(trace))
+    let runs = runs(trace);
+    let senders = Sender::of_all(&runs);
+    judge_from(true, runs.into_iter().zip(senders))
 }
 
 /// The same of octets that stations sent without a pause, from the first telegram of the line on.
 pub(in crate::buses::nordac) fn judge_runs(
     runs: impl IntoIterator<Item = TelegramRun>,
 ) -> JudgedSlaves {
-    judge_from(false, runs)
+    judge_from(false, runs.into_iter().map(|own| (own, Sender::Known)))
 }
 
-fn judge_from(midway: bool, runs: impl IntoIterator<Item = TelegramRun>) -> JudgedSlaves {
+fn judge_from(midway: bool, runs: impl IntoIterator<Item = (TelegramRun, Sender)>) -> JudgedSlaves {
     let mut judge = Judge {
         midway,
+        recorded: midway,
         ..Judge::default()
     };
-    for (number, run) in (1..).zip(runs) {
+    for (number, (run, sender)) in (1..).zip(runs) {
+        judge.sender = sender;
         match run.from {
             None => judge.asks(number, &run),
             Some(_) => judge.replies(number, &run),
@@ -90,7 +102,14 @@ fn judge_from(midway: bool, runs: impl IntoIterator<Item = TelegramRun>) -> Judg
 struct Judge {
     /// Whether something was sent that was not heard, right before the next telegram.
     midway: bool,
+    /// Whether the telegrams are those of a capture, which does not show a supply, and says of a telegram no more than its octets.
+    recorded: bool,
+    /// Whether the station that a telegram seems to be of has sent it.
+    sender: Sender,
     followers: BTreeMap<u8, Follower>,
+    /// What the telegrams show of each slave if it was switched off and on in its last silence in which a restart fits, and when that
+    /// began; until the slave shows that it was not.
+    restarted: BTreeMap<u8, (Instant, Follower)>,
     asked: Option<Asked>,
     judged: JudgedSlaves,
 }
@@ -102,7 +121,11 @@ impl Judge {
         (what, section): (Symptom, &'static str),
         (part, about): (&str, String),
     ) {
-        if self.judged.breaches.len() < MOST_BREACHES {
+        if let Some(why) = self.sender.doubt() {
+            self.doubt(format!(
+                "telegram {telegram}, slave {slave}: {about}; {why}"
+            ));
+        } else if self.judged.breaches.len() < MOST_BREACHES {
             self.judged.breaches.push(Breach {
                 what,
                 telegram,
@@ -112,6 +135,26 @@ impl Judge {
                 about,
             });
         }
+    }
+
+    /// Notes what accuses no slave.
+    fn doubt(&mut self, about: String) {
+        if self.judged.doubts.len() < MOST_BREACHES {
+            self.judged.doubts.push(about);
+        }
+    }
+
+    /// All followers.
+    fn all(&mut self) -> impl Iterator<Item = &mut Follower> {
+        let restarted = self.restarted.values_mut().map(|(_, own)| own);
+        self.followers.values_mut().chain(restarted)
+    }
+
+    /// Those of one slave, if it was heard.
+    fn of(&mut self, address: u8) -> impl Iterator<Item = &mut Follower> {
+        let restarted = self.restarted.get_mut(&address).map(|(_, own)| own);
+        let own = self.followers.get_mut(&address);
+        own.into_iter().chain(restarted)
     }
 
     fn follower(&mut self, address: u8) -> &mut Follower {
@@ -138,9 +181,7 @@ impl Judge {
             self.sent(pdu);
         } else {
             // What was damaged may have been heard by some.
-            self.followers
-                .values_mut()
-                .for_each(|own| own.fresh = false);
+            self.all().for_each(|own| own.fresh = false);
         }
         self.asked = Some(Asked {
             number,
@@ -153,18 +194,17 @@ impl Judge {
     fn sent(&mut self, pdu: &Pdu) {
         let service = Service::of(pdu.dsap());
         if pdu.da() == BROADCAST {
-            self.followers
-                .values_mut()
-                .for_each(|own| own.fresh = false);
+            self.all().for_each(|own| own.fresh = false);
             return;
         }
-        let follower = self.follower(pdu.da());
         let exchanges = pdu.dsap().is_none() && service == Some(Service::DataExchange);
-        let (Way::Configured { ppo: Some(ppo), .. }, true) = (follower.way, exchanges) else {
-            return;
-        };
-        if let Some(image) = Image::decode(ppo, pdu.data()) {
-            follower.tasks.push(image.pkw);
+        self.follower(pdu.da());
+        for follower in self.of(pdu.da()).filter(|_| exchanges) {
+            if let Way::Configured { ppo: Some(ppo), .. } = follower.way
+                && let Some(image) = Image::decode(ppo, pdu.data())
+            {
+                follower.tasks.push(image.pkw);
+            }
         }
     }
 
@@ -185,7 +225,7 @@ impl Judge {
         };
         if !answered || pdu.da() == BROADCAST {
             let counts = pdu.fc().function().is_some_and(|own| !own.is_sdn());
-            if let Some(own) = self.followers.get_mut(&pdu.da()) {
+            for own in self.of(pdu.da()) {
                 own.fresh = false;
                 if counts {
                     own.record = Record::Unknown;
@@ -194,19 +234,19 @@ impl Judge {
             return;
         }
         let name = Place::of(Some(&Telegram::Pdu(pdu))).part;
-        let follower = self.follower(pdu.da());
-        follower.record = Record::Unknown;
-        follower.fresh = false;
-        // What sets the slave up may have been lost, or not.
-        if matches!(
+        let sets_up = matches!(
             Service::of(pdu.dsap()),
             Some(Service::SetPrm | Service::ChkCfg)
-        ) {
-            follower.way = Way::Unknown;
-            follower.unanswered = None;
-            follower.exchanging = false;
-        } else if follower.exchanging && follower.unanswered.is_none() {
-            follower.unanswered = Some((number, name));
+        );
+        self.follower(pdu.da());
+        for follower in self.of(pdu.da()) {
+            follower.record = Record::Unknown;
+            follower.fresh = false;
+            if sets_up {
+                follower.may_be_set_up();
+            } else if follower.exchanging && follower.unanswered.is_none() {
+                follower.unanswered = Some((number, name.clone()));
+            }
         }
     }
 
@@ -239,8 +279,10 @@ impl Judge {
         };
         if damaged {
             // On the way to the master: nothing is known of it.
-            if let Some(own) = asked.pdu.and_then(|pdu| self.followers.get_mut(&pdu.da())) {
-                (own.record, own.way, own.fresh) = (Record::Unknown, Way::Unknown, false);
+            if let Some(pdu) = &asked.pdu {
+                for own in self.of(pdu.da()) {
+                    (own.record, own.way, own.fresh) = (Record::Unknown, Way::Unknown, false);
+                }
             }
             return;
         }
@@ -256,11 +298,28 @@ impl Judge {
             return;
         };
         let address = request.da();
-        let found = match said.telegram() {
+        self.comes(address, said.at);
+        let reply = said.telegram();
+        let follower = self.follower(address);
+        let found = match &reply {
             None => Some((NoTelegram, "EN 1", "its reply is no telegram".to_owned())),
-            Some(reply) => self.follower(address).judge(&request, &reply, &said.octets),
+            Some(reply) => follower.judge(&request, reply, &said.octets),
         };
-        let shown = self.follower(address).shown();
+        let shown = follower.shown();
+        let why = found.as_ref().map(|own| &own.2);
+        let why = why.or(shown.as_ref().map(|own| &own.1));
+        if let Some((silent, restarted)) = self.explained(&request, &said) {
+            let Some(why) = why else {
+                self.restarted.insert(address, (silent, restarted));
+                return;
+            };
+            self.doubt(format!(
+                "telegram {number}, slave {address}: {why}; its supply may have been switched off and on in the silence from {} on, which explains it",
+                silent.since_start()
+            ));
+            self.followers.insert(address, restarted);
+            return;
+        }
         if let Some((earlier, what)) = shown {
             let about = format!("{what} is not answered, and the slave goes on exchanging");
             self.breach((earlier, address), (Missing, "EN 1"), (&what, about));
@@ -270,5 +329,25 @@ impl Judge {
             let about = format!("{place}: {why}");
             self.breach((number, from), (what, section), (&place, about));
         }
+    }
+
+    /// A slave replies at `at`: in a capture, a long silence behind its last reply may have been one without supply.
+    fn comes(&mut self, address: u8, at: Instant) {
+        let recorded = self.recorded;
+        let follower = self.follower(address);
+        let last = follower.sent.replace(at);
+        let silent = last.filter(|last| recorded && at.since(*last) >= RESTART);
+        if let Some(silent) = silent {
+            let restarted = follower.restarted();
+            self.restarted.insert(address, (silent, restarted));
+        }
+    }
+
+    /// The slave that replies, switched off and on in its last silence, if it can have sent this; it was not switched off if it cannot.
+    fn explained(&mut self, request: &Pdu, said: &Said) -> Option<(Instant, Follower)> {
+        let (silent, mut restarted) = self.restarted.remove(&request.da())?;
+        let reply = said.telegram()?;
+        let found = restarted.judge(request, &reply, &said.octets);
+        (found.is_none() && restarted.shown().is_none()).then_some((silent, restarted))
     }
 }

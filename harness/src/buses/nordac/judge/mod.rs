@@ -6,6 +6,7 @@
 
 mod channel;
 mod diagnosis;
+mod doubt;
 mod follower;
 mod line;
 mod symptom;

@@ -12,9 +12,9 @@ mod telegrams;
 mod words;
 
 pub use telegrams::TelegramRun;
-pub(super) use telegrams::octets;
 pub(crate) use telegrams::runs;
 pub use telegrams::{Said, said};
+pub(super) use telegrams::{octet_time, octets};
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 
