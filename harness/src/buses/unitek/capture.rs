@@ -114,6 +114,8 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
         )
     };
     let mut remarks = judged.remarks;
+    let in_doubt = !judged.doubts.is_empty();
+    remarks.extend(judged.doubts);
     if judged.compared == 0 {
         remarks.push("nothing was compared: no frame of a drive is in it".to_owned());
     }
@@ -121,6 +123,7 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
         verdict: match (judged.breaches.is_empty(), judged.compared) {
             (false, _) => Verdict::Failed,
             (true, 0) => Verdict::Inconclusive,
+            (true, _) if in_doubt => Verdict::Inconclusive,
             (true, _) => Verdict::Passed,
         },
         compared: judged.compared,

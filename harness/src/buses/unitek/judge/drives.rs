@@ -1,10 +1,10 @@
-//! Judges the drives of a bus.
+//! Judges the drives of a bus: what differs, and what is in doubt.
 
 use super::follower::Follower;
 use super::symptom::FrameSymptom;
 use harness_sim::record::LineFrame;
 
-/// Differences that are kept at most.
+/// Differences and doubts that are kept at most.
 pub(super) const MOST_BREACHES: usize = 50;
 
 /// Something that a drive does, and that no value of what the manual leaves open explains.
@@ -35,6 +35,17 @@ pub struct JudgedDrives {
     pub values: usize,
     /// What was not compared, in sentences.
     pub remarks: Vec<String>,
+    /// What differs and may have another cause than a wrong drive, in sentences with their places: it accuses no drive, and nothing has passed.
+    pub doubts: Vec<String>,
+}
+
+impl JudgedDrives {
+    /// Notes what accuses no drive.
+    pub(super) fn doubt(&mut self, about: String) {
+        if self.doubts.len() < MOST_BREACHES {
+            self.doubts.push(about);
+        }
+    }
 }
 
 /// Judges frames with these drives: number, and the identifiers on which each receives and sends.
@@ -61,6 +72,7 @@ pub fn judge(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives 
         all.compared += own.compared;
         all.values += own.values;
         all.remarks.extend(own.remarks);
+        all.doubts.extend(own.doubts);
     }
     all.breaches.sort_by_key(|own| own.frame);
     all

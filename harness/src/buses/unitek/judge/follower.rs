@@ -3,6 +3,7 @@
 use super::cycle::{Cycle, Running, Untimely};
 use super::drives::{Breach, JudgedDrives, MOST_BREACHES};
 use super::held::{Held, is_live, takes_writes};
+use super::supply::Supply;
 use super::symptom::FrameSymptom::{self, Length, Missing, Name, Time, Unasked, Value};
 use crate::buses::unitek::language::{identifier, written};
 use crate::buses::unitek::report::sender_of;
@@ -29,30 +30,30 @@ const LONGEST_CYCLE: Span = Span::from_millis(300);
 
 /// A request that waits for its reply.
 #[derive(Clone, Debug)]
-struct Asked {
+pub(super) struct Asked {
     register: u8,
     at: Instant,
     frame: usize,
     /// Whether the drive has certainly heard it and answers it.
-    sure: bool,
+    pub(super) sure: bool,
     /// What the register could hold at the request: a drive may read it then, or when it replies.
-    held: Held,
+    pub(super) held: Held,
 }
 
 /// What the frames show of one drive.
 #[derive(Debug)]
 pub struct Follower {
-    drive: u8,
+    pub(super) drive: u8,
     /// On which it may receive and send: after a change the old and the new ones, since it is open when a drive changes.
-    rx: Vec<u16>,
-    tx: Vec<u16>,
-    held: Vec<Held>,
-    cycles: [Cycle; 256],
-    asked: VecDeque<Asked>,
+    pub(super) rx: Vec<u16>,
+    pub(super) tx: Vec<u16>,
+    pub(super) held: Vec<Held>,
+    pub(super) cycles: [Cycle; 256],
+    pub(super) asked: VecDeque<Asked>,
     /// The latest of all replies, behind its request.
-    slowest: Option<Span>,
+    pub(super) slowest: Option<Span>,
     /// Whether replies with 8F are short, once it is known (`map-reply`).
-    short_map: Option<bool>,
+    pub(super) short_map: Option<bool>,
     /// Whether all replies have 6 bytes, where it is known (bit 8 of DC), and when that may have changed.
     wide: Option<bool>,
     wide_at: Instant,
@@ -65,7 +66,7 @@ pub struct Follower {
     /// Registers of which a frame came that nothing here asks for, and when last: their cycles run since before the first frame.
     unsolicited: BTreeMap<u8, Instant>,
     /// What was written to registers that cannot be written, and held something else.
-    refused: BTreeMap<u8, u32>,
+    pub(super) refused: BTreeMap<u8, u32>,
     /// The numbers of the other drives.
     pub(super) others: Vec<u8>,
     /// Whether the times of frames are those of the bus.
@@ -73,8 +74,10 @@ pub struct Follower {
     /// How late a frame may be.
     patience: Span,
     /// The time that frames have used.
-    used: Span,
-    judged: JudgedDrives,
+    pub(super) used: Span,
+    /// Whether the supply may have been switched off and on, and what the frames show if so.
+    pub(super) supply: Supply,
+    pub(super) judged: JudgedDrives,
 }
 
 impl Follower {
@@ -104,6 +107,7 @@ impl Follower {
             timed: true,
             patience: PATIENCE,
             used: Span::ZERO,
+            supply: Supply::default(),
             judged: JudgedDrives::default(),
         }
     }
@@ -114,6 +118,7 @@ impl Follower {
         Self {
             cycles: [Cycle::Off(Instant::START); 256],
             timed: false,
+            supply: Supply::always_on(),
             patience: LONG_PATIENCE,
             ..Self::new(drive, identifiers)
         }
@@ -127,6 +132,22 @@ impl Follower {
 
     /// A frame of the bus.
     pub fn hear(&mut self, number: usize, own: &LineFrame) {
+        let sends = self.sent_it(own) && !matches!(own.ended, FrameEnd::Error(_));
+        if sends && self.supply.may_have_failed(own.start) {
+            self.supply.breaches = self.judged.breaches.len();
+            self.supply.restarted = Some(Box::new(self.restarted()));
+        }
+        if let Some(restarted) = &mut self.supply.restarted {
+            restarted.hear(number, own);
+        }
+        self.hear_one(number, own);
+        self.explain_by_restart(number);
+        if sends {
+            self.supply.sent = Some(own.at);
+        }
+    }
+
+    fn hear_one(&mut self, number: usize, own: &LineFrame) {
         self.used = self.used + own.at.since(own.start);
         self.begin.get_or_insert(own.start);
         if self.sent_it(own) {
@@ -163,6 +184,12 @@ impl Follower {
             ));
         }
         self.judged
+    }
+
+    /// Whether something asks the drive for a frame.
+    fn is_asked(&self) -> bool {
+        let cycles = &self.cycles;
+        !self.asked.is_empty() || cycles.iter().any(|own| matches!(own, Cycle::On(_)))
     }
 
     fn breach(
@@ -262,7 +289,9 @@ impl Follower {
         }
         match number {
             // A load brings every parameter back; the EEPROM is not known.
+            0x84 => self.supply.stored(),
             0x83 => {
+                self.supply.stored();
                 for other in REGISTERS.iter().filter(|own| own.access == Access::RW) {
                     self.held[usize::from(other.number)] = Held::any();
                 }
@@ -283,6 +312,8 @@ impl Follower {
         // Identifiers out of a range are ignored (`id-range`).
         let takes = sure && !matches!(number, 0x68 | 0x69);
         self.held[place] = before.written(register, data, takes);
+        self.supply
+            .wrote(number, before.sure().filter(|_| takes), at);
         if number == 0x51 && data.bits() & u32::from(MODE_LOCK) != 0 {
             // `lock-clears-command`.
             for command in [0x31, 0x90] {
@@ -363,6 +394,13 @@ impl Follower {
         }
         let reply = match Reply::decode(&own.frame, tx) {
             Ok(reply) => reply,
+            Err(_) if self.timed && !self.is_asked() => {
+                return self.judged.doubt(format!(
+                    "frame {number}, {}: nothing asks drive {} for a frame, and another station may have sent this one with its identifier",
+                    written(&own.frame),
+                    self.drive
+                ));
+            }
             Err(why) => {
                 let about = format!("{} is no reply: {why}", written(&own.frame));
                 return self.breach((number, first), (Length, "4.5"), about);
@@ -539,6 +577,9 @@ impl Follower {
         let held = self.held[place].clone();
         if takes_writes(register) {
             self.judged.values += usize::from(held != Held::any());
+            if held.sure() == Some(raw & mask) {
+                self.supply.kept(reply.register, raw & mask);
+            }
             if !held.can_be(raw, mask) && !asked.held.can_be(raw, mask) {
                 let digits = register.width.bits() as usize / 4;
                 let about = format!(

@@ -8,6 +8,7 @@ mod cycle;
 mod drives;
 mod follower;
 mod held;
+mod supply;
 mod symptom;
 #[cfg(test)]
 mod tests;

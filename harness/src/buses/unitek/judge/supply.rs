@@ -1,0 +1,133 @@
+//! A supply that may have been switched off and on, which no frame shows: a drive then loses what was written and not stored, and its cycles.
+
+use super::cycle::Cycle;
+use super::follower::Follower;
+use super::held::Held;
+use super::symptom::FrameSymptom::Missing;
+use harness_proto::time::{Instant, Span};
+use std::collections::BTreeMap;
+
+/// In this time a drive can be switched off and be back; it is longer than the longest cycle, so that none runs meanwhile.
+const RESTART: Span = Span::from_millis(300);
+
+/// Frames that are missing at least where nothing but their absence shows that a drive was off.
+const OFF: usize = 2;
+
+/// What is known of the supply.
+#[derive(Debug, Default)]
+pub(super) struct Supply {
+    /// It is known not to have failed.
+    always_on: bool,
+    /// When the last frame of the drive had ended.
+    pub(super) sent: Option<Instant>,
+    /// Number of differences when the last silence had ended.
+    pub(super) breaches: usize,
+    /// Registers that were written and not stored: what each held before, where that is known, and when it was last written.
+    written: BTreeMap<u8, (Option<u32>, Instant)>,
+    /// When the last silence began.
+    silent: Instant,
+    /// What the frames since the last silence show of a drive that was switched off and on in it.
+    pub(super) restarted: Option<Box<Follower>>,
+}
+
+impl Supply {
+    pub(super) fn always_on() -> Self {
+        Self {
+            always_on: true,
+            ..Self::default()
+        }
+    }
+
+    /// Whether a frame of the drive that begins at `at` ends a silence in which a restart fits.
+    pub(super) fn may_have_failed(&mut self, at: Instant) -> bool {
+        // A drive that has sent nothing yet is silent since the last write to it.
+        let wrote = || self.written.values().map(|own| own.1).max();
+        let last = self.sent.or_else(wrote).filter(|_| !self.always_on);
+        let silent = last.filter(|last| at.since(*last) >= RESTART);
+        self.silent = silent.unwrap_or(self.silent);
+        silent.is_some()
+    }
+
+    /// A register was written at `at`, and certainly held `before` until then, if that is known.
+    pub(super) fn wrote(&mut self, register: u8, before: Option<u32>, at: Instant) {
+        self.written.entry(register).or_insert((before, at)).1 = at;
+    }
+
+    /// Registers were stored or loaded.
+    pub(super) fn stored(&mut self) {
+        self.written.clear();
+    }
+
+    /// A register reads `value`, which was written to it: if it was written before the silence and held something else until then, the
+    /// supply has not failed.
+    pub(super) fn kept(&mut self, register: u8, value: u32) {
+        let written = self.written.get(&register);
+        let differs = |own: &(Option<u32>, Instant)| {
+            own.0.is_some_and(|before| before != value) && own.1 <= self.silent
+        };
+        if written.is_some_and(differs) {
+            self.restarted = None;
+        }
+    }
+}
+
+impl Follower {
+    /// The same drive, switched off and on: nothing is known of its registers, and what was asked for before may be lost.
+    pub(super) fn restarted(&self) -> Self {
+        let (Some(rx), Some(tx)) = (self.rx.first(), self.tx.first()) else {
+            return Self::new(self.drive, (0, 0));
+        };
+        let mut own = Self::new(self.drive, (*rx, *tx));
+        own.held.fill(Held::any());
+        // No cycle survives; one that was asked for in the silence may run, or not.
+        own.cycles = self.cycles.map(|cycle| match cycle {
+            Cycle::On(_) => Cycle::Unknown,
+            Cycle::Off(_) | Cycle::Unknown => Cycle::Off(Instant::START),
+        });
+        (own.rx, own.tx) = (self.rx.clone(), self.tx.clone());
+        own.asked = self.asked.clone();
+        for asked in &mut own.asked {
+            (asked.sure, asked.held) = (false, Held::any());
+        }
+        (own.slowest, own.short_map) = (self.slowest, self.short_map);
+        (own.others, own.used) = (self.others.clone(), self.used);
+        // A restart makes no register writable.
+        own.refused = self.refused.clone();
+        own.supply = Supply::always_on();
+        own
+    }
+
+    /// What differs since the last silence, and does not where the supply was switched off and on in it, accuses no drive.
+    pub(super) fn explain_by_restart(&mut self, number: usize) {
+        let Some(restarted) = &self.supply.restarted else {
+            return;
+        };
+        let since = &self.judged.breaches[self.supply.breaches.min(self.judged.breaches.len())..];
+        let Some(first) = since.first() else {
+            return;
+        };
+        let shown = since.len() >= OFF || since.iter().any(|own| own.what != Missing);
+        if !shown || !restarted.judged.breaches.is_empty() {
+            return;
+        }
+        let doubt = format!(
+            "frame {number}, drive {}: {}; its supply may have been switched off and on in the silence from {} on, which explains it",
+            self.drive,
+            first.about,
+            self.supply.silent.since_start()
+        );
+        let Some(restarted) = self.supply.restarted.take() else {
+            return;
+        };
+        let mut judged = std::mem::take(&mut self.judged);
+        let sent = self.supply.sent;
+        judged.breaches.truncate(self.supply.breaches);
+        judged.doubt(doubt);
+        *self = *restarted;
+        self.judged = judged;
+        self.supply = Supply {
+            sent,
+            ..Supply::default()
+        };
+    }
+}
