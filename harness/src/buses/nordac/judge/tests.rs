@@ -1,12 +1,14 @@
 //! Right slaves are never accused, whatever the value of an open point; wrong ones are.
 
 use super::judge;
+use crate::buses::nordac::report::{octet_time, octets};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
+use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::deviation::deviations;
-use harness_sim::record::Trace;
+use harness_sim::record::{LineByte, Trace};
 use std::collections::BTreeSet;
 
 const BUS: &str = "bus     nordac\n";
@@ -49,6 +51,28 @@ fn trace(source: &Source, lines: &str) -> Trace {
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     link.trace(0)
+}
+
+/// The same telegrams behind a token that the master passes to itself, as a master alone on a line does: without it, the first octets of a
+/// capture may be the end of a telegram.
+fn behind_a_token(mut trace: Trace) -> Trace {
+    let octets = octets(&trace);
+    let octet = octet_time(octets.iter().map(|(from, own)| (*from, own)));
+    let octet = octet.unwrap_or(Span::from_micros(22));
+    let mut at = Instant::START;
+    let token = [0xDC, 0x02, 0x02].map(|byte| {
+        at += octet;
+        LineByte::seen(at, Some(byte), Some(byte), None)
+    });
+    for channel in &mut trace.channels {
+        let from = channel.from;
+        let octets = channel.octets_mut().expect("a line of octets");
+        octets.iter_mut().for_each(|own| own.at += octet * 20);
+        if from.is_none() {
+            octets.splice(..0, token);
+        }
+    }
+    trace
 }
 
 /// A line for each slave of a scenario, but for a property that it sets itself.
@@ -94,14 +118,17 @@ fn right_slaves(share: usize) -> usize {
             if header.is_empty() && !line.is_empty() {
                 continue;
             }
-            let judged = judge(&trace(&source, &header));
-            assert!(
-                judged.breaches.is_empty(),
-                "{} {line}\n{:#?}",
-                source.name,
-                judged.breaches
-            );
-            compared += judged.compared;
+            let trace = trace(&source, &header);
+            for trace in [trace.clone(), behind_a_token(trace)] {
+                let judged = judge(&trace);
+                assert!(
+                    judged.breaches.is_empty(),
+                    "{} {line}\n{:#?}",
+                    source.name,
+                    judged.breaches
+                );
+                compared += judged.compared;
+            }
         }
     }
     compared
@@ -121,7 +148,7 @@ fn no_right_slave_is_accused_in_any_scenario() {
 }
 
 /// Deviations that a capture alone does not show: they lie in what parameters, a plant or times decide, or in a slave that is silent.
-const NOT_SHOWN: usize = 65;
+const NOT_SHOWN: usize = 64;
 
 #[test]
 #[ignore = "takes a minute; .ci/nightly runs it"]
@@ -130,7 +157,8 @@ fn wrong_slaves_are_accused() {
     let found = |name: &str| {
         scenarios.iter().any(|source| {
             let lines = of_all(source, &format!("deviates {name}"));
-            !judge(&trace(source, &lines)).breaches.is_empty()
+            let trace = behind_a_token(trace(source, &lines));
+            !judge(&trace).breaches.is_empty()
         })
     };
     let missed: Vec<_> = deviations()
