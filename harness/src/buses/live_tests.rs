@@ -328,9 +328,30 @@ fn a_silence_excuses_no_wrong_drive() {
          > 68 05 05 68 88 82 5C 3C 3E E0 16\n< 68 0B 0B 68 82 88 08 3E 3C 42 05 00 FF 75 31 78 16\n",
     );
     for text in [written_behind, kept, set_up_behind] {
-        let source = Source::from_bytes("wrong".to_owned(), text.clone().into_bytes());
-        let tape = Tape::of(&traces_of(source.expect("text")), Rate::default());
-        let found = verdict(&begun_at(&tape, 0, 0));
-        assert_eq!(found, Some(Verdict::Failed), "{text}");
+        assert_eq!(of_text(&text), Some(Verdict::Failed), "{text}");
     }
+}
+
+/// A drive that loses what it held, in a silence that is too short for a restart.
+#[test]
+fn a_restart_takes_its_time() {
+    let unitek = "title Wrong\nsource unitek 5.2\nbus unitek\ndrive 1\n\n\
+         > 201 3D 1C 00\n< 181 1C 0A 00 xx\n> 201 1C 37 00\n> 201 3D 1C 00\n< 181 1C 37 00 xx\n\
+         drive 1 restart\n> 201 3D 1C 00\n< 181 1C 0A 00 xx\n";
+    let folder = format!("{}/corpora/scenarios/nordac", env!("CARGO_MANIFEST_DIR"));
+    let nordac = std::fs::read_to_string(format!("{folder}/nordac-open-reinit-at-power-up.scn"));
+    for text in [unitek.to_owned(), nordac.expect("a scenario")] {
+        let found = |wait: &str| {
+            of_text(&text.replace(" restart\n", &format!(" restart # at once\nwait {wait}\n")))
+        };
+        assert_eq!(found("250ms"), Some(Verdict::Failed), "{text}");
+        assert_eq!(found("350ms"), Some(Verdict::Inconclusive), "{text}");
+    }
+}
+
+/// What comes of judging the whole capture of a scenario.
+fn of_text(text: &str) -> Option<Verdict> {
+    let source = Source::from_bytes("captured".to_owned(), text.as_bytes().to_vec());
+    let tape = Tape::of(&traces_of(source.expect("text")), Rate::default());
+    verdict(&begun_at(&tape, 0, 0))
 }
