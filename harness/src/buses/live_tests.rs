@@ -349,6 +349,16 @@ fn a_restart_takes_its_time() {
     }
 }
 
+/// A drive that receives on another identifier than that which follows from what it sends, since before the capture began.
+#[test]
+fn a_drive_may_receive_elsewhere() {
+    let elsewhere = "title Right\nsource unitek 3.1\nbus unitek\ndrive 1 rx 210 tx 181\n\n\
+         > 210 3D 68 00\n< 181 68 10 02 xx\nwait 400ms\n> 210 3D 68 00\n< 181 68 10 02 xx\n";
+    assert_eq!(of_text(elsewhere), Some(Verdict::Inconclusive));
+    let changed = Tape::of(&traces("unitek-ex-1-stored"), Rate::default());
+    assert_ne!(verdict(&begun_at(&changed, 1, 0)), Some(Verdict::Failed));
+}
+
 /// What comes of judging the whole capture of a scenario.
 fn of_text(text: &str) -> Option<Verdict> {
     let source = Source::from_bytes("captured".to_owned(), text.as_bytes().to_vec());

@@ -1,7 +1,7 @@
 //! Captures: judged, and made into a scenario, in which what hosts have sent is sent again at its time and what drives have sent is
 //! expected.
 
-use super::judge::{Breach, judge};
+use super::judge::{Breach, judge, judge_guessed};
 use super::language::{identifier, written};
 use super::serve::bench;
 use crate::buses::JudgedFrames;
@@ -90,11 +90,12 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
     let frames: Vec<LineFrame> = channels
         .flat_map(|own| own.frames().iter().copied())
         .collect();
-    let drives = match setup {
+    let judged = match setup {
         Some(setup) => {
             let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
             let drives = plan.setup.setup.drives.iter();
-            drives.map(|own| (own.node, own.identifiers)).collect()
+            let drives = drives.map(|own| (own.node, own.identifiers));
+            judge(&frames, &drives.collect::<Vec<_>>())
         }
         None => {
             let all: Vec<&LineFrame> = frames.iter().collect();
@@ -103,10 +104,10 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
                 (number, (DEFAULT_RX - 1 + node, DEFAULT_TX - 1 + node))
             };
             let nodes = nodes(&all)?;
-            nodes.into_iter().map(own).collect::<Vec<_>>()
+            let drives = nodes.into_iter().map(own);
+            judge_guessed(&frames, &drives.collect::<Vec<_>>())
         }
     };
-    let judged = judge(&frames, &drives);
     let difference = |own: &Breach| {
         format!(
             "frame {}, drive {} (UNITEK {}): {}",

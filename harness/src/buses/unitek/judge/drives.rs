@@ -51,6 +51,20 @@ impl JudgedDrives {
 /// Judges frames with these drives: number, and the identifiers on which each receives and sends.
 #[must_use]
 pub fn judge(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+    judge_with(frames, drives, Follower::new)
+}
+
+/// The same of drives whose identifiers are guessed from their frames.
+#[must_use]
+pub fn judge_guessed(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+    judge_with(frames, drives, Follower::guessed)
+}
+
+fn judge_with(
+    frames: &[LineFrame],
+    drives: &[(u8, (u16, u16))],
+    of: fn(u8, (u16, u16)) -> Follower,
+) -> JudgedDrives {
     let mut all = JudgedDrives::default();
     for &(drive, identifiers) in drives {
         let shared = |other: &&(u8, (u16, u16))| {
@@ -62,7 +76,7 @@ pub fn judge(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives 
             all.remarks.push(remark);
             continue;
         }
-        let mut follower = Follower::new(drive, identifiers);
+        let mut follower = of(drive, identifiers);
         follower.others = drives.iter().map(|own| own.0).collect();
         for (index, frame) in frames.iter().enumerate() {
             follower.hear(index + 1, frame);

@@ -69,6 +69,8 @@ pub struct Follower {
     pub(super) refused: BTreeMap<u8, u32>,
     /// The numbers of the other drives.
     pub(super) others: Vec<u8>,
+    /// Whether its identifiers are guessed from what it sends: it may receive on another one, and change both at its next start (`id-change`).
+    pub(super) guessed: bool,
     /// Whether the times of frames are those of the bus.
     timed: bool,
     /// How late a frame may be.
@@ -104,11 +106,22 @@ impl Follower {
             refused: BTreeMap::new(),
             others: Vec::new(),
             mode_at: Instant::START,
+            guessed: false,
             timed: true,
             patience: PATIENCE,
             used: Span::ZERO,
             supply: Supply::default(),
             judged: JudgedDrives::default(),
+        }
+    }
+
+    /// The same for a drive of which the identifiers are guessed from its frames.
+    #[must_use]
+    pub fn guessed(drive: u8, identifiers: (u16, u16)) -> Self {
+        Self {
+            guessed: true,
+            held: vec![Held::any(); REGISTERS.len()],
+            ..Self::new(drive, identifiers)
         }
     }
 
@@ -487,7 +500,13 @@ impl Follower {
                 "{} comes, and nothing asks for register {register:02X} ({name}): no cycle is as long",
                 written(&own.frame)
             );
-            self.breach((number, register), (Unasked, "5.2"), about);
+            match self.guessed && self.slowest.is_none() {
+                false => self.breach((number, register), (Unasked, "5.2"), about),
+                true => self.judged.doubt(format!(
+                    "frame {number}, drive {}: {about}; it has answered no request on {:03X}, and may receive on another identifier",
+                    self.drive, self.rx[0]
+                )),
+            }
         }
         self.unsolicited.insert(register, own.start);
     }

@@ -13,6 +13,6 @@ mod symptom;
 #[cfg(test)]
 mod tests;
 
-pub use drives::{Breach, JudgedDrives, judge};
+pub use drives::{Breach, JudgedDrives, judge, judge_guessed};
 pub use follower::Follower;
 pub use symptom::FrameSymptom;

@@ -93,6 +93,7 @@ impl Follower {
         (own.others, own.used) = (self.others.clone(), self.used);
         // A restart makes no register writable.
         own.refused = self.refused.clone();
+        own.guessed = self.guessed;
         own.supply = Supply::always_on();
         own
     }
