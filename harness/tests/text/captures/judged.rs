@@ -175,6 +175,47 @@ fn data_that_change_by_themselves() {
     assert!(text.contains("88 01 C0 13 xx xx"), "{text}");
 }
 
+/// Without a setup, what a drive may write itself and its process data accuse no drive, and nothing has passed (ND21 9.4, 14.2).
+#[test]
+fn what_is_left_to_the_drive_accuses_nobody() {
+    for name in [
+        "8.2-exchange-1",
+        "9.4-process-data",
+        "9.5-several-commands",
+        "13.3.1-phases",
+        "14.4.1-status",
+        "14.10.5-eeprom-read-byte",
+        "14.11.10-register-errors",
+    ] {
+        let capture = imported(&built_in(name));
+        let judged = judge(&capture, &options(None)).expect("judged");
+        let shown = judged.links.show("capture", "model").to_string();
+        assert_eq!(judged.verdict, Verdict::Inconclusive, "{name}: {shown}");
+        let why = judged.remarks.last().expect("a reason");
+        assert!(why.contains("--setup"), "{name}: {why}");
+    }
+}
+
+/// It excuses nothing else: a write to RAM that is not taken, a wrong checking byte of an answer with a cell of the drive's own.
+#[test]
+fn what_is_left_to_the_drive_excuses_nothing_else() {
+    let process_data = "> 85 FE 12 34\n";
+    let status = "> 8A FE 82 00 00 FF 81\n> 88 FE C0 00 FF BF\n";
+    let ram = "> 8A FE 82 FF 20 FE 9F\n> 88 FE C0 20 FE DE\n";
+    for (deviation, steps) in [
+        ("writes-ignored", [process_data, ram].concat()),
+        ("writes-ignored", [status, ram].concat()),
+        ("checksum-not-negated", [process_data, status].concat()),
+        ("checksum-wrong", [process_data, status].concat()),
+    ] {
+        let text = format!(
+            "title wrong\nring 3\ndrive 1 memory DataOut = 28\ndrive 1 memory FF28 = 56 78\ndrive 1 deviates {deviation}\n{steps}"
+        );
+        let judged = judge(&imported(&run(&text)), &options(None)).expect("judged");
+        assert_eq!(judged.verdict, Verdict::Failed, "{deviation}: {steps}");
+    }
+}
+
 /// Complete ND21s must be declared in the header of a scenario.
 #[test]
 fn with_a_setup() {

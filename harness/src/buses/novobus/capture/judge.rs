@@ -38,6 +38,9 @@ pub struct Judged {
 /// From how many places a capture that begins in mid-conversation is judged.
 const MOST_STARTS: usize = 6;
 
+/// Why plain memory differs from a right drive.
+const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself (ND21 9.4, 14.2): describe the drives with --setup";
+
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
     fn in_doubt(mut self, why: &str) -> Self {
@@ -118,10 +121,8 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
     let model = only_captured(&model, capture);
     let behind = |ring: usize, own: &Channel, index: usize| {
         // Data behind the drive that cannot be predicted stand at the same place on the last link.
-        own.from.is_some()
-            && told
-                .get(ring)
-                .is_some_and(|told| told.unforeseen.contains(&index))
+        let told = told.get(ring).filter(|_| own.from.is_some());
+        told.is_some_and(|told| told.unforeseen.contains(&index))
     };
     let tolerance = Span::from_units(options.tolerance.units().max(6));
     let (left, right) = (
@@ -148,7 +149,13 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
     } else {
         Verdict::Passed
     };
-    Ok(Judged {
+    let of_drives = |ring: usize, own: &Channel, index: usize| {
+        let of_drive = told.get(ring).is_some_and(|told| told.own.contains(&index));
+        inner(ring, own, index) || of_drive
+    };
+    let is_plain = verdict == Verdict::Failed && options.setup.is_none();
+    let in_doubt = is_plain && compare(left, right, tolerance, &of_drives, end).differ == 0;
+    let judged = Judged {
         verdict,
         master,
         links,
@@ -159,6 +166,10 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
         unforeseen: told.iter().map(|told| told.unforeseen.len()).sum(),
         located: located(capture),
         remarks,
+    };
+    Ok(match in_doubt {
+        true => judged.in_doubt(OF_DRIVES),
+        false => judged,
     })
 }
 

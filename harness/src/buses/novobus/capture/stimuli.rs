@@ -3,6 +3,7 @@
 use crate::report::meaning::{self, Observer};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::nd21::own::is_own;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
@@ -16,6 +17,9 @@ pub(crate) struct Told {
     pub(crate) cells: BTreeMap<(u8, u16), u8>,
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
     pub(crate) unforeseen: BTreeSet<usize>,
+    /// Bytes received that plain memory may answer otherwise than a right drive: process data, of which its settings choose the cell
+    /// (ND21 9.4), and data of cells that were written and that a drive may write itself (14.2), with their checking bytes.
+    pub(crate) own: BTreeSet<usize>,
 }
 
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
@@ -52,7 +56,7 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
             }
         }
         if last {
-            told.unforeseen = own.unforeseen;
+            (told.unforeseen, told.own) = (own.unforeseen, own.own);
         }
     }
     told
@@ -64,15 +68,18 @@ fn of_link(link: &Channel, asked: &[Role]) -> Told {
         told: Told::default(),
         own: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
+        written: BTreeSet::new(),
         open: BTreeMap::new(),
     };
     let mut observer = Observer::new(link.from, link.to);
+    let mut addressed = false;
     let bytes = link.octets().iter().filter_map(|byte| match link.to {
         None => byte.arrival(),
         Some(_) => byte.sent.map(Received::good),
     });
     for ((index, byte), role) in bytes.enumerate().zip(asked) {
         let seen = observer.see(Some(byte.byte), byte.error);
+        addressed |= matches!(role, Role::Address { .. });
         // In the error mode bytes are not the answers to those of the master's. Where bytes were lost, answers do not stand
         // beside what was asked: then both seldom speak of the same drive.
         if *role == Role::Foreign || seen.section() == "9.7" {
@@ -80,6 +87,11 @@ fn of_link(link: &Channel, asked: &[Role]) -> Told {
         } else if role.drive() == seen.drive {
             let is_data = seen.role == meaning::ByteRole::Data;
             reader.read(index, byte.byte, *role, is_data, seen.fits);
+            // Where no address was seen yet, the capture does not show which drive is meant.
+            let may_be_of_a_drive = role.drive().is_some() || !addressed;
+            if matches!(role, Role::ProcessData { .. }) && may_be_of_a_drive {
+                reader.told.own.insert(index);
+            }
         }
     }
     reader.told
@@ -91,6 +103,8 @@ struct Reader {
     own: Option<u8>,
     /// What a cell holds now; `None` if it was written with an unknown result.
     now: BTreeMap<(u8, u16), Option<u8>>,
+    /// Cells that the master has written.
+    written: BTreeSet<(u8, u16)>,
     /// Data of the answer that each drive is giving: place, cell and value.
     open: BTreeMap<u8, Vec<(usize, u16, u8)>>,
 }
@@ -121,7 +135,9 @@ impl Reader {
                 self.open.remove(&drive);
                 if let Some((address, width)) = writes {
                     for offset in 0..u16::from(width) {
-                        self.now.insert((drive, address.wrapping_add(offset)), None);
+                        let cell = (drive, address.wrapping_add(offset));
+                        self.now.insert(cell, None);
+                        self.written.insert(cell);
                     }
                 }
             }
@@ -131,8 +147,12 @@ impl Reader {
 
     /// Takes over the data of an answer that is whole.
     fn settle(&mut self, drive: u8, check: Option<usize>) {
-        let mut changed = false;
+        let (mut changed, mut own) = (false, false);
         for (index, address, value) in self.open.remove(&drive).unwrap_or_default() {
+            if self.written.contains(&(drive, address)) && is_of_the_drive(address) {
+                own = true;
+                self.told.own.insert(index);
+            }
             match self.now.get(&(drive, address)) {
                 None => {
                     self.now.insert((drive, address), Some(value));
@@ -153,12 +173,20 @@ impl Reader {
         if changed {
             self.told.unforeseen.extend(check);
         }
+        if own {
+            self.told.own.extend(check);
+        }
     }
 }
 
 /// Where a drive has memory (ND21 10.1).
 fn cell_exists(address: u16) -> bool {
     matches!(address, 0x2F00..=0x2FDF | 0xFD80..=0xFFFF)
+}
+
+/// Whether the drive may write a cell although a master can write it too; a reserved one is compared.
+fn is_of_the_drive(address: u16) -> bool {
+    is_own(address) && cell_at(address).is_none_or(|cell| cell.access != Access::Reserved)
 }
 
 /// Whether the drive itself writes a cell (14.2: read only).
