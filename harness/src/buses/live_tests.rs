@@ -355,8 +355,11 @@ fn a_drive_may_receive_elsewhere() {
     let elsewhere = "title Right\nsource unitek 3.1\nbus unitek\ndrive 1 rx 210 tx 181\n\n\
          > 210 3D 68 00\n< 181 68 10 02 xx\nwait 400ms\n> 210 3D 68 00\n< 181 68 10 02 xx\n";
     assert_eq!(of_text(elsewhere), Some(Verdict::Inconclusive));
-    let changed = Tape::of(&traces("unitek-ex-1-stored"), Rate::default());
-    assert_ne!(verdict(&begun_at(&changed, 1, 0)), Some(Verdict::Failed));
+    for (name, first) in [("unitek-ex-1-stored", 1), ("unitek-open-id-change", 4)] {
+        let changed = Tape::of(&traces(name), Rate::default());
+        let found = verdict(&begun_at(&changed, first, 0));
+        assert_ne!(found, Some(Verdict::Failed), "{name}");
+    }
 }
 
 /// What comes of judging the whole capture of a scenario.

@@ -333,8 +333,13 @@ impl Follower {
                 self.held[command] = self.held[command].may_be(0);
             }
         }
-        if let (0x68 | 0x69, Ok(id @ 1..=0x7FF)) = (number, u16::try_from(data.bits() & 0xFFFF)) {
-            let all = if number == 0x68 {
+        self.may_use(number, data.bits());
+    }
+
+    /// A register of identifiers holds this: the drive may use it at once, or from its next start on (`id-change`).
+    fn may_use(&mut self, register: u8, raw: u32) {
+        if let (0x68 | 0x69, Ok(id @ 1..=0x7FF)) = (register, u16::try_from(raw & 0xFFFF)) {
+            let all = if register == 0x68 {
                 &mut self.rx
             } else {
                 &mut self.tx
@@ -616,6 +621,7 @@ impl Follower {
         }
         if whole && asked.held == held {
             self.held[place] = Held::one(raw & mask);
+            self.may_use(reply.register, raw);
         }
     }
 }
