@@ -1,4 +1,4 @@
-//! Telegrams of which a capture does not show who has sent them: octets of one line name their senders themselves, or nobody does.
+//! Telegrams of which a capture does not show who has sent them: only the octets of a telegram name its sender.
 
 use crate::buses::nordac::report::{TelegramRun, octet_time};
 use harness_proto::decode::Decoded;
@@ -19,7 +19,7 @@ pub(super) enum Sender {
     NoPauseBefore,
     /// A request follows it sooner than any master begins one (T_SYN, 33 bits).
     NoPauseBehind,
-    /// It is a short confirmation, which names nobody, and such octets are sent by somebody else in this capture.
+    /// It is a short confirmation, which names nobody, and another station sends such octets in this capture.
     Nobody,
 }
 
