@@ -177,7 +177,7 @@ fn data_that_change_by_themselves() {
 
 /// Without a setup, what a drive may write itself and its process data accuse no drive, and nothing has passed (ND21 9.4, 14.2).
 #[test]
-fn what_is_left_to_the_drive_accuses_nobody() {
+fn what_is_left_to_the_drive_accuses_no_drive() {
     for name in [
         "8.2-exchange-1",
         "9.4-process-data",

@@ -19,7 +19,7 @@ pub(super) enum Sender {
     NoPauseBefore,
     /// A request follows it sooner than any master begins one (T_SYN, 33 bits).
     NoPauseBehind,
-    /// It is a short confirmation, which names nobody, and another station sends such octets in this capture.
+    /// It is a short confirmation, which names no station, and another one sends such octets in this capture.
     Nobody,
 }
 
