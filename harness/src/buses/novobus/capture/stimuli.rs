@@ -17,7 +17,7 @@ pub(crate) struct Told {
     pub(crate) cells: BTreeMap<(u8, u16), u8>,
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
     pub(crate) unforeseen: BTreeSet<usize>,
-    /// Bytes received that plain memory may answer otherwise than a right drive: process data, of which its settings choose the cell
+    /// Bytes received that plain memory may answer with other bytes than a right drive: process data, of which its settings choose the cell
     /// (ND21 9.4), and data of cells that were written and that a drive may write itself (14.2), with their checking bytes.
     pub(crate) own: BTreeSet<usize>,
 }
