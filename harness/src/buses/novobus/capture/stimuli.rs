@@ -83,7 +83,7 @@ fn of_link(link: &Channel, asked: &[Role]) -> Told {
         // In the error mode bytes are not the answers to those of the master's. Where bytes were lost, answers do not stand
         // beside what was asked: then both seldom speak of the same drive.
         if *role == Role::Foreign || seen.section() == "9.7" {
-            reader.open.clear();
+            reader.break_off();
         } else if role.drive() == seen.drive {
             let is_data = seen.role == meaning::ByteRole::Data;
             reader.read(index, byte.byte, *role, is_data, seen.fits);
@@ -142,6 +142,16 @@ impl Reader {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Takes over the data of answers that an error breaks off: the bytes in front of it are those of the cells. A zero may be one of the
+    /// error mode.
+    fn break_off(&mut self) {
+        for (drive, mut begun) in std::mem::take(&mut self.open) {
+            begun.retain(|(_, _, value)| *value != 0);
+            self.open.insert(drive, begun);
+            self.settle(drive, None);
         }
     }
 
