@@ -176,6 +176,8 @@ fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
     names.sort();
     let tape = |name: String| (Tape::of(&traces(&name), Rate::default()), name);
     let all = names.into_iter().skip(first).step_by(step).map(tape);
+    // There the bench sends octets as a slave would, 32 bits in front of a request: a beginning can hide whose they are.
+    let all = all.filter(|(_, name)| name != "nordac-en-1-t-syn");
     let right = all.filter(|(tape, _)| (1..=MOST_PIECES).contains(&tape.pieces.len()));
     let right = right.filter(|(tape, _)| {
         verdict(&begun_at(tape, 0, 0)).is_some_and(|own| own != Verdict::Failed)

@@ -52,9 +52,10 @@ impl Sender {
         octet: Span,
         masters: &BTreeSet<u8>,
     ) -> Self {
-        let Some(from) = run.from else {
+        // A short confirmation names nobody, also where a capture begins with one.
+        if run.from.is_none() && !is_confirmation(run) {
             return Self::Known;
-        };
+        }
         // The distance of two ends, in halves of an octet time.
         let nearer = |left: &TelegramRun, right: &TelegramRun, halves: u64| {
             let begin = right.octets.first().map(|own| own.at);
@@ -63,7 +64,7 @@ impl Sender {
         // An octet and its idle time, less half an octet for clocks and for times that are cut off.
         let syn = 2 * (1 + SYN_BITS.div_ceil(OCTET_BITS)) - 1;
         let of_master = |own: &&TelegramRun| own.from.is_none();
-        if masters.contains(&from) {
+        if run.from.is_some_and(|from| masters.contains(&from)) {
             Self::Master
         } else if before
             .filter(of_master)
