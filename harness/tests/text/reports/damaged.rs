@@ -185,7 +185,10 @@ fn the_rigs_file_is_its_own() {
     std::fs::write(folder.join("run.jsonl"), other).expect("room");
     let (code, said) = verify(&folder);
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("line 1") && said.contains("[3]"), "{said}");
+    assert!(
+        said.contains("line 1") && said.contains("rings of 3 drives"),
+        "{said}"
+    );
 }
 
 /// Cut anywhere a record is one up to there, or says where it is none.
