@@ -5,7 +5,7 @@
 //! once, when the first drive receives it. It gives the byte to no drive but the one that is addressed, at that drive's own time,
 //! and puts it on the link behind the group when the last drive sends it.
 //!
-//! Times are those of [home](Entry::home): when a byte reaches the end of the ring. Sums are those of a drive before all others.
+//! Times are those of `Entry::home`: when a byte reaches the end of the ring. Sums are those of a drive before all others.
 //! With both, a byte has the same entry at every drive.
 //!
 //! A group ends at the first byte that its drives do not pass on in this way. Then each drive and each link gets the state that the

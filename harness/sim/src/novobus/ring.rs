@@ -2,7 +2,7 @@
 //!
 //! A drive sees nothing but what the one before it sends. So there is no queue of events for the whole
 //! ring: [`Ring::run_until`] walks it once, drive after drive, and each does everything that is due on
-//! its inbound link up to that time. Drives in a row that only pass bytes on are advanced together, as a [`Group`]; nothing but
+//! its inbound link up to that time. Drives in a row that only pass bytes on are advanced together, as a group; nothing but
 //! the cost shows it.
 
 use crate::fault::{DriveFault, LinkFault};
