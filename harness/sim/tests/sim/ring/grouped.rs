@@ -205,7 +205,7 @@ fn grouped_drives_do_what_each_does_by_itself() {
 }
 
 #[test]
-#[ignore = "minutes; the nightly run plays it"]
+#[ignore = "takes about 45 minutes; .ci/nightly runs it"]
 fn grouped_drives_do_what_each_does_in_a_million_rings() {
     play(1_000_000);
 }

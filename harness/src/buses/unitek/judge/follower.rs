@@ -301,8 +301,8 @@ impl Follower {
             self.mode_at = at;
         }
         match number {
-            // A load brings every parameter back; the EEPROM is not known.
             0x84 => self.supply.stored(),
+            // A load brings every parameter back; the EEPROM is not known.
             0x83 => {
                 self.supply.stored();
                 for other in REGISTERS.iter().filter(|own| own.access == Access::RW) {
