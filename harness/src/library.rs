@@ -117,7 +117,7 @@ impl Entry {
         }
         let scenario: Scenario = parse(&source)?;
         let range = scenario.header.rings.first();
-        let fits = |n: &u8| range.is_some_and(|own| (own.smallest..=own.largest).contains(n));
+        let fits = |drives: &u8| range.is_some_and(|own| own.contains(*drives));
         Self::new(source, drives.filter(fits))
     }
 
@@ -187,6 +187,12 @@ pub fn sources(names: &[PathBuf]) -> Result<Vec<Source>, LibraryError> {
         }
     }
     Ok(sources)
+}
+
+/// Whether the scenario of this name was named itself, and is not one of a folder or of all built-in ones.
+pub(crate) fn is_named(names: &[PathBuf], scenario: &str) -> bool {
+    let is = |name: &str| name == scenario || name == last(scenario);
+    names.iter().any(|name| name.to_str().is_some_and(is))
 }
 
 fn search(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), LibraryError> {
@@ -330,5 +336,26 @@ mod tests {
             .map(|own| natural(bare(&own.name)))
             .collect();
         assert!(names.is_sorted());
+    }
+
+    /// `run --ring N` reads every scenario for the size where it allows it: none may be wrong at an end of its range.
+    #[test]
+    fn built_in_scenarios_hold_at_both_ends_of_their_sizes() {
+        let (mut ends, mut wrong) = (0, Vec::new());
+        for source in sources(&[]).expect("the built-in ones") {
+            let name = source.name.clone();
+            let entry = Entry::new(source, None).expect("a scenario");
+            let Some(own) = entry.scenario.header.rings.first() else {
+                continue;
+            };
+            for size in [own.smallest, own.largest] {
+                if let Err(problems) = Entry::new(entry.source.clone(), Some(size)) {
+                    wrong.push(format!("{name} on a ring of {size}: {problems}"));
+                }
+                ends += usize::from(own.smallest != own.largest);
+            }
+        }
+        assert_eq!(wrong, [""; 0]);
+        assert!(ends > 100, "{ends} ends of ranges");
     }
 }

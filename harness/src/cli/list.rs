@@ -32,13 +32,7 @@ pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Resul
             .header
             .rings
             .iter()
-            .map(|ring| {
-                if ring.smallest == ring.largest {
-                    ring.smallest.to_string()
-                } else {
-                    format!("{}..{}", ring.smallest, ring.largest)
-                }
-            })
+            .map(|ring| ring.sizes())
             .collect();
         let bench = match rings.is_empty() {
             true => format!("{} {}", entry.scenario.bus.name(), entry.drives()),

@@ -12,18 +12,20 @@ use super::tally::Tally;
 use crate::buses::Bus;
 use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, too_large};
-use crate::library::{Entry, LibraryError, sources};
+use crate::library::{Entry, LibraryError, is_named, sources};
 use crate::link::Recording;
 use crate::report::finding::explain;
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
+use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome, Skip};
+use crate::scenario::source::Source;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
 
-/// Reads every scenario selected; a ring size is taken where the scenario allows it.
+/// Reads every scenario selected; the size of a rig's ring is taken where the scenario allows it.
 ///
 /// # Errors
 /// The first file that is not there, or the mistakes of every scenario that has some.
@@ -31,11 +33,29 @@ pub(crate) fn select(
     selection: &Selection,
     ring: Option<u8>,
 ) -> Result<Vec<Entry>, Vec<LibraryError>> {
+    select_by(selection, |source| Entry::fitting(source, ring))
+}
+
+/// Reads every scenario selected, for rings of the size that the user asked for. A scenario that was named itself must allow it; one of a
+/// folder or of all that does not is played on a ring of its own size.
+fn select_of_size(selection: &Selection, ring: u8) -> Result<Vec<Entry>, Vec<LibraryError>> {
+    select_by(selection, |source| {
+        match is_named(&selection.paths, &source.name) {
+            true => Entry::new(source, Some(ring)),
+            false => Entry::fitting(source, Some(ring)),
+        }
+    })
+}
+
+fn select_by(
+    selection: &Selection,
+    read: impl Fn(Source) -> Result<Entry, Box<Problems>>,
+) -> Result<Vec<Entry>, Vec<LibraryError>> {
     let sources = sources(&selection.paths).map_err(|error| vec![error])?;
     let mut entries = Vec::new();
     let mut errors: Vec<LibraryError> = Vec::new();
     for source in sources {
-        match Entry::fitting(source, ring) {
+        match read(source) {
             Ok(entry) => entries.push(entry),
             Err(problems) => errors.push(problems.into()),
         }
@@ -76,8 +96,11 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         Some(None) => return Ok(Exit::Usage),
     };
     let own = rig.as_ref().map(Rig::ring_size).filter(|own| *own > 0);
-    let size = own.or(arguments.ring);
-    let entries = match select(&arguments.selection, size) {
+    let selected = match arguments.ring {
+        Some(asked) => select_of_size(&arguments.selection, asked),
+        None => select(&arguments.selection, own),
+    };
+    let entries = match selected {
         Ok(entries) => entries,
         Err(errors) => {
             errors.iter().for_each(|error| output.library_error(error));
@@ -173,6 +196,7 @@ fn on_simulated(
     }
     bar.finish_and_clear();
     output.result(&tally.summary())?;
+    output.say(&other_sizes(entries, arguments.ring));
     let head = Head {
         found: Vec::new(),
         title: "drivebench: scenarios on simulated drives",
@@ -186,6 +210,23 @@ fn on_simulated(
         return Ok(Exit::RigError);
     }
     Ok(cases.write(tally.exit(arguments.require_all), output))
+}
+
+/// How many scenarios were not played on rings of the size that was asked for.
+fn other_sizes(entries: &[Entry], asked: Option<u8>) -> String {
+    let Some(asked) = asked else {
+        return String::new();
+    };
+    let drives = |entry: &Entry| Some(entry.plan.as_ref()?.rings.first()?.drives());
+    let other = entries.iter().filter(|entry| drives(entry) != Some(asked));
+    match other.count() {
+        0 => String::new(),
+        count => format!(
+            "on benches of their own sizes, because they are not for rings of {}: {}\n",
+            counted(usize::from(asked), "drive"),
+            counted(count, "scenario")
+        ),
+    }
 }
 
 /// Plays a scenario on simulated rings of its own, into the folder where there is one.

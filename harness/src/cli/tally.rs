@@ -3,7 +3,7 @@
 
 use super::exit::Exit;
 use crate::counted::counted;
-use crate::library::Entry;
+use crate::library::{Entry, is_named};
 use crate::scenario::run::{Outcome, Unlock, Why, together};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -50,11 +50,8 @@ impl Tally {
             *self.unlocks.entry(unlocks.clone()).or_default() += 1;
         }
         let why = outcome.skip.as_ref().map(|skip| &skip.why);
-        let is = |path: &PathBuf| {
-            let name = path.to_str();
-            name == Some(entry.name.as_str()) || name == Some(entry.short_name())
-        };
-        self.named_denied |= matches!(why, Some(Why::Denied(_))) && self.named.iter().any(is);
+        self.named_denied |=
+            matches!(why, Some(Why::Denied(_))) && is_named(&self.named, &entry.name);
         self.count(outcome);
     }
 

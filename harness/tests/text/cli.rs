@@ -229,6 +229,28 @@ fn a_ring_of_another_size_is_taken_where_the_scenario_allows_it() {
     assert_eq!(code(&drivebench(&["run", text(&path)])), 2);
 }
 
+/// A scenario that was named is not played on a ring of another size than the one asked for; one of a folder is, and the run says so.
+#[test]
+fn a_ring_of_another_size_is_refused_where_the_named_scenario_forbids_it() {
+    let path = file("other_sizes", "a.scn", "title a\nring 1..60\n> 80\n< 80\n");
+    for named in [text(&path), "9.4-process-data-cut", "8.2-exchange-1"] {
+        let output = drivebench(&["run", named, "--ring", "61"]);
+        assert_eq!(code(&output), 2, "{named}");
+        let said = stderr(&output);
+        assert!(said.contains("not for a ring of 61"), "{said}");
+        assert!(said.contains("nothing was played"), "{said}");
+    }
+    let folder = path.parent().expect("a folder");
+    let output = drivebench(&["run", text(folder), "--ring", "61"]);
+    assert_eq!(code(&output), 0);
+    let said = stderr(&output);
+    let expected =
+        "on benches of their own sizes, because they are not for rings of 61 drives: 1 scenario\n";
+    assert_eq!(said, expected);
+    let output = drivebench(&["run", text(folder), "--ring", "60"]);
+    assert_eq!((code(&output), stderr(&output).as_str()), (0, ""));
+}
+
 #[test]
 fn the_trace_of_an_example_is_what_the_documentation_says() {
     let output = drivebench(&["trace", "9.7-parity-error", "--format", "json"]);

@@ -192,14 +192,16 @@ fn steps<L: Language>(
 }
 
 fn too_long((sent, room): (usize, usize), expected: usize, span: Span) -> Option<Problem> {
-    let what = if expected > MAX_BYTES {
-        format!("more than {MAX_BYTES} bytes expected in one scenario")
+    let (what, remedy) = if expected > MAX_BYTES {
+        let what = format!("more than {MAX_BYTES} bytes expected in one scenario");
+        (what, "fewer bytes, in several scenarios")
     } else if sent > room {
-        format!("more than {room} bytes sent in one scenario on this ring")
+        let what = format!("more than {room} bytes sent in one scenario on this ring");
+        (what, "fewer bytes, or a smaller ring")
     } else {
         return None;
     };
-    Some(Problem::new(span, what, "fewer bytes expected here"))
+    Some(Problem::new(span, what, remedy))
 }
 
 /// Settles one more step for the bench of a plan.

@@ -138,7 +138,7 @@ fn no_header_line(step: &Step) -> Problem {
 /// The mistake in the `ring` line of a header that is not for rings of these sizes.
 pub(crate) fn for_other_rings(header: &Header, rings: &[u8]) -> Option<Problem> {
     let own = &header.rings;
-    let fits = |(range, size): (&RingRange, &u8)| (range.smallest..=range.largest).contains(size);
+    let fits = |(range, size): (&RingRange, &u8)| range.contains(*size);
     if own.is_empty() || own.len() == rings.len() && own.iter().zip(rings).all(fits) {
         return None;
     }

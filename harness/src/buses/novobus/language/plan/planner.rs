@@ -55,7 +55,7 @@ fn sizes(scenario: &Scenario<Novobus>, size: Option<u8>) -> Result<Vec<RingSize>
     let mut rings = Vec::new();
     for (index, range) in scenario.header.rings.iter().enumerate() {
         let wanted = size.filter(|_| index == 0).unwrap_or(range.default);
-        if !(range.smallest..=range.largest).contains(&wanted) {
+        if !range.contains(wanted) {
             return Err(Problem::new(
                 range.span,
                 format!("the scenario is not for a ring of {wanted}"),

@@ -186,6 +186,21 @@ impl RingRange {
             span: Span::default(),
         }
     }
+
+    /// Whether rings of so many drives belong to it.
+    #[must_use]
+    pub fn contains(&self, drives: u8) -> bool {
+        (self.smallest..=self.largest).contains(&drives)
+    }
+
+    /// The sizes as a header has them, without the default: `3` or `1..250`.
+    #[must_use]
+    pub fn sizes(&self) -> String {
+        match self.smallest == self.largest {
+            true => self.smallest.to_string(),
+            false => format!("{}..{}", self.smallest, self.largest),
+        }
+    }
 }
 
 /// Drives: one, or all from one to another, in ring 1 or ring 2.

@@ -46,19 +46,9 @@ pub(crate) fn devices(header: &Header) -> Vec<String> {
 }
 
 fn sizes(range: &RingRange) -> String {
-    let RingRange {
-        smallest,
-        largest,
-        default,
-        ..
-    } = range;
-    let sizes = match smallest == largest {
-        true => smallest.to_string(),
-        false => format!("{smallest}..{largest}"),
-    };
-    match default == smallest {
-        true => sizes,
-        false => format!("{sizes} default {default}"),
+    match range.default == range.smallest {
+        true => range.sizes(),
+        false => format!("{} default {}", range.sizes(), range.default),
     }
 }
 
