@@ -13,7 +13,6 @@ use crate::capture::{
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
-use crate::link::link_name;
 use crate::regular;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
@@ -114,7 +113,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         capture.end(),
     );
     output.result(&line)?;
-    output.say(&details(&judged, &capture));
+    output.say(&details(&judged));
     Ok(Exit::of(&[judged.verdict], false))
 }
 
@@ -247,23 +246,10 @@ fn write_scenario(
 }
 
 /// What there is to say about a judgement, for people.
-fn details(judged: &Judged, capture: &Capture) -> String {
+fn details(judged: &Judged) -> String {
     let mut text = String::new();
-    // Writing to a String cannot fail.
-    if judged.verdict == Verdict::Inconclusive {
-        let missing = capture
-            .traces
-            .iter()
-            .enumerate()
-            .map(|(ring, trace)| link_name(ring, trace.stations, usize::from(trace.stations)));
-        let missing: Vec<_> = missing.collect();
-        let _infallible = writeln!(
-            text,
-            "  note: the master's incoming link ({}) was not captured",
-            missing.join(", ")
-        );
-    }
     if judged.adopted > 0 {
+        // Writing to a String cannot fail.
         let _infallible = writeln!(
             text,
             "  note: {} taken to hold the first value that the drives reported",

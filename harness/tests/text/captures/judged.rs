@@ -196,6 +196,80 @@ fn what_is_left_to_the_drive_accuses_no_drive() {
     }
 }
 
+/// A capture does not show whether drives monitor time-outs (ND21 9.9): where monitoring explains every byte, it is taken for their setting.
+#[test]
+fn monitoring_is_a_setting_of_right_drives() {
+    for name in [
+        "9.9-broken-ring-1-0",
+        "9.9-broken-ring-master-3",
+        "9.9-equal-clocks",
+    ] {
+        let judged = judge(&imported(&built_in(name)), &options(None)).expect("judged");
+        assert_eq!(
+            (judged.verdict, judged.links.differ),
+            (Verdict::Passed, 0),
+            "{name}"
+        );
+        let why = judged.remarks.last().expect("a remark");
+        assert!(why.contains("monitor time-outs"), "{name}: {why}");
+    }
+}
+
+/// It explains nothing else that a drive does in the error mode.
+#[test]
+fn monitoring_excuses_no_wrong_drive() {
+    let broken = text("9.9-broken-ring-2-1");
+    for deviation in [
+        "counts-7-zeros",
+        "never-increments",
+        "increments-twice-in-error-mode",
+    ] {
+        let wrong = broken.replace(
+            "strict\n",
+            &format!("strict\ndrive 0 deviates {deviation}\n"),
+        );
+        assert_ne!(wrong, broken);
+        let judged = judge(&imported(&run(&wrong)), &options(None)).expect("judged");
+        assert_eq!(judged.verdict, Verdict::Failed, "{deviation}");
+    }
+}
+
+/// A value that the manual leaves open and that explains every byte is named, and settles nothing.
+#[test]
+fn an_open_value_that_explains_a_capture_is_named() {
+    for (name, property) in [
+        (
+            "9.2-empty-short-telegram-error",
+            "empty-short-telegram = error",
+        ),
+        ("9.2-short-address-kept-sum", "short-address = kept-sum"),
+    ] {
+        let judged = judge(&imported(&built_in(name)), &options(None)).expect("judged");
+        let why = judged.remarks.last().expect("a remark").as_str();
+        assert_eq!(judged.verdict, Verdict::Inconclusive, "{name}: {why}");
+        assert!(
+            why.contains(property) && why.contains("--setup"),
+            "{name}: {why}"
+        );
+    }
+}
+
+/// What a reset loads is not known (ND21 10.5), and that the master's incoming link is missing is said only where it is.
+#[test]
+fn what_a_reset_loads_accuses_no_drive() {
+    let judged = judge(
+        &imported(&built_in("14.3.3-counter-after-reset")),
+        &options(None),
+    );
+    let judged = judged.expect("judged");
+    assert_eq!(judged.verdict, Verdict::Inconclusive);
+    let why = judged.remarks.join("; ");
+    assert!(
+        why.contains("a reset has changed") && !why.contains("not captured"),
+        "{why}"
+    );
+}
+
 /// It excuses nothing else: a write to RAM that is not taken, a wrong checking byte of an answer with a cell of the drive's own.
 #[test]
 fn what_is_left_to_the_drive_excuses_nothing_else() {

@@ -1,11 +1,14 @@
 //! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
 use super::begin::{after_silences, from, is_midway, is_one_telegram};
-use super::scenario::{Options, SketchError, scenario, unforeseen};
+use super::open::explanations;
+use super::scenario::{Options, SketchError, scenario_with, unforeseen};
+use super::stimuli::Told;
+use crate::buses::novobus::language::syntax::Header;
 use crate::capture::Capture;
 use crate::capture::diff::{ComparedRun, Summary, compare};
 use crate::library::Entry;
-use crate::link::Link;
+use crate::link::{Link, link_name};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, play};
 use crate::scenario::simulate::simulated;
@@ -39,7 +42,8 @@ pub struct Judged {
 const MOST_STARTS: usize = 6;
 
 /// Why plain memory differs from a right drive.
-const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself (ND21 9.4, 14.2): describe the drives with --setup";
+const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself or that a reset has changed (ND21 9.4, 10.5, 14.2): \
+     describe the drives with --setup";
 
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
@@ -116,8 +120,35 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
 }
 
 fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
-    let (model, remarks) = model(capture, options)?;
     let told = unforeseen(capture);
+    let judged = judge_as(capture, options, &told, &Header::default())?;
+    if judged.verdict != Verdict::Failed || options.setup.is_some() {
+        return Ok(judged);
+    }
+    for explanation in explanations(capture, &told) {
+        let Ok(mut explained) = judge_as(capture, options, &told, &explanation.header) else {
+            continue;
+        };
+        if explained.links.differ > 0 {
+            continue;
+        }
+        explained.remarks.push(explanation.remark());
+        if !explanation.is_a_setting() {
+            explained.verdict = Verdict::Inconclusive;
+        }
+        return Ok(explained);
+    }
+    Ok(judged)
+}
+
+/// Judges a capture beside simulated drives with more in their header.
+fn judge_as(
+    capture: &Capture,
+    options: &Options<'_>,
+    told: &[Told],
+    more: &Header,
+) -> Result<Judged, JudgeError> {
+    let (model, remarks) = model(capture, options, more)?;
     let model = only_captured(&model, capture);
     let behind = |ring: usize, own: &Channel, index: usize| {
         // Data behind the drive that cannot be predicted stand at the same place on the last link.
@@ -142,7 +173,8 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
     let links = compare(left, right, tolerance, &behind, end);
     let last =
         |trace: &harness_sim::record::Trace| trace.channels.iter().any(|link| link.to.is_none());
-    let verdict = if !capture.traces.iter().all(last) {
+    let is_whole = capture.traces.iter().all(last);
+    let verdict = if !is_whole {
         Verdict::Inconclusive
     } else if master.differ > 0 {
         Verdict::Failed
@@ -167,15 +199,29 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
         located: located(capture),
         remarks,
     };
-    Ok(match in_doubt {
-        true => judged.in_doubt(OF_DRIVES),
-        false => judged,
+    Ok(match (is_whole, in_doubt) {
+        (false, _) => judged.in_doubt(&not_captured(capture)),
+        (true, true) => judged.in_doubt(OF_DRIVES),
+        (true, false) => judged,
     })
 }
 
+/// The links without which there is no verdict.
+fn not_captured(capture: &Capture) -> String {
+    let rings = capture.traces.iter().enumerate();
+    let last = rings.map(|(ring, own)| link_name(ring, own.stations, usize::from(own.stations)));
+    let last: Vec<_> = last.collect();
+    let last = last.join(", ");
+    format!("the master's incoming link ({last}) was not captured")
+}
+
 /// What the model does where the same is done to it.
-fn model(capture: &Capture, options: &Options<'_>) -> Result<(Capture, Vec<String>), JudgeError> {
-    let text = scenario(capture, options)?;
+fn model(
+    capture: &Capture,
+    options: &Options<'_>,
+    more: &Header,
+) -> Result<(Capture, Vec<String>), JudgeError> {
+    let text = scenario_with(capture, options, more)?;
     let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
     let entry = Entry::new(source, None)?;
     let Some(plan) = &entry.plan else {

@@ -3,5 +3,6 @@
 mod begin;
 pub(crate) mod json;
 pub(crate) mod judge;
+mod open;
 pub(crate) mod scenario;
 pub(crate) mod stimuli;

@@ -69,6 +69,15 @@ pub enum SketchError {
 /// # Errors
 /// [`SketchError`].
 pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, SketchError> {
+    scenario_with(capture, options, &Header::default())
+}
+
+/// The scenario's text, with more in its header.
+pub(super) fn scenario_with(
+    capture: &Capture,
+    options: &Options<'_>,
+    more: &Header,
+) -> Result<String, SketchError> {
     let mut rings = Vec::new();
     for (index, trace) in capture.traces.iter().enumerate() {
         rings.push(Ring::of(index, trace)?);
@@ -82,7 +91,7 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
         .sum();
     let width = (bytes * 2 / LINES).clamp(A_LINE, MOST_A_LINE);
     let mut text: Text = Text::default();
-    text.header(&head(capture, options, &rings)?);
+    text.header(&head(capture, options, &rings, more)?);
     text.empty_line();
     for (index, trace) in capture.traces.iter().enumerate() {
         for link in &trace.channels {
@@ -138,6 +147,7 @@ fn head(
     capture: &Capture,
     options: &Options<'_>,
     rings: &[Ring<'_>],
+    more: &Header,
 ) -> Result<Scenario, SketchError> {
     let sizes: Vec<_> = rings.iter().map(|ring| ring.size.drives()).collect();
     // A setup also defines the contents of the cells.
@@ -157,7 +167,7 @@ fn head(
     let millis = capture.end().since_start().as_nanos() / 1_000_000 + 1_000;
     Ok(Scenario {
         deadline: Some(Duration::millis(millis.min(600_000))),
-        ..Scenario::new(&title(options.title), header)
+        ..Scenario::new(&title(options.title), header.and(more))
     })
 }
 

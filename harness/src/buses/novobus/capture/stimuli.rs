@@ -10,6 +10,9 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_sim::record::{Channel, Trace};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// The section of ResetH8.
+const RESET: &str = "10.5";
+
 /// What the first and the last link of a ring show.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Told {
@@ -18,7 +21,8 @@ pub(crate) struct Told {
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
     pub(crate) unforeseen: BTreeSet<usize>,
     /// Bytes received that plain memory may answer with other bytes than a right drive: process data, of which its settings choose the cell
-    /// (ND21 9.4), and data of cells that were written and that a drive may write itself (14.2), with their checking bytes.
+    /// (ND21 9.4), and data of cells that were written and that a drive may write itself (14.2), or that a reset may have changed (10.5), with
+    /// their checking bytes.
     pub(crate) own: BTreeSet<usize>,
 }
 
@@ -69,6 +73,8 @@ fn of_link(link: &Channel, asked: &[Role]) -> Told {
         own: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
         written: BTreeSet::new(),
+        last: BTreeMap::new(),
+        reset: BTreeSet::new(),
         open: BTreeMap::new(),
     };
     let mut observer = Observer::new(link.from, link.to);
@@ -105,6 +111,10 @@ struct Reader {
     now: BTreeMap<(u8, u16), Option<u8>>,
     /// Cells that the master has written.
     written: BTreeSet<(u8, u16)>,
+    /// The section of the last command to each drive.
+    last: BTreeMap<u8, &'static str>,
+    /// Drives that were reset.
+    reset: BTreeSet<u8>,
     /// Data of the answer that each drive is giving: place, cell and value.
     open: BTreeMap<u8, Vec<(usize, u16, u8)>>,
 }
@@ -124,6 +134,12 @@ impl Reader {
                     self.settle(drive, None);
                 }
             }
+            Role::Command {
+                drive: Some(drive),
+                section,
+            } => {
+                self.last.insert(drive, section);
+            }
             Role::Check {
                 drive: Some(drive),
                 writes,
@@ -133,6 +149,11 @@ impl Reader {
                     self.settle(drive, Some(index));
                 }
                 self.open.remove(&drive);
+                if self.last.remove(&drive) == Some(RESET) {
+                    self.reset.insert(drive);
+                    self.now.retain(|(own, _), _| *own != drive);
+                    self.written.retain(|(own, _)| *own != drive);
+                }
                 if let Some((address, width)) = writes {
                     for offset in 0..u16::from(width) {
                         let cell = (drive, address.wrapping_add(offset));
@@ -159,14 +180,18 @@ impl Reader {
     fn settle(&mut self, drive: u8, check: Option<usize>) {
         let (mut changed, mut own) = (false, false);
         for (index, address, value) in self.open.remove(&drive).unwrap_or_default() {
-            if self.written.contains(&(drive, address)) && is_of_the_drive(address) {
+            let left = match self.written.contains(&(drive, address)) {
+                true => is_of_the_drive(address),
+                false => self.reset.contains(&drive),
+            };
+            if left {
                 own = true;
                 self.told.own.insert(index);
             }
             match self.now.get(&(drive, address)) {
                 None => {
                     self.now.insert((drive, address), Some(value));
-                    if cell_exists(address) {
+                    if cell_exists(address) && !self.reset.contains(&drive) {
                         self.told.cells.insert((drive, address), value);
                     }
                 }

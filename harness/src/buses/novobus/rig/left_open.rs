@@ -3,44 +3,16 @@
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
 use super::judge::{Heard, known};
-use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup, SetupKind};
+use crate::buses::novobus::choice::{Choice, of_drives, of_the_bus};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::language::write::ring_prefix;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
 use crate::rig::check::Rig;
 use crate::rig::run::twin;
-use crate::scenario::times::Duration;
-use harness_proto::novobus::properties;
 use harness_proto::time::Span;
-use harness_sim::nd21;
-use std::fmt;
 
 /// The largest ring of which single drives are tried.
 const SMALL: u8 = 16;
-
-/// Times that a time-out may have, in milliseconds, but for the model's own 10 (ND21 9.9).
-const TIME_OUTS: std::ops::RangeInclusive<u64> = 11..=20;
-
-/// A value of an open property that is not the model's default.
-#[derive(Clone, Debug)]
-struct Choice {
-    /// The property.
-    property: &'static str,
-    /// It with its value.
-    setting: SetupKind,
-    /// The section of the ND21 manual that leaves it open.
-    section: &'static str,
-}
-
-impl fmt::Display for Choice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            property,
-            setting,
-            section,
-        } = self;
-        write!(f, "{property} = {} (ND21 {section})", setting.value())
-    }
-}
 
 /// Choices that explain every byte of an attempt.
 pub(crate) struct Explanation {
@@ -132,10 +104,7 @@ fn candidates<'c>(
 ) -> Vec<(&'c Choice, String, Header)> {
     let rings = || heard.way.rings.iter().enumerate();
     let setup = |whom: DriveRange, choice: &Choice| Setup::new(whom, choice.setting.clone());
-    let every = |choice: &Choice| -> Header {
-        let all = rings().map(|(ring, _)| setup(DriveRange::all(ring), choice));
-        all.collect()
-    };
+    let every = |choice: &Choice| choice.in_all(heard.way.rings.len());
     let mut all: Vec<_> = open
         .iter()
         .map(|choice| (choice, String::new(), every(choice)))
@@ -166,38 +135,12 @@ fn choices(rig: &Rig) -> Vec<Choice> {
     let profile = rig.profile.iter().map(|profile| &profile.header);
     let headers = profile.chain([&rig.setup]);
     let settings: Vec<_> = headers.flat_map(|own| &own.setups).collect();
-    let of_the_bus = properties::PROPERTIES.iter().flat_map(|property| {
-        let name = property.name;
-        let settings: Vec<_> = match name {
-            "time-out" => TIME_OUTS
-                .map(|ms| SetupKind::time(name, Duration::millis(ms)))
-                .collect(),
-            "time-out-wait" => Vec::new(),
-            _ => property.values[1..]
-                .iter()
-                .map(|word| SetupKind::word(name, word))
-                .collect(),
-        };
-        settings.into_iter().map(move |setting| Choice {
-            property: name,
-            setting,
-            section: property.section,
-        })
-    });
-    let of_drives = nd21::PROPERTIES.iter().flat_map(|property| {
-        let values = property.words().skip(1);
-        values.map(|value| Choice {
-            property: property.name,
-            setting: SetupKind::word(property.name, value),
-            section: property.section,
-        })
-    });
     let settled = |choice: &Choice| {
         let mut all = settings.iter();
         all.any(|own| own.sets() == Some(choice.property))
     };
-    of_the_bus
-        .chain(of_drives)
+    of_the_bus()
+        .chain(of_drives())
         .filter(|choice| !settled(choice))
         .collect()
 }

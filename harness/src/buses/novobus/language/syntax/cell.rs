@@ -38,6 +38,19 @@ impl CellPlace {
         }
     }
 
+    /// The place at an address of the EEPROM, without a name.
+    #[must_use]
+    pub fn in_eeprom(address: u8) -> Self {
+        Self {
+            name: format!("{address:02X}"),
+            address: u16::from(address),
+            offset: None,
+            cell: None,
+            named: false,
+            span: Span::default(),
+        }
+    }
+
     /// The scale of the number that begins there.
     #[must_use]
     pub fn scale(&self) -> Option<Scale> {

@@ -1,0 +1,91 @@
+//! What a capture does not show of a right drive: whether it monitors time-outs, and how it does what the manual leaves open. One of them
+//! may be why a ring differs from plain memory.
+
+use super::stimuli::Told;
+use crate::buses::novobus::choice::{Choice, of_the_bus};
+use crate::buses::novobus::language::syntax::{
+    CellPlace, DriveRange, Header, Setup, SetupKind, Written,
+};
+use crate::capture::Capture;
+use crate::scenario::pattern::{Expected, Pattern};
+use harness_proto::nd21::{ee, ram};
+
+/// `EE_selftest` with bit 7: time-out monitoring (ND21 14.3.6).
+const MONITORING: u8 = 0x80;
+
+/// A longer capture is not played once more for each choice: its bytes on all links.
+const MOST_BYTES: usize = 100_000;
+
+/// Something that explains what differs.
+#[derive(Clone, Debug)]
+pub(super) struct Explanation {
+    /// What makes simulated drives behave so.
+    pub(super) header: Header,
+    /// The choices, in words; empty where the drives only monitor time-outs.
+    pub(super) words: String,
+}
+
+impl Explanation {
+    /// Whether it is a setting of right drives, and nothing that the manual leaves open.
+    pub(super) fn is_a_setting(&self) -> bool {
+        self.words.is_empty()
+    }
+
+    /// What it says to the user.
+    pub(super) fn remark(&self) -> String {
+        match self.is_a_setting() {
+            true => "the drives are taken to monitor time-outs (ND21 9.9, 14.10.2): so every byte is as the model says".to_owned(),
+            false => format!(
+                "{} explains every byte that differs: the manual leaves it open; describe the drives with --setup",
+                self.words
+            ),
+        }
+    }
+}
+
+/// What may explain a difference, the simplest first: monitoring, then each open value of the bus without it and with it.
+pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation> {
+    if capture.bytes() > MOST_BYTES {
+        return Vec::new();
+    }
+    let monitoring = monitoring(capture, told);
+    let with = |choice: &Choice, more: &Header, words: &str| Explanation {
+        header: choice.in_all(capture.traces.len()).and(more),
+        words: format!("`{choice}`{words}"),
+    };
+    let open: Vec<_> = of_the_bus().collect();
+    let plain = open
+        .iter()
+        .filter(|choice| !choice.property.starts_with("time-out"));
+    let plain = plain.map(|choice| with(choice, &Header::default(), ""));
+    let monitored = open
+        .iter()
+        .map(|choice| with(choice, &monitoring, " with time-out monitoring"));
+    let alone = Explanation {
+        header: monitoring.clone(),
+        words: String::new(),
+    };
+    std::iter::once(alone)
+        .chain(plain)
+        .chain(monitored)
+        .collect()
+}
+
+/// Monitoring in each drive that did not report whether it monitors.
+fn monitoring(capture: &Capture, told: &[Told]) -> Header {
+    let on = || Written::Bytes(Pattern::of(&[Expected::Byte(MONITORING)], usize::MAX));
+    let rings = capture.traces.iter().enumerate();
+    let drives =
+        rings.flat_map(|(ring, trace)| (0..trace.stations).map(move |drive| (ring, drive)));
+    let says = |ring: usize, drive: u8| {
+        let told = told.get(ring);
+        told.is_some_and(|told| told.cells.contains_key(&(drive, ram::FLAGS2)))
+    };
+    drives
+        .filter(|(ring, drive)| !says(*ring, *drive))
+        .map(|(ring, drive)| {
+            let place = CellPlace::in_eeprom(ee::SELFTEST);
+            Setup::new(DriveRange::one(ring, drive), SetupKind::Eeprom(place, on()))
+        })
+        .collect()
+}
