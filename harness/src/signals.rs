@@ -23,12 +23,31 @@ pub(crate) fn ending() -> impl Iterator<Item = c_int> {
 
 /// A flag that every ending signal sets from now on, and SIGTSTP (Ctrl-Z) too: a suspended program cannot stop the drives.
 pub(crate) fn interrupt_flag() -> Arc<AtomicBool> {
+    flag(ending().chain([SIGTSTP]))
+}
+
+fn flag(signals: impl Iterator<Item = c_int>) -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
-    for signal in ending().chain([SIGTSTP]) {
+    for signal in signals {
         // Where a signal cannot be caught, its default action stays.
         let _as_before = signal_hook::flag::register(signal, Arc::clone(&flag));
     }
     flag
+}
+
+/// The same without SIGINT: Ctrl-C ends what is under way, and not the program.
+pub(crate) fn interrupt_flag_without_ctrl_c() -> Arc<AtomicBool> {
+    flag(ending().filter(|own| *own != SIGINT).chain([SIGTSTP]))
+}
+
+/// Does something at each SIGINT (Ctrl-C) from now on, in a thread of its own.
+///
+/// # Errors
+/// The signal cannot be caught.
+pub(crate) fn at_ctrl_c(mut act: impl FnMut() + Send + 'static) -> std::io::Result<()> {
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT])?;
+    std::thread::spawn(move || signals.forever().for_each(|_| act()));
+    Ok(())
 }
 
 /// Two flags: one that every ending signal sets from now on but SIGHUP, and one that SIGHUP sets.

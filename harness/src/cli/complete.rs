@@ -40,14 +40,14 @@ pub(crate) fn complete(words: &[String], output: &mut Output) -> std::io::Result
 
 /// What can stand at the cursor.
 #[derive(Debug, Default, PartialEq, Eq)]
-struct Fitting {
-    words: Vec<String>,
+pub(crate) struct Fitting {
+    pub(crate) words: Vec<String>,
     /// File names can.
     files: bool,
 }
 
 /// What fits in place of the last word.
-fn fitting(command: &Command, words: &[String]) -> Fitting {
+pub(crate) fn fitting(command: &Command, words: &[String]) -> Fitting {
     let Some((current, before)) = words.split_last() else {
         return Fitting::default();
     };

@@ -21,6 +21,17 @@ pub(crate) struct Output {
     width: Option<usize>,
     /// Results and messages, where they are collected for an answer in place of being written.
     collected: Option<[String; 2]>,
+    /// Takes results and messages in place of the streams of the process.
+    given: Option<Box<dyn Fn(Stream, &str)>>,
+}
+
+/// What a text is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stream {
+    /// A result: standard output.
+    Result,
+    /// A message for people: standard error.
+    Message,
 }
 
 /// Maximum bytes that are collected of results, and of messages.
@@ -86,6 +97,7 @@ impl Output {
             full_screen: streams.out_is_terminal && !streams.dumb,
             width: streams.width.filter(|_| streams.out_is_terminal),
             collected: None,
+            given: None,
         }
     }
 
@@ -99,6 +111,17 @@ impl Output {
             full_screen: false,
             width: None,
             collected: Some(Default::default()),
+            given: None,
+        }
+    }
+
+    /// Gives results and messages to `take` from now on. The screen is not its own: there is no progress and no full screen.
+    pub(crate) fn given_to(self, take: impl Fn(Stream, &str) + 'static) -> Self {
+        Self {
+            progress: false,
+            full_screen: false,
+            given: Some(Box::new(take)),
+            ..self
         }
     }
 
@@ -116,13 +139,21 @@ impl Output {
     }
 
     /// Keeps a text where texts are collected; of too long ones their beginning.
-    fn collect(&mut self, stream: usize, text: &str) -> bool {
+    fn collect(&mut self, stream: Stream, text: &str) -> bool {
         let Some(collected) = &mut self.collected else {
             return false;
         };
-        if collected[stream].len() < MOST_COLLECTED {
-            collected[stream].push_str(text);
+        if collected[stream as usize].len() < MOST_COLLECTED {
+            collected[stream as usize].push_str(text);
         }
+        true
+    }
+
+    fn give(&self, stream: Stream, text: &str) -> bool {
+        let Some(take) = &self.given else {
+            return false;
+        };
+        take(stream, text);
         true
     }
 
@@ -144,7 +175,7 @@ impl Output {
 
     /// Writes a result.
     pub(crate) fn result(&mut self, text: &str) -> std::io::Result<()> {
-        if self.collect(0, text) {
+        if self.collect(Stream::Result, text) || self.give(Stream::Result, text) {
             return Ok(());
         }
         let mut out = std::io::stdout().lock();
@@ -165,7 +196,7 @@ impl Output {
 
     /// Writes to standard error; a failure is ignored, because a closed standard error means that no one reads it.
     pub(crate) fn say(&mut self, text: &str) {
-        if self.collect(1, text) {
+        if self.collect(Stream::Message, text) || self.give(Stream::Message, text) {
             return;
         }
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());

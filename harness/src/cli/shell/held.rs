@@ -15,6 +15,9 @@ pub(crate) trait HeldBench {
     /// The numbers of its drives.
     fn drives(&self) -> Vec<String>;
 
+    /// The name of a drive's actual speed.
+    fn speed(&self) -> &'static str;
+
     /// Runs a command on it.
     ///
     /// # Errors
@@ -66,6 +69,9 @@ pub(crate) trait HeldBench {
 
 /// What a session asks of the drives of a port.
 pub(crate) trait HeldDrives: PortDrives {
+    /// The name of a drive's actual speed.
+    const SPEED: &'static str;
+
     /// Runs a command.
     ///
     /// # Errors
@@ -96,6 +102,10 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
             .iter()
             .map(|own| D::number(own).to_string())
             .collect()
+    }
+
+    fn speed(&self) -> &'static str {
+        D::SPEED
     }
 
     fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::spawn;
 use std::time::Duration;
@@ -48,25 +48,23 @@ pub(crate) struct RequestReader {
 
 impl RequestReader {
     /// Reads requests from an input in a thread of its own.
-    pub(crate) fn read(
-        input: impl Read + Send + 'static,
-        interrupt: Arc<AtomicBool>,
-        out: LineWriter,
-    ) -> Self {
-        let inbox = Self {
-            state: Arc::default(),
-            interrupt,
-        };
-        let own = inbox.clone();
+    pub(crate) fn read(&self, input: impl Read + Send + 'static, out: LineWriter) {
+        let own = self.clone();
         spawn(move || {
             let mut input = BufReader::new(input);
             while let Ok(Some(line)) = next_line(&mut input) {
                 own.take_line(line, &out);
             }
-            own.lock().waiting.push_back(SessionItem::End);
-            own.state.1.notify_one();
+            own.push_end();
         });
-        inbox
+    }
+
+    /// One that nothing is read for yet. `interrupt` ends what is under way on the bus.
+    pub(crate) fn new(interrupt: Arc<AtomicBool>) -> Self {
+        Self {
+            state: Arc::default(),
+            interrupt,
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, Waiting> {
@@ -86,6 +84,14 @@ impl RequestReader {
             Ok(request) => request,
             Err(what) => return out.error(id, Exit::Usage, what),
         };
+        if !self.push(id.clone(), request) {
+            let what = format!("{MOST_WAITING} requests wait already: wait for answers");
+            out.error(id, Exit::Usage, what);
+        }
+    }
+
+    /// Lets a request wait for its turn; `false` where too many wait already. `stop` and `cancel` overtake.
+    pub(crate) fn push(&self, id: Value, request: SessionRequest) -> bool {
         let mut state = self.lock();
         match &request {
             SessionRequest::Stop { .. } => {
@@ -96,14 +102,27 @@ impl RequestReader {
                 self.break_off(&mut state, of.as_ref());
                 state.waiting.push_front(SessionItem::Ask(id, request));
             }
-            _ if state.waiting.len() >= MOST_WAITING => {
-                drop(state);
-                let what = format!("{MOST_WAITING} requests wait already: wait for answers");
-                return out.error(id, Exit::Usage, what);
-            }
+            _ if state.waiting.len() >= MOST_WAITING => return false,
             _ => state.waiting.push_back(SessionItem::Ask(id, request)),
         }
         self.state.1.notify_one();
+        true
+    }
+
+    /// The input has ended: so does the session, when it has done what waits.
+    pub(crate) fn push_end(&self) {
+        self.lock().waiting.push_back(SessionItem::End);
+        self.state.1.notify_one();
+    }
+
+    /// What is under way from now on ends like a request.
+    pub(crate) fn begin(&self) {
+        self.lock().under_way = Some(Value::Null);
+    }
+
+    /// Whether nothing waits.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lock().waiting.is_empty()
     }
 
     /// Ends the request under way and takes back those that wait, or one of them.
@@ -156,7 +175,7 @@ impl RequestReader {
 
 /// The next line without its end; `None` for one that is too long, and at the end of the input. A line without an end is read too: a JSON
 /// object is whole or it is none.
-fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Option<Vec<u8>>>> {
+pub(super) fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Option<Vec<u8>>>> {
     let mut line = Vec::new();
     let most = LONGEST as u64 + 1;
     if input.take(most).read_until(b'\n', &mut line)? == 0 {
@@ -173,10 +192,17 @@ fn next_line(input: &mut impl BufRead) -> std::io::Result<Option<Option<Vec<u8>>
     Ok(Some(None))
 }
 
+/// What waits to be written.
+enum Unwritten {
+    Text(String),
+    /// All in front of it is written.
+    Mark(SyncSender<()>),
+}
+
 /// Lines that wait to be written.
 #[derive(Clone)]
 pub(crate) struct LineWriter {
-    lines: SyncSender<String>,
+    lines: SyncSender<Unwritten>,
     stuck: Arc<AtomicBool>,
 }
 
@@ -185,16 +211,19 @@ impl LineWriter {
     pub(crate) fn write(
         mut output: impl Write + Send + 'static,
     ) -> (Self, std::thread::JoinHandle<()>) {
-        let (lines, waiting) = sync_channel::<String>(MOST_UNREAD);
+        let (lines, waiting) = sync_channel(MOST_UNREAD);
         let stuck = Arc::<AtomicBool>::default();
         let broken = Arc::clone(&stuck);
         let thread = spawn(move || {
-            for line in waiting {
-                if output
-                    .write_all(line.as_bytes())
-                    .and_then(|()| output.flush())
-                    .is_err()
-                {
+            for own in waiting {
+                let written = match own {
+                    Unwritten::Text(text) => output.write_all(text.as_bytes()),
+                    Unwritten::Mark(done) => {
+                        let _nobody_waits_any_more = done.send(());
+                        continue;
+                    }
+                };
+                if written.and_then(|()| output.flush()).is_err() {
                     broken.store(true, Ordering::Relaxed);
                     return;
                 }
@@ -208,16 +237,24 @@ impl LineWriter {
         self.stuck.load(Ordering::Relaxed)
     }
 
-    /// Writes a line.
+    /// Writes a line of JSON.
     pub(crate) fn put(&self, line: &SessionLine) {
-        let Ok(text) = serde_json::to_string(line) else {
-            return;
-        };
-        match self.lines.try_send(text + "\n") {
-            Ok(()) => {}
-            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
-                self.stuck.store(true, Ordering::Relaxed);
-            }
+        if let Ok(text) = serde_json::to_string(line) {
+            self.text(text + "\n");
+        }
+    }
+
+    /// Writes a text.
+    pub(crate) fn text(&self, text: impl Into<String>) {
+        let lost = self.lines.try_send(Unwritten::Text(text.into())).is_err();
+        self.stuck.fetch_or(lost, Ordering::Relaxed);
+    }
+
+    /// Waits until all is written, for at most a second.
+    pub(crate) fn wait(&self) {
+        let (done, written) = sync_channel(1);
+        if self.lines.try_send(Unwritten::Mark(done)).is_ok() {
+            let _too_late = written.recv_timeout(Duration::from_secs(1));
         }
     }
 

@@ -1,18 +1,19 @@
-//! `drivebench shell --json`: a session that holds a bench, for programs. One request a line on standard input, one answer a line on standard
-//! output.
+//! `drivebench shell`: a session that holds a bench. People type commands with an editor, or write them into a pipe; with `--json` programs
+//! send one request a line on standard input and get one answer a line on standard output.
 
 mod held;
 mod inbox;
+mod people;
 mod request;
 
 pub(crate) use held::{HeldBench, HeldDrives, HeldPort};
 pub(crate) use request::schema;
 
-use super::args::{Arguments, Command};
+use super::args::{Arguments, ColourWhen, Command, ShowProgress};
 use super::exit::Exit;
 use super::failure::{Failure, exit_of_trouble};
 use super::help::command;
-use super::output::Output;
+use super::output::{Output, Stream};
 use super::rig_failure::{alarm, find_any_rig, tell_end};
 use super::run::play_entry;
 use crate::buses::{Bus, hold};
@@ -21,14 +22,16 @@ use crate::link::Trouble;
 use crate::rig::{Options, Rig};
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::source::{Source, line_number};
-use crate::signals::interrupt_flag;
+use crate::signals::{at_ctrl_c, interrupt_flag, interrupt_flag_without_ctrl_c};
 use clap::{Args, FromArgMatches};
 use harness_proto::time::Span;
 use inbox::{LineWriter, RequestReader, SessionItem};
+use people::{LineEditor, Turn, read_pipe};
 use request::{SCHEMA, SessionEvent, SessionLine, SessionRequest};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -64,6 +67,12 @@ const KEPT: Span = Span::from_micros(500);
 /// How often a session in virtual time looks for a signal.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// The most drives that are asked for their speeds before each prompt.
+const MOST_IN_PROMPT: usize = 8;
+
+/// A drive that turns no faster than this stands, in the unit of its speed.
+const STANDS: f64 = 0.5;
+
 /// The longest wait that a request may ask for.
 const LONGEST_WAIT: u32 = 60_000;
 
@@ -73,8 +82,8 @@ pub struct ShellArguments {
     /// The rig: sim:N, sim:unitek:N, sim:nordac:N, a file, or a name that `rig list` shows.
     #[arg(long, value_name = "RIG", default_value = "sim:3")]
     pub rig: String,
-    /// Read JSON requests, one a line, and write JSON answers; `schema session` describes both.
-    #[arg(long, required = true)]
+    /// For programs: read JSON requests, one a line, and write JSON answers; `schema session` describes both.
+    #[arg(long)]
     pub json: bool,
     /// Let motors turn; the rig's file must allow it too.
     #[arg(long = "move", visible_alias = "allow-motion")]
@@ -84,8 +93,30 @@ pub struct ShellArguments {
     pub wait: Option<Duration>,
 }
 
+/// Who asks, and how answers are written.
+enum Asker {
+    /// A program: JSON.
+    Program,
+    /// People: text.
+    People {
+        /// Gives the prompt to who reads lines.
+        turn: Turn,
+        /// The lines come from a pipe or a file: the first that fails ends the session.
+        piped: bool,
+        /// A line is done, and the next is not read before the prompt.
+        awaited: bool,
+    },
+}
+
 /// Holds a bench until the input ends.
 pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io::Result<Exit> {
+    match arguments.json {
+        true => for_program(arguments, output),
+        false => for_people(arguments),
+    }
+}
+
+fn for_program(arguments: &ShellArguments, output: &mut Output) -> std::io::Result<Exit> {
     // Nothing else may write to standard output from now on: it becomes standard error for the rest of the program.
     let lines = File::from(rustix::io::dup(rustix::stdio::stdout())?);
     rustix::stdio::dup2_stdout(rustix::stdio::stderr())?;
@@ -96,7 +127,11 @@ pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io:
         rig: arguments.rig.clone(),
     }));
     let mut told = Output::collecting();
-    let exit = serve(arguments, &out, &mut told);
+    let flags = [interrupt_flag(), interrupt_flag()];
+    let exit = serve(arguments, &out, &mut told, flags, |inbox| {
+        inbox.read(std::io::stdin(), out.clone());
+        Asker::Program
+    });
     let [_, what] = told.take_collected();
     output.say(&what);
     let what = what.trim_end().to_owned();
@@ -104,26 +139,93 @@ pub(crate) fn shell(arguments: &ShellArguments, output: &mut Output) -> std::io:
         code: exit as u8,
         what,
     }));
-    let stuck = out.is_stuck();
-    drop(out);
-    if !stuck {
-        // A client that reads nothing any more must not keep the program.
-        let mut naps = 0;
-        while !writer.is_finished() && naps < 100 {
-            std::thread::sleep(Duration::from_millis(10));
-            naps += 1;
-        }
+    finish(out, &writer);
+    Ok(exit)
+}
+
+fn for_people(arguments: &ShellArguments) -> std::io::Result<Exit> {
+    let input = std::io::stdin();
+    // The editor's thread may hold the terminal in its own mode when the session ends.
+    let mode = rustix::termios::tcgetattr(&input).ok();
+    let editor = match input.is_terminal() && std::io::stdout().is_terminal() {
+        true => Some(LineEditor::new(&arguments.rig).map_err(std::io::Error::other)?),
+        false => None,
+    };
+    let ((out, writer), editor) = match editor {
+        Some((editor, printer)) => (LineWriter::write(printer), Some(editor)),
+        None => (LineWriter::write(std::io::stdout()), None),
+    };
+    let flags = [
+        interrupt_flag_without_ctrl_c(),
+        interrupt_flag_without_ctrl_c(),
+    ];
+    let piped = editor.is_none();
+    let mut told = people_output(&out, piped);
+    let exit = serve(arguments, &out, &mut told, flags, |inbox| Asker::People {
+        turn: match editor {
+            Some(editor) => editor.read(inbox.clone(), out.clone()),
+            None => read_pipe(std::io::BufReader::new(input), inbox.clone(), out.clone()),
+        },
+        piped,
+        awaited: true,
+    });
+    drop(told);
+    finish(out, &writer);
+    if let Some(mode) = mode {
+        let input = std::io::stdin();
+        let _lost = rustix::termios::tcsetattr(input, rustix::termios::OptionalActions::Now, &mode);
     }
     Ok(exit)
 }
 
-fn serve(arguments: &ShellArguments, out: &LineWriter, told: &mut Output) -> Exit {
+/// What people read, in the colours of their terminal. Behind a pipe, messages go to standard error.
+fn people_output(out: &LineWriter, piped: bool) -> Output {
+    let out = out.clone();
+    Output::new(ColourWhen::Auto, ShowProgress::None).given_to(move |stream, text| {
+        if piped && stream == Stream::Message {
+            let _nobody_reads = std::io::stderr().lock().write_all(text.as_bytes());
+        } else {
+            out.text(text);
+        }
+    })
+}
+
+/// Waits until all is written.
+fn finish(out: LineWriter, writer: &std::thread::JoinHandle<()>) {
+    if out.is_stuck() {
+        return;
+    }
+    out.wait();
+    drop(out);
+    // A client that reads nothing any more must not keep the program.
+    let mut naps = 0;
+    while !writer.is_finished() && naps < 100 {
+        std::thread::sleep(Duration::from_millis(10));
+        naps += 1;
+    }
+}
+
+/// Opens the bench and does requests. The first flag is set by every signal that ends the program, the second one by what ends a request too.
+fn serve(
+    arguments: &ShellArguments,
+    out: &LineWriter,
+    told: &mut Output,
+    [ended, interrupt]: [Arc<AtomicBool>; 2],
+    listen: impl FnOnce(&RequestReader) -> Asker,
+) -> Exit {
     let Some(rig) = find_any_rig(&arguments.rig, told) else {
         return Exit::Usage;
     };
-    // Set by every signal that ends the program; the second one by `cancel` and `stop` too.
-    let ended = interrupt_flag();
-    let interrupt = interrupt_flag();
+    let inbox = RequestReader::new(Arc::clone(&interrupt));
+    // The opening ends like a request.
+    inbox.begin();
+    if !arguments.json {
+        let own = inbox.clone();
+        // Where the signal cannot be caught, its default action stays.
+        let _as_before = at_ctrl_c(move || {
+            let _overtakes = own.push(Value::Null, SessionRequest::Stop { drive: None });
+        });
+    }
     let options = Options {
         purpose: "shell".to_owned(),
         wait: arguments.wait.unwrap_or_default(),
@@ -137,15 +239,17 @@ fn serve(arguments: &ShellArguments, out: &LineWriter, told: &mut Output) -> Exi
         Ok(bench) => bench,
         Err(failure) => return failure.tell(told),
     };
+    let opened = !inbox.done();
     let bus = rig.port().map_or(Bus::DEFAULT, |port| port.bus.bus());
-    out.put(&SessionLine::Event(SessionEvent::Ready {
+    let ready = SessionEvent::Ready {
         bus: bus.name(),
         drives: bench.drives(),
         simulated: rig.is_simulated(),
         motion: arguments.leave,
-    }));
+    };
     let mut session = HeldSession {
-        inbox: RequestReader::read(std::io::stdin(), Arc::clone(&interrupt), out.clone()),
+        asker: listen(&inbox),
+        inbox,
         rig,
         bus,
         bench,
@@ -155,7 +259,11 @@ fn serve(arguments: &ShellArguments, out: &LineWriter, told: &mut Output) -> Exi
         ended,
         interrupt,
     };
-    let exit = session.work(told);
+    session.happened(ready);
+    let exit = match opened {
+        true => session.work(told),
+        false => Exit::Interrupted,
+    };
     let end = session
         .bench
         .end(matches!(exit, Exit::RigError | Exit::Interlock));
@@ -163,6 +271,7 @@ fn serve(arguments: &ShellArguments, out: &LineWriter, told: &mut Output) -> Exi
 }
 
 struct HeldSession {
+    asker: Asker,
     inbox: RequestReader,
     rig: Rig,
     bus: Bus,
@@ -183,6 +292,7 @@ impl HeldSession {
             false => Duration::ZERO,
         };
         loop {
+            self.prompt();
             if self.ended.load(Ordering::Relaxed) {
                 return Exit::Interrupted;
             }
@@ -196,10 +306,7 @@ impl HeldSession {
             }
             match self.inbox.next(patience) {
                 Some(SessionItem::End) => return Exit::Passed,
-                Some(SessionItem::Cancelled(id)) => {
-                    self.out
-                        .error(id, Exit::Interrupted, "cancelled before it began")
-                }
+                Some(SessionItem::Cancelled(id)) => self.cancelled(id),
                 Some(SessionItem::Ask(id, SessionRequest::End {})) => {
                     self.out.put(&SessionLine::Result {
                         id,
@@ -207,7 +314,11 @@ impl HeldSession {
                     });
                     return Exit::Passed;
                 }
-                Some(SessionItem::Ask(id, request)) => self.ask(id, &request),
+                Some(SessionItem::Ask(id, request)) => {
+                    if let Some(exit) = self.ask(id, &request) {
+                        return exit;
+                    }
+                }
                 None if self.rig.is_simulated() => {}
                 None => {
                     if let Err(failure) = self.bench.pass(KEPT)
@@ -216,9 +327,9 @@ impl HeldSession {
                         let mut own = Output::collecting();
                         failure.tell(&mut own);
                         let [_, what] = own.take_collected();
-                        self.out.put(&SessionLine::Event(SessionEvent::Bus {
+                        self.happened(SessionEvent::Bus {
                             what: what.trim_end().to_owned(),
-                        }));
+                        });
                         if let Err(failure) = self.bench.resume() {
                             return failure.tell(told);
                         }
@@ -226,8 +337,7 @@ impl HeldSession {
                 }
             }
             for what in self.bench.events() {
-                self.out
-                    .put(&SessionLine::Event(SessionEvent::Bus { what }));
+                self.happened(SessionEvent::Bus { what });
             }
             if let Some(exit) = self.in_trouble(told) {
                 return exit;
@@ -252,8 +362,130 @@ impl HeldSession {
         }
     }
 
-    /// Does a request and answers it.
-    fn ask(&mut self, id: Value, request: &SessionRequest) {
+    /// Reports what no request asked for.
+    fn happened(&self, event: SessionEvent) {
+        match (&self.asker, event) {
+            (Asker::Program, event) => self.out.put(&SessionLine::Event(event)),
+            (Asker::People { .. }, SessionEvent::Bus { what }) => {
+                self.out.text(format!("bus: {what}\n"));
+            }
+            (Asker::People { piped: false, .. }, SessionEvent::Ready { drives, .. }) => {
+                let drives = drives.join(", ");
+                let motion = match self.motion {
+                    true => "motors may turn as far as the rig's file permits",
+                    false => "motors stay off; `shell --move` lets them turn",
+                };
+                let text = format!(
+                    "{}: drives {drives}; {motion}. `help` lists the commands, Ctrl-C stops what moves, Ctrl-D ends in the safe state.\n",
+                    self.rig.id()
+                );
+                self.out.text(text);
+            }
+            (Asker::People { .. }, _) => {}
+        }
+    }
+
+    /// Gives the prompt to who waits for it, with the drives that move.
+    fn prompt(&mut self) {
+        let awaited = matches!(&self.asker, Asker::People { awaited: true, .. });
+        if !awaited || !self.inbox.is_empty() || self.bench.trouble().is_some() {
+            return;
+        }
+        let moving = match &self.asker {
+            Asker::People { piped: false, .. } if self.motion => self.moving(),
+            _ => String::new(),
+        };
+        let text = format!("{}{moving}> ", self.rig.id());
+        self.out.wait();
+        if let Asker::People { turn, awaited, .. } = &mut self.asker {
+            *awaited = false;
+            let _reader_has_ended = turn.send(text);
+        }
+    }
+
+    /// The drives that turn, with their speeds. A bench of many drives is not asked for a prompt.
+    fn moving(&mut self) -> String {
+        if self.bench.drives().len() > MOST_IN_PROMPT {
+            return String::new();
+        }
+        let request = SessionRequest::Read {
+            drive: request::DriveWords::Text("all".to_owned()),
+            cells: vec![self.bench.speed().to_owned()],
+        };
+        let mut output = Output::collecting();
+        let words = request.words().unwrap_or_default();
+        if self.command(&words, &mut output).is_err() {
+            return String::new();
+        }
+        let turning = values(output.collected_result()).into_iter();
+        let turning: Vec<_> = turning
+            .filter_map(|own| {
+                let speed = own["value"].as_f64().filter(|own| own.abs() >= STANDS)?;
+                let unit = own["unit"].as_str().unwrap_or_default();
+                Some(format!("{}: {speed} {unit}", own["drive"].as_str()?))
+            })
+            .collect();
+        match turning.is_empty() {
+            true => String::new(),
+            false => format!(" ({})", turning.join(", ")),
+        }
+    }
+
+    /// A request was taken back before it began.
+    fn cancelled(&mut self, id: Value) {
+        match &mut self.asker {
+            Asker::Program => {
+                self.out
+                    .error(id, Exit::Interrupted, "cancelled before it began");
+            }
+            Asker::People { awaited, .. } => *awaited |= people::is_typed(&id),
+        }
+    }
+
+    /// Does a request and answers it; returns the exit code of one that ends the session.
+    fn ask(&mut self, id: Value, request: &SessionRequest) -> Option<Exit> {
+        match self.asker {
+            Asker::Program => {
+                self.answer(id, request);
+                None
+            }
+            Asker::People { piped, .. } => {
+                let mut output = people_output(&self.out, piped);
+                let exit = self.tell(request, &mut output);
+                if let Asker::People { awaited, .. } = &mut self.asker {
+                    *awaited |= people::is_typed(&id);
+                }
+                let failed = piped && exit != Exit::Passed;
+                if failed {
+                    output.say(&format!(
+                        "line {id} ends the session: the lines behind it were not done\n"
+                    ));
+                }
+                failed.then_some(exit)
+            }
+        }
+    }
+
+    /// Does a request and tells people what came of it.
+    fn tell(&mut self, request: &SessionRequest, output: &mut Output) -> Exit {
+        let done = self.perform(request, output);
+        let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
+        if cancelled {
+            self.interrupt.store(false, Ordering::Relaxed);
+        }
+        match done {
+            Ok((exit, result)) => {
+                self.out.text(people::text(&result));
+                exit
+            }
+            // Ctrl-C has ended it: what the link says of that is no news.
+            Err(_) if cancelled => Exit::Interrupted,
+            Err(failure) => failure.tell(output),
+        }
+    }
+
+    /// Does a request and answers it in JSON.
+    fn answer(&mut self, id: Value, request: &SessionRequest) {
         let mut output = Output::collecting();
         let done = self.perform(request, &mut output);
         let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
@@ -317,6 +549,12 @@ impl HeldSession {
                 self.struck = true;
                 json!({})
             }
+            SessionRequest::Help { command } => {
+                let text = people::help(command.as_deref()).map_err(Failure::refused)?;
+                output.result(&text)?;
+                Value::Null
+            }
+            SessionRequest::Wrong { what } => return Err(Failure::refused(what.clone())),
             SessionRequest::Recover {} => json!({"found": self.bench.recover()?}),
             // What they break off has been broken off.
             SessionRequest::Cancel { .. } | SessionRequest::End {} => json!({}),

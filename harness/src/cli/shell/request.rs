@@ -104,6 +104,18 @@ pub(crate) enum SessionRequest {
     },
     /// Ends the session in the safe state.
     End {},
+    /// What people typed and what is no request.
+    #[serde(skip)]
+    Wrong {
+        /// Why.
+        what: String,
+    },
+    /// The list of commands for people, or how one is used.
+    #[serde(skip)]
+    Help {
+        /// The command.
+        command: Option<String>,
+    },
 }
 
 impl SessionRequest {

@@ -12,6 +12,8 @@ use crate::rig::port_session::PortSession;
 use harness_proto::time::Span;
 
 impl HeldDrives for Inverters {
+    const SPEED: &'static str = "HIW";
+
     fn perform(
         session: &mut PortSession<Self>,
         command: &DriveCommand,

@@ -119,6 +119,10 @@ impl HeldBench for HeldRings {
         axes.iter().flatten().map(ToString::to_string).collect()
     }
 
+    fn speed(&self) -> &'static str {
+        "nist"
+    }
+
     fn perform(&mut self, mut command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
         if matches!(command, DriveCommand::Reset(_)) {
             return Err(Failure::refused(

@@ -11,6 +11,8 @@ use crate::rig::port_session::PortSession;
 use harness_proto::time::Span;
 
 impl HeldDrives for UnitekDrives {
+    const SPEED: &'static str = "SPEED_ACTUAL";
+
     fn perform(
         session: &mut PortSession<Self>,
         command: &DriveCommand,
