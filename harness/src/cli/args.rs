@@ -120,9 +120,10 @@ pub enum Command {
         /// The kind of file.
         of: SchemaName,
     },
-    /// Hold a bench for a program: JSON requests on standard input, JSON answers.
+    /// Hold a bench and type commands while its bus stays alive; --json is for programs.
     ///
-    /// The bus stays at work between two requests. The end of the input, a signal or a lost port ends in the safe state.
+    /// An editor with history and completion at a terminal, or lines of a pipe. Ctrl-C stops what moves. The end of the input, a signal or a
+    /// lost port ends in the safe state.
     Shell(ShellArguments),
     /// Search for unknown faults with random conversations.
     Fuzz {

@@ -28,4 +28,5 @@ mod scenarios;
 mod ser2net;
 mod serve;
 mod session;
+mod shell;
 mod top;

@@ -79,7 +79,7 @@ fn code(answer: &Value) -> u64 {
 }
 
 /// A desk at a served ring.
-fn at(served: &Served) -> Desk {
+pub(crate) fn at(served: &Served) -> Desk {
     let Endpoint::Tcp(address) = &served.endpoints[0] else {
         panic!("a socket");
     };

@@ -250,6 +250,7 @@ fn serve(
     let mut session = HeldSession {
         asker: listen(&inbox),
         inbox,
+        name: arguments.rig.clone(),
         rig,
         bus,
         bench,
@@ -273,6 +274,8 @@ fn serve(
 struct HeldSession {
     asker: Asker,
     inbox: RequestReader,
+    /// The rig as it was named.
+    name: String,
     rig: Rig,
     bus: Bus,
     bench: Box<dyn HeldBench>,
@@ -377,7 +380,7 @@ impl HeldSession {
                 };
                 let text = format!(
                     "{}: drives {drives}; {motion}. `help` lists the commands, Ctrl-C stops what moves, Ctrl-D ends in the safe state.\n",
-                    self.rig.id()
+                    self.name
                 );
                 self.out.text(text);
             }
@@ -395,7 +398,7 @@ impl HeldSession {
             Asker::People { piped: false, .. } if self.motion => self.moving(),
             _ => String::new(),
         };
-        let text = format!("{}{moving}> ", self.rig.id());
+        let text = format!("{}{moving}> ", self.name);
         self.out.wait();
         if let Asker::People { turn, awaited, .. } = &mut self.asker {
             *awaited = false;
@@ -422,7 +425,7 @@ impl HeldSession {
             .filter_map(|own| {
                 let speed = own["value"].as_f64().filter(|own| own.abs() >= STANDS)?;
                 let unit = own["unit"].as_str().unwrap_or_default();
-                Some(format!("{}: {speed} {unit}", own["drive"].as_str()?))
+                Some(format!("{}: {speed:.1} {unit}", own["drive"].as_str()?))
             })
             .collect();
         match turning.is_empty() {

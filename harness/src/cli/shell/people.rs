@@ -1,12 +1,13 @@
 //! `drivebench shell` for people: lines of an editor with history and completion, or of a pipe, as requests of a session.
 
-use super::COMMANDS;
 use super::inbox::{LineWriter, RequestReader};
 use super::request::{DriveWords, SessionRequest};
+use super::{COMMANDS, SETTLED};
 use crate::cli::args::duration;
 use crate::cli::complete::fitting;
 use crate::cli::help::command;
 use crate::scenario::problem::nearest;
+use clap::Arg;
 use rustyline::completion::{Completer, Pair};
 use rustyline::error::ReadlineError;
 use rustyline::highlight::Highlighter;
@@ -226,7 +227,7 @@ fn names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// There is no such command.
 pub(super) fn help(name: Option<&str>) -> Result<String, String> {
-    let mut program = command();
+    let program = command();
     let Some(name) = name else {
         let about = |name: &str| {
             let own = program
@@ -251,8 +252,20 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
         return Ok(format!("{usage}: {about}\n"));
     }
     let known = COMMANDS.contains(&name);
-    let found = program.find_subcommand_mut(name).filter(|_| known);
-    let found = found.ok_or_else(|| unknown(name))?;
+    let found = program.find_subcommand(name).filter(|_| known);
+    let found = found.ok_or_else(|| unknown(name))?.clone();
+    // Options that the shell has settled, and those of the program, are no choice here.
+    let settled = |own: &Arg| {
+        let long = own.get_long().unwrap_or_default();
+        SETTLED
+            .iter()
+            .any(|own| own.strip_prefix("--") == Some(long))
+            || own.is_global_set()
+    };
+    let mut found = found.bin_name(name).mut_args(|own| {
+        let hide = settled(&own);
+        own.hide(hide)
+    });
     Ok(found.render_help().to_string())
 }
 
@@ -449,5 +462,10 @@ mod tests {
             assert!(!help(Some(name)).expect(name).is_empty());
         }
         assert!(help(Some("fuzz")).is_err());
+        let read = help(Some("read")).expect("a command");
+        assert!(
+            read.contains("Usage: read") && !read.contains("--rig"),
+            "{read}"
+        );
     }
 }

@@ -1,4 +1,4 @@
 //! `drivebench top`: its pages, its keys, and the program in a terminal of its own.
 
-mod terminal;
-mod tty;
+pub(crate) mod terminal;
+pub(crate) mod tty;

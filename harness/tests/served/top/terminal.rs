@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// `setsid` of util-linux makes the terminal the program's own, so that no output goes to the tester's terminal.
-fn in_session(program: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn in_session(program: &Path, arguments: &[&str]) -> Command {
     let known = Command::new("setsid")
         .arg("--version")
         .stdout(Stdio::null())

@@ -126,13 +126,19 @@ impl Tty {
     #[track_caller]
     pub(crate) fn is_as_before(&self) -> Seen {
         let seen = self.see("the first screen", |seen| !seen.other_screen && seen.cursor);
-        let now = tcgetattr(&self.slave).expect("a terminal");
-        assert_eq!(format!("{now:?}"), format!("{:?}", self.before));
+        self.has_its_modes();
         assert!(
             self.written().contains("\x1b[?1049h"),
             "it was never on the other screen"
         );
         seen
+    }
+
+    /// The modes of the terminal are as they were.
+    #[track_caller]
+    pub(crate) fn has_its_modes(&self) {
+        let now = tcgetattr(&self.slave).expect("a terminal");
+        assert_eq!(format!("{now:?}"), format!("{:?}", self.before));
     }
 
     /// Closes the terminal, as when its window is closed.

@@ -1,0 +1,140 @@
+//! `drivebench shell` as people use it: at a terminal, and with lines of a pipe.
+
+use crate::program::{Desk, ended};
+use crate::ring::Served;
+use crate::session::at;
+use crate::top::terminal::in_session;
+use crate::top::tty::Tty;
+use rustix::process::{Pid, Signal, kill_process};
+use std::io::Write;
+use std::path::Path;
+use std::process::{Output, Stdio};
+
+fn shell(arguments: &[&str]) -> Tty {
+    let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
+    Tty::start(in_session(program, &[&["shell"], arguments].concat()))
+}
+
+/// The shell in a terminal, at a rig that another process serves.
+fn at_desk(desk: &Desk) -> Tty {
+    let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
+    let mut command = in_session(program, &["shell", "--rig", "desk.toml", "--move"]);
+    command
+        .current_dir(desk.path(""))
+        .env("DRIVEBENCH_STATE", desk.path("state"));
+    Tty::start(command)
+}
+
+/// Waits for words, which stand behind those that were seen before.
+#[track_caller]
+fn says(tty: &Tty, words: &str) {
+    tty.see(words, |seen| seen.first.contains(words));
+}
+
+fn signal(tty: &Tty, signal: Signal) {
+    kill_process(Pid::from_child(&tty.child), signal).expect("a process");
+}
+
+#[test]
+fn people_type_complete_and_stop() {
+    let mut tty = shell(&["--rig", "sim:3", "--move"]);
+    says(&tty, "sim:3> ");
+    tty.keys("read 0 nsollr\t\r");
+    says(&tty, "nsollrampe");
+    tty.keys("raed 0 nist\r");
+    says(&tty, "did you mean `read`?");
+    // The prompt shows who moves, and Ctrl-C stops it and stays.
+    tty.keys("write 0 nsoll=100rpm\r");
+    says(&tty, "nsoll: 0000 (0 rpm)");
+    tty.keys("wait 500ms\r");
+    says(&tty, "sim:3 (0: 99.9 rpm)> ");
+    tty.keys("\x03");
+    says(&tty, "drive 0 is in stop");
+    // What was typed comes back by a key.
+    tty.keys("fault 2->1: flip 0\r");
+    tty.keys("\x1b[A\x1b[A\x1b[A\x1b[A\r");
+    tty.keys("read 1 nist\r");
+    says(&tty, "the link from drive 2 to drive 1 is damaged");
+    tty.keys("\x04");
+    assert_eq!(tty.ended().code(), Some(0));
+    tty.has_its_modes();
+}
+
+/// Ctrl-C ends a command that lasts, and not the shell.
+#[test]
+fn ctrl_c_ends_a_command() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = at(&served);
+    let mut tty = at_desk(&desk);
+    says(&tty, "desk.toml> ");
+    tty.keys("watch 0 nist --every 100ms\r");
+    says(&tty, "nist 0 rpm");
+    signal(&tty, Signal::INT);
+    says(&tty, "drive 0 is in stop");
+    tty.keys("exit\r");
+    says(&tty, "safe state");
+    assert_eq!(tty.ended().code(), Some(0));
+    tty.has_its_modes();
+}
+
+#[test]
+fn signals_end_in_the_safe_state() {
+    for how in [Signal::TERM, Signal::HUP] {
+        let served = Served::start("nd21", &[2], "tcp", true, &[]);
+        let desk = at(&served);
+        let mut tty = at_desk(&desk);
+        says(&tty, "desk.toml> ");
+        tty.keys("go all\r");
+        says(&tty, "drive 1 is in go");
+        signal(&tty, how);
+        assert_eq!(tty.ended().code(), Some(130));
+        says(&tty, "safe state");
+        tty.has_its_modes();
+    }
+}
+
+fn piped(arguments: &[&str], lines: &str) -> Output {
+    let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
+    let mut command = desk.command(&["shell"]);
+    let mut child = command
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    let mut input = child.stdin.take().expect("a pipe");
+    input.write_all(lines.as_bytes()).expect("a reader");
+    drop(input);
+    child.wait_with_output().expect("its end")
+}
+
+/// Lines of a pipe are done one by one, without an editor; the first that fails ends the session with its exit code.
+#[test]
+fn lines_of_a_pipe() {
+    let lines = "# a remark\n\nwrite 0 FE13=12\nread 0 FE13\nrun 9.7-parity-error\n";
+    let all = piped(&["--rig", "sim:3"], lines);
+    ended(&all, 0, "");
+    let said = String::from_utf8_lossy(&all.stdout);
+    assert!(
+        said.contains("FE13") && said.contains("passed 9.7-parity-error"),
+        "{said}"
+    );
+    assert!(!said.contains('\x1b') && !said.contains("sim:3>"), "{said}");
+    let some = piped(
+        &["--rig", "sim:3"],
+        "write 0 FE13=12\ngo 0\nwrite 0 FE13=13\n",
+    );
+    ended(&some, 2, "line 2 ends the session");
+    assert!(
+        !String::from_utf8_lossy(&some.stdout).contains("13 ("),
+        "{some:?}"
+    );
+    ended(&piped(&["--rig", "sim:3"], "run absent\n"), 2, "absent");
+    ended(&piped(&["--rig", "absent"], ""), 2, "absent");
+    let mut long = vec![b'x'; 3 << 20];
+    long.push(b'\n');
+    let long = String::from_utf8(long).expect("text");
+    ended(&piped(&["--rig", "sim:3"], &long), 2, "too long");
+    for other in ["sim:unitek:1", "sim:nordac"] {
+        ended(&piped(&["--rig", other], "info\nhelp go\n"), 0, "");
+    }
+}
