@@ -85,7 +85,7 @@ fn give_back<D: PortDrives>(
         Some(Trouble::Interrupted) => Exit::Interrupted,
         _ => exit,
     };
-    let end = match leave && trouble.is_none() {
+    let end = match leave && trouble.is_none() && exit != Exit::Interlock {
         true => session.release(),
         false => session.close(matches!(exit, Exit::RigError | Exit::Interlock)),
     };

@@ -145,6 +145,11 @@ impl<L: Line> Guarded<L> {
         }
     }
 
+    /// Puts the link in this trouble, unless it is in another one.
+    pub(crate) fn fail(&mut self, trouble: Trouble) {
+        self.trouble.get_or_insert(trouble);
+    }
+
     /// Whether drives can be asked something in between, so that nothing is changed by it.
     fn can_pause(&self) -> bool {
         !self.faulty && self.at_rest() && self.gates.iter().all(|gate| gate.can_pause())

@@ -38,6 +38,7 @@ impl RigCheck<'_> {
         self.adapter(port);
         self.nodes(port);
         self.port_limits(port);
+        self.port_interlocks(port);
         true
     }
 
@@ -51,6 +52,17 @@ impl RigCheck<'_> {
                 message,
                 "nothing expected here",
             );
+        }
+        for (index, own) in self.file.interlock.iter().enumerate() {
+            let given = [
+                ("register", own.register.is_some()),
+                ("bit", own.bit.is_some()),
+            ];
+            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+                let path = ["interlock".into(), index.into(), key.into()];
+                let message = format!("`{key}` is for benches with [port.1]");
+                self.wrong(&path, message, "`cell` or `input` expected in its place");
+            }
         }
         if matches!(limits.max_speed, Some(MaxSpeed::Percent(_))) {
             let path = ["limits".into(), "max_speed".into()];
@@ -74,7 +86,6 @@ impl RigCheck<'_> {
             ("tap", !file.tap.is_empty()),
             ("interposer", !file.interposer.is_empty()),
             ("drive", !file.drive.is_empty()),
-            ("interlock", !file.interlock.is_empty()),
             ("deviation", !file.deviation.is_empty()),
         ];
         for (key, _) in tables.into_iter().filter(|(_, given)| *given) {
@@ -250,6 +261,44 @@ impl RigCheck<'_> {
                 } else {
                     seen.push((identifier, index));
                 }
+            }
+        }
+    }
+
+    /// Interlocks are on registers of drives that the port lists.
+    fn port_interlocks(&mut self, port: &Port) {
+        let file = self.file;
+        let listed = port.drives.iter().enumerate();
+        let listed: Vec<u8> = listed
+            .map(|(at, node)| port.bus.drive(at, *node).0)
+            .collect();
+        for (index, own) in file.interlock.iter().enumerate() {
+            let entry = [Step::Key("interlock"), Step::Index(index)];
+            let at = |key| [entry[0], entry[1], Step::Key(key)];
+            let Some(read) = port.bus.row().interlock else {
+                let message = format!("the bus {} has no interlocks yet", port.bus.name());
+                self.wrong(&entry, message, "no such table expected here");
+                continue;
+            };
+            let of_rings = [
+                ("ring", own.ring != 1),
+                ("cell", own.cell.is_some()),
+                ("input", own.input.is_some()),
+            ];
+            for (key, _) in of_rings.into_iter().filter(|(_, given)| *given) {
+                let message = format!("`{key}` is for benches with rings");
+                self.wrong(&at(key), message, "`register` expected in its place");
+            }
+            if !listed.contains(&own.drive) {
+                let message = format!("the port has no drive {}", own.drive);
+                self.wrong(&at("drive"), message, "a drive of `drives` expected here");
+            }
+            if port.listen_only {
+                let message = "nothing is sent with `listen_only = true`, so this cannot be read";
+                self.wrong(&entry, message, "no such table expected here");
+            }
+            if let Err((key, message, expected)) = read(own) {
+                self.wrong(&at(key), message, expected);
             }
         }
     }

@@ -335,6 +335,12 @@ pub struct Interlock {
     /// A RAM cell by its printed name, with `min`, `max` or both.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell: Option<String>,
+    /// In place of a cell, on benches with `[port.1]`: a register of a drive on CAN, with `min`, `max` or both, or with `bit` and `level`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub register: Option<String>,
+    /// A bit of that register by its name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bit: Option<String>,
     /// The least that is allowed, in a unit of the cell: `-100rpm`; a whole number where it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<String>,
@@ -344,7 +350,7 @@ pub struct Interlock {
     /// An input by its printed name: `GPIN1` to `GPIN8`, `ESCHP`, `ESCHN` (ND21 5.3).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
-    /// The level at which that input must stay.
+    /// The level at which that input or bit must stay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level: Option<Level>,
     /// How often it is looked at; default 100ms.

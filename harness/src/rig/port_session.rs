@@ -40,6 +40,14 @@ pub trait PortDrives: Clone + std::fmt::Debug {
     /// Why they cannot be used.
     fn ready(session: &mut PortSession<Self>, ill_as_well: bool) -> Result<(), SessionError>;
 
+    /// Looks at every interlock of the rig's file; nothing is under way.
+    ///
+    /// # Errors
+    /// [`Trouble::Interlock`] for the first that does not hold, [`Trouble::Lost`] for one that cannot be read.
+    fn look_at_interlocks(_session: &mut PortSession<Self>) -> Result<(), Trouble> {
+        Ok(())
+    }
+
     /// The drives, in the order of the rig's file.
     fn listed(&self) -> Vec<Self::Drive>;
 
@@ -115,6 +123,10 @@ impl<D: PortDrives> PortSession<D> {
         }
         session.taken.around.used();
         session.ended = session.listen_only || rig.is_simulated();
+        session.look_at_interlocks();
+        if matches!(session.link.trouble(), Some(Trouble::Lost(_))) {
+            session.sound()?;
+        }
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
@@ -135,6 +147,15 @@ impl<D: PortDrives> PortSession<D> {
             }
         }
         self.sound()
+    }
+
+    /// Looks at every interlock. One that does not hold, or cannot be read, is the trouble of the link from then on.
+    pub fn look_at_interlocks(&mut self) {
+        if self.link.trouble().is_none()
+            && let Err(trouble) = D::look_at_interlocks(self)
+        {
+            self.link.fail(trouble);
+        }
     }
 
     /// The rig.

@@ -125,6 +125,7 @@ impl<B: LineRig> Target<LineTalk<B>> for OnAdapter<'_, B> {
         // Whether the drives stand is confirmed at the end of the run: a wrong drive may not.
         let _as_far_as_they_do = self.session.make_safe();
         pass(self.session, REST);
+        self.session.look_at_interlocks();
         self.sound()?;
         self.session.link().begin();
         let unknown = B::converse(self.session, &mut self.kept, talk);

@@ -113,10 +113,18 @@ impl<P: PortPlayer> PortRun<P> {
         self.player.wait(own, self.session.link());
         let link = self.session.link();
         link.reset_after_denial();
-        let mut recording = Recording::new(link, sink);
+        if !anew {
+            self.session.look_at_interlocks();
+        }
+        let mut recording = Recording::new(self.session.link(), sink);
         let (outcome, before) = self.player.attempt(own, &mut recording);
         let traces = vec![recording.trace(0)];
-        if outcome.verdict != Verdict::Skipped && !anew {
+        let tripped = matches!(
+            self.session.guarded().trouble(),
+            Some(Trouble::Interlock(_))
+        );
+        // The way to the safe state behind an interlock is that of the end of the run.
+        if outcome.verdict != Verdict::Skipped && !anew && !tripped {
             let safe = self.session.make_safe();
             match safe.confirmed {
                 true => {

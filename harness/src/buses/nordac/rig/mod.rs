@@ -69,6 +69,7 @@ pub(crate) const PORT: PortRow = PortRow {
         let expected = "no such permission expected on this bus".to_owned();
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
+    interlock: None,
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: Some(|rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))

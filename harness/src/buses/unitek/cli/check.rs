@@ -31,7 +31,7 @@ pub(crate) fn check(
     let mut exit = Exit::Passed;
     for axis in axes {
         let (rx, tx) = (axis.rx, axis.tx);
-        let mut driver = session.driver();
+        let mut driver = session.watched_driver();
         let mut read = |register| Ok::<_, Failure>(driver.read(axis, register)?.data.bits());
         let read = match listens {
             true => Ok(None),

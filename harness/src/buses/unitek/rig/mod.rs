@@ -15,6 +15,7 @@ use permitted::special_register;
 use player::Player;
 pub use session::{Session, UnitekDrives};
 
+use super::interlock::RegisterInterlock;
 use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
@@ -54,6 +55,7 @@ pub(crate) const PORT: PortRow = PortRow {
     },
     setup_mistakes: |port, source| setup(port, source).err(),
     special_register,
+    interlock: Some(|own| RegisterInterlock::read(own).map(|_| ())),
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: Some(|rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))

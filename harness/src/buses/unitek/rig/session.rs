@@ -3,9 +3,11 @@
 use super::{Axis, axes, limits, rate, setup};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::gate::guarded;
+use crate::buses::unitek::interlock::RegisterInterlock;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
 use crate::guard::{Guarded, Safe, Standstill};
+use crate::link::Trouble;
 use crate::link::frames::{AdapterSettings, FrameLink};
 use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
@@ -62,6 +64,10 @@ impl PortDrives for UnitekDrives {
         ask(session, ill_as_well)
     }
 
+    fn look_at_interlocks(session: &mut Session) -> Result<(), Trouble> {
+        session.watched_driver().look_at_interlocks()
+    }
+
     fn listed(&self) -> Vec<Axis> {
         self.axes.clone()
     }
@@ -97,6 +103,14 @@ impl Session {
     pub fn driver(&mut self) -> Driver<'_> {
         let (link, drives) = self.parts();
         Driver::new(Box::new(link), &drives.axes, drives.patience)
+    }
+
+    /// The same for a command: it looks at the interlocks of the rig's file between jobs.
+    pub fn watched_driver(&mut self) -> Driver<'_> {
+        let interlocks = RegisterInterlock::all(self.rig());
+        let mut driver = self.driver();
+        driver.watch(interlocks);
+        driver
     }
 }
 
