@@ -7,6 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::fuzz::LineFuzz;
 use crate::cli::output::Output;
 use crate::cli::shell::HeldBench;
+use crate::rig::condition::Mistake;
 use crate::rig::file::Interlock;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
@@ -23,8 +24,8 @@ type OpenSession = fn(&Rig, &Options) -> Result<Box<dyn HeldBench>, SessionError
 /// Judges what was played on a rig again.
 type OpenJudge = fn(&Rig, bool, bool) -> Box<dyn SegmentJudge>;
 
-/// Checks an entry of `[[interlock]]`: the key that is wrong, the message, and what was expected.
-type CheckInterlock = fn(&Interlock) -> Result<(), (&'static str, String, String)>;
+/// Checks an entry of `[[interlock]]`.
+type CheckInterlock = fn(&Interlock) -> Result<(), Mistake>;
 
 /// What a bus knows of `[port.1]` and of the drives there.
 pub(crate) struct PortRow {
@@ -50,8 +51,8 @@ pub(crate) struct PortRow {
     pub(crate) setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
     /// See [`PortBus::special_register`].
     pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
-    /// Checks an entry of `[[interlock]]`; `None` for a bus without interlocks.
-    pub(crate) interlock: Option<CheckInterlock>,
+    /// The key under which an entry of `[[interlock]]` names what it looks at, and what checks the entry.
+    pub(crate) interlock: (&'static str, CheckInterlock),
     /// Takes a rig to play scenarios on it.
     pub(crate) run: OpenRun,
     /// Judges what was played again, with or without `--allow-motion`.

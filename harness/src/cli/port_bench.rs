@@ -62,6 +62,7 @@ pub(crate) fn on<D: PortDrives>(
     };
     let session = PortSession::open(&rig, &options);
     let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
+    session.look_at_interlocks();
     let result = act(&mut session, output);
     Ok(give_back(session, as_what, result, output))
 }
@@ -81,11 +82,16 @@ fn give_back<D: PortDrives>(
         Err(failure) => (failure.tell(output), as_what.looks_only()),
     };
     let trouble = session.link().trouble().cloned();
-    let exit = match trouble {
+    let exit = match trouble.clone() {
         Some(Trouble::Interrupted) => Exit::Interrupted,
+        // It may have shown behind the last call of a command that went well.
+        Some(Trouble::Interlock(why)) if exit != Exit::Interlock => {
+            output.complain(&why);
+            Exit::Interlock
+        }
         _ => exit,
     };
-    let end = match leave && trouble.is_none() && exit != Exit::Interlock {
+    let end = match leave && trouble.is_none() {
         true => session.release(),
         false => session.close(matches!(exit, Exit::RigError | Exit::Interlock)),
     };

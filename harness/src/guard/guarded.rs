@@ -9,6 +9,7 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -30,6 +31,8 @@ pub struct Guarded<L> {
     origin: Instant,
     refused: usize,
     watch: Option<Box<dyn Watch>>,
+    /// What came on port 0 while the watch looked, and is for the conversation.
+    unasked: VecDeque<(Instant, Heard)>,
     /// Set when the program is to end; only looked at where the link behind the guard does not look itself.
     interrupt: Arc<AtomicBool>,
     /// A fault has been put on a link in the present conversation.
@@ -50,6 +53,7 @@ impl<L: Line> Guarded<L> {
             origin: Instant::START,
             refused: 0,
             watch: None,
+            unasked: VecDeque::new(),
             interrupt: Arc::default(),
             faulty: false,
             keeps: false,
@@ -128,14 +132,39 @@ impl<L: Line> Guarded<L> {
         self.interrupt = interrupt;
     }
 
-    /// Looks now, and puts the link in [trouble](Trouble::Interlock) where something must not go on.
-    pub fn look(&mut self, look: impl FnOnce(&mut dyn Line) -> Result<(), String>) {
+    /// Runs `act` without the watch: nothing may stop the way to a safe state.
+    pub(crate) fn unwatched<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let watch = self.watch.take();
+        let result = act(self);
+        self.watch = watch;
+        result
+    }
+
+    /// Lets the watch look at everything, due or not. The link is in [trouble](Self::trouble) behind it where something must not go on.
+    pub fn look_at_all(&mut self) {
+        if let Some(mut watch) = self.watch.take() {
+            self.look(watch.as_mut(), |watch, line| watch.look_at_all(line));
+            self.watch = Some(watch);
+        }
+    }
+
+    /// Looks now, and puts the link in trouble where something must not go on.
+    fn look(
+        &mut self,
+        watch: &mut dyn Watch,
+        look: impl FnOnce(&mut dyn Watch, &mut dyn Line) -> Result<(), Trouble>,
+    ) {
         if self.trouble().is_some() {
             return;
         }
         let before: Vec<_> = self.gates.iter().map(|gate| gate.addressed()).collect();
-        if let Err(why) = look(self) {
-            self.trouble = Some(Trouble::Interlock(why));
+        let seen = look(watch, self);
+        self.unasked.extend(watch.take_unasked());
+        // A link that is in trouble itself has ended the look.
+        if let Err(trouble) = seen
+            && self.trouble().is_none()
+        {
+            self.trouble = Some(trouble);
         }
         for (port, before) in before.into_iter().enumerate() {
             let gate = self.gates.get(port);
@@ -143,11 +172,6 @@ impl<L: Line> Guarded<L> {
                 restore(self);
             }
         }
-    }
-
-    /// Puts the link in this trouble, unless it is in another one.
-    pub(crate) fn fail(&mut self, trouble: Trouble) {
-        self.trouble.get_or_insert(trouble);
     }
 
     /// Whether drives can be asked something in between, so that nothing is changed by it.
@@ -200,7 +224,9 @@ impl<L: Line> Line for Guarded<L> {
             return;
         }
         if let Some(mut watch) = self.watch.take() {
-            self.look(|line| watch.look(now, line));
+            self.look(watch.as_mut(), |watch, line| {
+                watch.look(now, line).map_err(Trouble::Interlock)
+            });
             self.watch = Some(watch);
         }
     }
@@ -226,6 +252,9 @@ impl<L: Line> Line for Guarded<L> {
         }
         let (admitted, denied) = gate.admit(guard_time, what);
         self.refused = what.len() - admitted;
+        if let Some(watch) = &mut self.watch {
+            watch.sent(what.first(admitted));
+        }
         let end = self.inner.send(port, what.first(admitted));
         // An adapter may have no words for a frame.
         self.refused += self.inner.refused();
@@ -254,9 +283,21 @@ impl<L: Line> Line for Guarded<L> {
     }
 
     fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
-        let (at, heard) = self.inner.receive(port)?;
-        if let Some(gate) = self.gates.get_mut(port) {
-            gate.hear(&heard);
+        let unasked = (port == 0).then(|| self.unasked.pop_front()).flatten();
+        let (at, heard) = match unasked {
+            Some(piece) => piece,
+            None => {
+                let (at, heard) = self.inner.receive(port)?;
+                if let Some(gate) = self.gates.get_mut(port) {
+                    gate.hear(&heard);
+                }
+                (at, heard)
+            }
+        };
+        if let Some(watch) = &mut self.watch
+            && let Err(why) = watch.hear(&heard)
+        {
+            self.trouble.get_or_insert(Trouble::Interlock(why));
         }
         Some((at, heard))
     }
@@ -274,6 +315,10 @@ impl<L: Line> Line for Guarded<L> {
 
     fn trouble(&self) -> Option<&Trouble> {
         self.inner.trouble().or(self.trouble.as_ref())
+    }
+
+    fn fail(&mut self, trouble: Trouble) {
+        self.trouble.get_or_insert(trouble);
     }
 
     fn lead(&self) -> Lead {
@@ -314,6 +359,7 @@ impl<L: Link> Link for Guarded<L> {
     fn begin(&mut self) {
         self.origin = self.guard_time();
         self.inner.begin();
+        self.unasked.clear();
         self.faulty = false;
         for gate in &mut self.gates {
             gate.begin();

@@ -1,6 +1,7 @@
 //! Queries to drives in the pauses of a conversation.
 
-use crate::link::Line;
+use crate::link::{Line, Trouble};
+use crate::medium::{Heard, Out};
 use harness_proto::time::Instant;
 use std::fmt;
 
@@ -14,4 +15,29 @@ pub trait Watch: Send + fmt::Debug {
     /// # Errors
     /// Why the conversation must not go on, in a sentence.
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String>;
+
+    /// Looks at everything, due or not; every drive must answer. Nothing is under way.
+    ///
+    /// # Errors
+    /// [`Trouble::Interlock`] where something must not go on, [`Trouble::Lost`] where the bench cannot find out.
+    fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), Trouble>;
+
+    /// Takes notice of what the conversation sends.
+    fn sent(&mut self, what: Out<'_>) {
+        let _of_no_interest = what;
+    }
+
+    /// Takes notice of a piece that came for the conversation.
+    ///
+    /// # Errors
+    /// Why the conversation must not go on, in a sentence.
+    fn hear(&mut self, heard: &Heard) -> Result<(), String> {
+        let _of_no_interest = heard;
+        Ok(())
+    }
+
+    /// The pieces that came during the last look and do not answer it, with their times: the conversation gets them.
+    fn take_unasked(&mut self) -> Vec<(Instant, Heard)> {
+        Vec::new()
+    }
 }

@@ -215,6 +215,11 @@ pub trait Line: Send {
         None
     }
 
+    /// Puts the line in this trouble, unless it is in another one: its user has found that nothing must go on.
+    fn fail(&mut self, trouble: Trouble) {
+        let _only_guarded_lines = trouble;
+    }
+
     /// When this line next needs a [pause](Self::pause), on its own clock: a time without traffic in which it queries drives
     /// itself. `None` if it never needs one.
     fn pause_due(&self) -> Option<Instant> {
@@ -283,6 +288,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn trouble(&self) -> Option<&Trouble> {
         (**self).trouble()
+    }
+
+    fn fail(&mut self, trouble: Trouble) {
+        (**self).fail(trouble);
     }
 
     fn pause_due(&self) -> Option<Instant> {

@@ -56,6 +56,7 @@ impl RigCheck<'_> {
         for (index, own) in self.file.interlock.iter().enumerate() {
             let given = [
                 ("register", own.register.is_some()),
+                ("parameter", own.parameter.is_some()),
                 ("bit", own.bit.is_some()),
             ];
             for (key, _) in given.into_iter().filter(|(_, given)| *given) {
@@ -275,19 +276,22 @@ impl RigCheck<'_> {
         for (index, own) in file.interlock.iter().enumerate() {
             let entry = [Step::Key("interlock"), Step::Index(index)];
             let at = |key| [entry[0], entry[1], Step::Key(key)];
-            let Some(read) = port.bus.row().interlock else {
-                let message = format!("the bus {} has no interlocks yet", port.bus.name());
-                self.wrong(&entry, message, "no such table expected here");
-                continue;
-            };
-            let of_rings = [
+            let (key, read) = port.bus.row().interlock;
+            let foreign = [
                 ("ring", own.ring != 1),
                 ("cell", own.cell.is_some()),
                 ("input", own.input.is_some()),
+                ("register", own.register.is_some() && key != "register"),
+                ("parameter", own.parameter.is_some() && key != "parameter"),
             ];
-            for (key, _) in of_rings.into_iter().filter(|(_, given)| *given) {
-                let message = format!("`{key}` is for benches with rings");
-                self.wrong(&at(key), message, "`register` expected in its place");
+            let foreign: Vec<_> = foreign.iter().filter(|(_, given)| *given).collect();
+            for (other, _) in &foreign {
+                let message = format!("an interlock of this bus has no `{other}`");
+                self.wrong(
+                    &at(other),
+                    message,
+                    format!("`{key}` expected in its place"),
+                );
             }
             if !listed.contains(&own.drive) {
                 let message = format!("the port has no drive {}", own.drive);
@@ -297,7 +301,14 @@ impl RigCheck<'_> {
                 let message = "nothing is sent with `listen_only = true`, so this cannot be read";
                 self.wrong(&entry, message, "no such table expected here");
             }
-            if let Err((key, message, expected)) = read(own) {
+            let named = [("register", &own.register), ("parameter", &own.parameter)];
+            let named = named
+                .iter()
+                .any(|(own, name)| *own == key && name.is_some());
+            if !named && foreign.is_empty() {
+                let message = "it is not clear what must hold";
+                self.wrong(&entry, message, format!("`{key}` expected in here"));
+            } else if named && let Err((key, message, expected)) = read(own) {
                 self.wrong(&at(key), message, expected);
             }
         }

@@ -335,10 +335,13 @@ pub struct Interlock {
     /// A RAM cell by its printed name, with `min`, `max` or both.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell: Option<String>,
-    /// In place of a cell, on benches with `[port.1]`: a register of a drive on CAN, with `min`, `max` or both, or with `bit` and `level`.
+    /// On a CAN bus: a register by its name or number, with `min`, `max` or both, or with `bit` and `level`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub register: Option<String>,
-    /// A bit of that register by its name.
+    /// On PROFIBUS: a parameter by its name or number, or the status word, with the same keys beside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<String>,
+    /// A bit of that register or of the status word by its name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bit: Option<String>,
     /// The least that is allowed, in a unit of the cell: `-100rpm`; a whole number where it has none.

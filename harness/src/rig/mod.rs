@@ -8,6 +8,7 @@ pub(crate) mod around;
 pub(crate) mod check;
 mod check_port;
 mod check_sim;
+pub(crate) mod condition;
 mod ends;
 pub mod file;
 pub mod find;

@@ -5,7 +5,7 @@ use super::port_file::Port;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Options, Rig, SessionError, file, standing};
-use crate::guard::{Guarded, Safe, SafeStep, Standstill};
+use crate::guard::{Guarded, Safe, SafeStep, Standstill, Watch};
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Pieces};
 use crate::scenario::source::Source;
@@ -40,13 +40,8 @@ pub trait PortDrives: Clone + std::fmt::Debug {
     /// Why they cannot be used.
     fn ready(session: &mut PortSession<Self>, ill_as_well: bool) -> Result<(), SessionError>;
 
-    /// Looks at every interlock of the rig's file; nothing is under way.
-    ///
-    /// # Errors
-    /// [`Trouble::Interlock`] for the first that does not hold, [`Trouble::Lost`] for one that cannot be read.
-    fn look_at_interlocks(_session: &mut PortSession<Self>) -> Result<(), Trouble> {
-        Ok(())
-    }
+    /// What watches the interlocks of the rig's file; `None` where it has none.
+    fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>>;
 
     /// The drives, in the order of the rig's file.
     fn listed(&self) -> Vec<Self::Drive>;
@@ -123,10 +118,8 @@ impl<D: PortDrives> PortSession<D> {
         }
         session.taken.around.used();
         session.ended = session.listen_only || rig.is_simulated();
-        session.look_at_interlocks();
-        if matches!(session.link.trouble(), Some(Trouble::Lost(_))) {
-            session.sound()?;
-        }
+        let watch = session.drives.watch(rig);
+        session.link.set_watch(watch);
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
@@ -149,13 +142,9 @@ impl<D: PortDrives> PortSession<D> {
         self.sound()
     }
 
-    /// Looks at every interlock. One that does not hold, or cannot be read, is the trouble of the link from then on.
+    /// Looks at every interlock; nothing is under way. One that does not hold, or cannot be read, is trouble of the link from then on.
     pub fn look_at_interlocks(&mut self) {
-        if self.link.trouble().is_none()
-            && let Err(trouble) = D::look_at_interlocks(self)
-        {
-            self.link.fail(trouble);
-        }
+        self.link.look_at_all();
     }
 
     /// The rig.
@@ -227,7 +216,8 @@ impl<D: PortDrives> PortSession<D> {
             order: vec![SafeStep::Stop, SafeStep::Block],
             ..standing(&self.rig.file.safe_state)
         };
-        self.drives.safe_state(&mut self.link, &wanted)
+        let drives = &self.drives;
+        self.link.unwatched(|link| drives.safe_state(link, &wanted))
     }
 
     /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.

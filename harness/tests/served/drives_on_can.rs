@@ -7,25 +7,25 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
 /// A served segment of two drives, and a folder with a rig file for it.
-struct Desk {
+pub(crate) struct Desk {
     sim: Sim,
     folder: tempfile::TempDir,
     /// The address of SLCAN on a socket.
     slcan: String,
 }
 
-const SAFE: &str = "safe state: every drive is locked and stands, with commands 0";
+pub(crate) const SAFE: &str = "safe state: every drive is locked and stands, with commands 0";
 
 const MOTION: &str = "allow_motion = true\n";
 
 impl Desk {
     /// A rig at one of the ways in: `slcan`, `pty` or `socketcand`.
-    fn new(way: &str, limits: &str) -> Self {
+    pub(crate) fn new(way: &str, limits: &str) -> Self {
         Self::of(way, limits, "")
     }
 
     /// The same with drives of these header lines.
-    fn of(way: &str, limits: &str, setup: &str) -> Self {
+    pub(crate) fn of(way: &str, limits: &str, setup: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let terminal = folder.path().join("terminal");
         let header = folder.path().join("setup.scn");
@@ -58,23 +58,23 @@ impl Desk {
         Self { sim, folder, slcan }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn command(&self, line: &str) -> Command {
+    pub(crate) fn command(&self, line: &str) -> Command {
         self.started_by(Command::new(env!("CARGO_BIN_EXE_drivebench")), line)
     }
 
     /// The same, ended by SIGHUP too, which `nohup` around the tests would have it ignore.
-    fn heeding(&self, line: &str) -> Command {
+    pub(crate) fn heeding(&self, line: &str) -> Command {
         let mut command = Command::new("env");
         let program = env!("CARGO_BIN_EXE_drivebench");
         command.args(["--default-signal=HUP", program]);
         self.started_by(command, line)
     }
 
-    fn started_by(&self, mut command: Command, line: &str) -> Command {
+    pub(crate) fn started_by(&self, mut command: Command, line: &str) -> Command {
         command
             .args(line.split(' '))
             .current_dir(self.folder.path())
@@ -85,19 +85,19 @@ impl Desk {
         command
     }
 
-    fn run(&self, line: &str) -> Output {
+    pub(crate) fn run(&self, line: &str) -> Output {
         let mut command = self.command(line);
         command.args(["--rig", "desk.toml"]);
         command.output().expect("the program")
     }
 
     #[track_caller]
-    fn shows(&self, line: &str, words: &str) {
+    pub(crate) fn shows(&self, line: &str, words: &str) {
         ended(&self.run(line), 0, words);
     }
 
     /// Starts a move that lasts for minutes, and waits until the motor turns.
-    fn moving(&self) -> (Child, BufReader<std::process::ChildStderr>) {
+    pub(crate) fn moving(&self) -> (Child, BufReader<std::process::ChildStderr>) {
         let mut command = self.heeding("position 1 --to 30000turns --move --rig desk.toml");
         let mut child = command.spawn().expect("the program");
         let mut said = BufReader::new(child.stderr.take().expect("a pipe"));

@@ -8,22 +8,22 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-const SAFE: &str = "safe state: the output of every inverter is off";
+pub(crate) const SAFE: &str = "safe state: the output of every inverter is off";
 
 /// A served slave, and a folder with a rig file for it.
-struct Desk {
+pub(crate) struct Desk {
     _sim: Sim,
     folder: tempfile::TempDir,
 }
 
 impl Desk {
     /// A rig at one of the ways in, with more in its port.
-    fn new(way: &str, more: &str) -> Self {
+    pub(crate) fn new(way: &str, more: &str) -> Self {
         Self::of(way, more, "slave 8\nslave 8 parameter 1621 = 2\n")
     }
 
     /// The same with a slave of these header lines.
-    fn of(way: &str, more: &str, setup: &str) -> Self {
+    pub(crate) fn of(way: &str, more: &str, setup: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let terminal = folder.path().join("terminal");
         let place = match way {
@@ -49,11 +49,11 @@ impl Desk {
         Self { _sim: sim, folder }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn command(&self, line: &str) -> Command {
+    pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
         command
             .args(line.split(' '))
@@ -63,12 +63,12 @@ impl Desk {
         command
     }
 
-    fn run(&self, line: &str) -> Output {
+    pub(crate) fn run(&self, line: &str) -> Output {
         self.command(line).output().expect("the program")
     }
 
     /// Turns the motor, and goes on until it is ended. Returns when it turns.
-    fn hold(&self) -> (Child, BufReader<std::process::ChildStderr>) {
+    pub(crate) fn hold(&self) -> (Child, BufReader<std::process::ChildStderr>) {
         let line = "exchange 8 STW=047E then STW=047F HSW=20% --hold --move --rig desk.toml";
         let mut command = self.command(line);
         command.stdout(Stdio::null()).stderr(Stdio::piped());
@@ -83,7 +83,7 @@ impl Desk {
     }
 
     /// Asks until an answer holds a text.
-    fn shows(&self, line: &str, text: &str) {
+    pub(crate) fn shows(&self, line: &str, text: &str) {
         let end = Instant::now() + Duration::from_secs(60);
         loop {
             let output = self.run(line);

@@ -8,7 +8,6 @@ pub mod dissector;
 pub mod driver;
 pub mod explore;
 pub mod gate;
-mod interlock;
 pub mod judge;
 pub mod language;
 pub(crate) mod manual;

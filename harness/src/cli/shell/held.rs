@@ -7,7 +7,7 @@ use crate::cli::output::Output;
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession};
-use crate::rig::{End, Played};
+use crate::rig::{End, Options, Played, Rig, SessionError};
 use harness_proto::time::Span;
 
 /// A bench that stays open between requests.
@@ -93,7 +93,19 @@ pub(crate) trait HeldDrives: PortDrives {
 }
 
 /// The drives of a port that a session holds.
-pub(crate) struct HeldPort<D: PortDrives>(pub(crate) PortSession<D>);
+pub(crate) struct HeldPort<D: PortDrives>(PortSession<D>);
+
+impl<D: PortDrives> HeldPort<D> {
+    /// Takes a rig, and looks at its interlocks.
+    ///
+    /// # Errors
+    /// See [`PortSession::open`].
+    pub(crate) fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        let mut session = PortSession::open(rig, options)?;
+        session.look_at_interlocks();
+        Ok(Self(session))
+    }
+}
 
 impl<D: HeldDrives> HeldBench for HeldPort<D> {
     fn drives(&self) -> Vec<String> {

@@ -31,6 +31,8 @@ pub(crate) struct Observed<'l, N> {
     late: Span,
     /// How the link is made worse; `None` for the link as it is.
     slow: Option<Slow>,
+    /// Whether the link makes no queries of its own.
+    unpaused: bool,
     /// How often something was sent.
     sent: u32,
     /// What the bus has noted.
@@ -110,6 +112,7 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
             link,
             late: Span::ZERO,
             slow: None,
+            unpaused: false,
             sent: 0,
             noted: N::default(),
         }
@@ -119,6 +122,11 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
     pub(crate) fn slowed(mut self, slow: Option<Slow>) -> Self {
         self.slow = slow;
         self
+    }
+
+    /// Keeps the link from queries of its own: they would change what drives do.
+    pub(crate) const fn without_pauses(&mut self) {
+        self.unpaused = true;
     }
 
     /// By how much a wait has ended late since the last call, at most.
@@ -192,11 +200,13 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
     }
 
     fn pause_due(&self) -> Option<Instant> {
-        self.link.pause_due()
+        self.link.pause_due().filter(|_| !self.unpaused)
     }
 
     fn pause(&mut self) {
-        self.link.pause();
+        if !self.unpaused {
+            self.link.pause();
+        }
     }
 
     fn lead(&self) -> Lead {

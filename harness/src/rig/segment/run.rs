@@ -100,21 +100,28 @@ impl<P: PortPlayer> PortRun<P> {
         })
     }
 
+    /// Takes simulated drives that were just switched on.
+    fn restart(&mut self) {
+        match PortSession::open(self.session.rig(), &self.options) {
+            Ok(fresh) => {
+                let _simulated = std::mem::replace(&mut self.session, fresh).release();
+            }
+            Err(error) => self.over = Some(error.to_string()),
+        }
+    }
+
     fn attempt(&mut self, own: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
         let anew = P::ANEW && self.session.rig().is_simulated();
         if anew {
-            match PortSession::open(self.session.rig(), &self.options) {
-                Ok(fresh) => {
-                    let _simulated = std::mem::replace(&mut self.session, fresh).release();
-                }
-                Err(error) => self.over = Some(error.to_string()),
-            }
+            self.restart();
         }
         self.player.wait(own, self.session.link());
-        let link = self.session.link();
-        link.reset_after_denial();
-        if !anew {
-            self.session.look_at_interlocks();
+        self.session.link().reset_after_denial();
+        self.session.look_at_interlocks();
+        // A look takes drives where no scenario expects them that were just switched on.
+        let looked = !self.session.rig().file.interlock.is_empty();
+        if anew && looked && self.session.sound().is_ok() {
+            self.restart();
         }
         let mut recording = Recording::new(self.session.link(), sink);
         let (outcome, before) = self.player.attempt(own, &mut recording);

@@ -1,6 +1,7 @@
 //! The master of a bench.
 
 use crate::buses::nordac::driver::{Driver, Options, Timing};
+use crate::buses::nordac::rig::interlock::OwnInterlock;
 use crate::buses::nordac::rig::{Session, rate};
 use crate::link::Line;
 use crate::medium::{Heard, Medium, Out};
@@ -79,13 +80,18 @@ pub(super) fn driver(session: &mut Session) -> Master<'_> {
     }
     let watchdog = Options::WATCHDOG;
     let options = Options { timing, watchdog };
+    let interlocks = OwnInterlock::parameters(session.rig());
     let parked = Arc::clone(&session.drives().parked);
     let kept = parked.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = Box::new(session.link());
     Master {
         driver: match kept {
             Some(driver) => driver.onto(line),
-            None => Driver::new(line, options),
+            None => {
+                let mut driver = Driver::new(line, options);
+                driver.watch(interlocks);
+                driver
+            }
         },
         options,
         parked,

@@ -4,7 +4,8 @@ use crate::buses::nordac::rig::Session;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::{exit_of, tell_end};
+use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
+use crate::link::Line as _;
 use crate::rig::{Options, Rig};
 use harness_proto::profibus::dp::Diagnosis;
 use serde_json::json;
@@ -62,6 +63,8 @@ pub(crate) fn check(
         let _infallible = writeln!(text, "slave {address}: {about}");
     }
     drop(talk);
+    session.look_at_interlocks();
+    let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = session.release();
     let text = match for_tools {
         true => format!(

@@ -14,7 +14,8 @@ pub use error::{Error, fault_name};
 pub use motion::{Reached, percent};
 pub use phy::Timing;
 
-use crate::link::Line;
+use super::rig::interlock::OwnInterlock;
+use crate::link::{Line, Trouble};
 use harness_proto::nordac::master::{Exchange, ExchangeError};
 use harness_proto::nordac::{Answer, IDENT, Image, PpoType};
 use harness_proto::profibus::dp::{Diagnosis, Service};
@@ -92,6 +93,8 @@ pub struct Driver<'l> {
     master: DpMaster<'static>,
     slaves: Vec<Slave>,
     options: Options,
+    /// What must hold of parameters while it is used.
+    interlocks: Vec<OwnInterlock>,
 }
 
 impl fmt::Debug for Driver<'_> {
@@ -114,6 +117,47 @@ impl<'l> Driver<'l> {
             master,
             slaves: Vec::new(),
             options,
+            interlocks: Vec::new(),
+        }
+    }
+
+    /// Looks at these interlocks from now on, before a motor is switched on and while time passes.
+    pub(super) fn watch(&mut self, interlocks: Vec<OwnInterlock>) {
+        self.interlocks = interlocks;
+    }
+
+    /// Looks at the interlocks that are due, as far as their slaves exchange data. What does not hold is trouble of the line from then on.
+    fn look(&mut self) -> Result<(), Error> {
+        let now = self.now();
+        if self.interlocks.iter().all(|own| own.next > now) {
+            return Ok(());
+        }
+        // A look reads parameters itself.
+        let mut all = std::mem::take(&mut self.interlocks);
+        let seen = all.iter_mut().filter(|own| own.next <= now);
+        let broken = seen.map(|own| self.look_at(own)).find_map(Result::err);
+        self.interlocks = all;
+        match broken {
+            Some(Error::Link(trouble)) => {
+                self.wire.line_mut().fail(trouble.clone());
+                Err(Error::Link(trouble))
+            }
+            other => other.map_or(Ok(()), Err),
+        }
+    }
+
+    fn look_at(&mut self, own: &mut OwnInterlock) -> Result<(), Error> {
+        own.seen_at(self.now());
+        let Some(parameter) = own.parameter().filter(|_| self.place(own.slave).is_ok()) else {
+            return Ok(());
+        };
+        match self.read(own.slave, &parameter) {
+            Ok(number) => match own.broken(number) {
+                Some(why) => Err(Error::Link(Trouble::Interlock(why))),
+                None => Ok(()),
+            },
+            Err(error @ Error::Link(_)) => Err(error),
+            Err(error) => Err(Error::Link(own.unread(&error.to_string()))),
         }
     }
 
@@ -127,6 +171,7 @@ impl<'l> Driver<'l> {
             master: self.master,
             slaves: self.slaves,
             options: self.options,
+            interlocks: self.interlocks,
         }
     }
 
@@ -339,10 +384,11 @@ impl<'l> Driver<'l> {
     pub fn run(&mut self, time: Span) -> Result<(), Error> {
         let end = self.now() + time;
         while self.now() < end {
+            self.look()?;
             self.step(end)?;
             self.all_exchange()?;
         }
-        Ok(())
+        self.look()
     }
 
     /// Whether the line lets these words of a slave pass now, and if not why, in a sentence. Nothing is sent.

@@ -39,6 +39,7 @@ impl Driver<'_> {
     /// # Errors
     /// [`Error::Fault`], [`Error::Local`], [`Error::NotReached`], [`Error::Left`], [`Error::Link`].
     pub fn on(&mut self, slave: u8, setpoint: u16) -> Result<Reached, Error> {
+        self.look()?;
         let seen = self.cycle(slave)?;
         self.ready_for_words(slave, &seen)?;
         let mut steps = [0; 3];

@@ -105,6 +105,12 @@ impl<'l> Wire<'l> {
         }
     }
 
+    /// The line, to be changed.
+    pub(super) fn line_mut(&mut self) -> &mut dyn Line {
+        self.line.as_mut()
+    }
+
+    /// The line.
     pub(super) fn line(&self) -> &dyn Line {
         &*self.line
     }

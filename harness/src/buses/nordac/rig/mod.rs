@@ -1,5 +1,6 @@
 //! Rig files of NORDAC inverters: addresses, limits, and the simulated bench.
 
+pub(in crate::buses::nordac) mod interlock;
 mod known;
 mod observed;
 mod permitted;
@@ -23,7 +24,6 @@ use crate::cli::fuzz::LineFuzz;
 use crate::cli::port_bench::PortBench;
 use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{Node, Port};
-use crate::rig::port_session::PortSession;
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::{Part, read};
 use crate::scenario::plan::plan as settle;
@@ -69,17 +69,13 @@ pub(crate) const PORT: PortRow = PortRow {
         let expected = "no such permission expected on this bus".to_owned();
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
-    interlock: None,
+    interlock: ("parameter", interlock::checked),
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: Some(|rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
     }),
     command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
-    hold: |rig, options| {
-        Ok(Box::new(HeldPort::<Inverters>(PortSession::open(
-            rig, options,
-        )?)))
-    },
+    hold: |rig, options| Ok(Box::new(HeldPort::<Inverters>::open(rig, options)?)),
     check: super::cli::check,
     fuzz: LineFuzz::of::<Nordac>(),
 };

@@ -1,5 +1,6 @@
 //! NORDAC inverters of a rig in use: opened behind their gate, found to answer, and taken to their safe state.
 
+use super::interlock::Interlocks;
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
 use crate::buses::nordac::cli::Parked;
@@ -7,7 +8,7 @@ use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
-use crate::guard::{Guarded, Safe, Standstill};
+use crate::guard::{Guarded, Safe, Standstill, Watch};
 use crate::medium::Pieces;
 use crate::port::{Endpoint, PortSettings};
 use crate::rig::file::Marks;
@@ -73,6 +74,10 @@ impl PortDrives for Inverters {
 
     fn number(address: &u8) -> u8 {
         *address
+    }
+
+    fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
+        Interlocks::of(rig, &self.slaves, self.patience).map(|own| Box::new(own) as Box<dyn Watch>)
     }
 
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {

@@ -3,7 +3,7 @@
 use super::condition::InterlockCondition;
 use crate::buses::novobus::language::scale::shown;
 use crate::guard::Watch;
-use crate::link::Line;
+use crate::link::{Line, Trouble};
 use crate::rig::file::Level;
 use crate::rig::{Rig, file};
 use crate::scenario::run::read_byte;
@@ -58,22 +58,6 @@ impl Interlocks {
         let all: Vec<_> = rig.file.interlock.iter().filter_map(entry).collect();
         (!all.is_empty()).then_some(Self { all })
     }
-
-    /// Checks every interlock, whether it is due or not. Every drive must answer.
-    ///
-    /// # Errors
-    /// The first that does not hold, or whose drive does not answer, in a sentence.
-    pub(crate) fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), String> {
-        for entry in &mut self.all {
-            if entry.look(line)?.is_none() {
-                return Err(format!(
-                    "{}: the drive does not answer, so its state is not known",
-                    entry.words()
-                ));
-            }
-        }
-        Ok(())
-    }
 }
 
 impl Watch for Interlocks {
@@ -86,6 +70,18 @@ impl Watch for Interlocks {
             entry.next = now + entry.every;
             // In the middle of a scenario a drive may be silent on purpose; between scenarios it must answer.
             entry.look(line)?;
+        }
+        Ok(())
+    }
+
+    fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), Trouble> {
+        for entry in &mut self.all {
+            if entry.look(line).map_err(Trouble::Interlock)?.is_none() {
+                return Err(Trouble::Interlock(format!(
+                    "{}: the drive does not answer, so its state is not known",
+                    entry.words()
+                )));
+            }
         }
         Ok(())
     }

@@ -458,9 +458,7 @@ impl Session {
 
     /// The same inside a conversation that goes on, so that its clock counts the time that this takes.
     pub(crate) fn ask_interlocks(&mut self) {
-        if let Some(mut interlocks) = Interlocks::of(&self.rig) {
-            self.link.look(|line| interlocks.look_at_all(line));
-        }
+        self.link.look_at_all();
     }
 
     /// The error for a ring that failed [`examine`].

@@ -6,7 +6,8 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::select;
-use crate::cli::rig_failure::{exit_of, tell_end};
+use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
+use crate::link::Line as _;
 use crate::rig::{Options, Rig};
 use harness_proto::unitek::words::{ERRORS, set_bits};
 use serde_json::json;
@@ -31,7 +32,7 @@ pub(crate) fn check(
     let mut exit = Exit::Passed;
     for axis in axes {
         let (rx, tx) = (axis.rx, axis.tx);
-        let mut driver = session.watched_driver();
+        let mut driver = session.driver();
         let mut read = |register| Ok::<_, Failure>(driver.read(axis, register)?.data.bits());
         let read = match listens {
             true => Ok(None),
@@ -59,6 +60,8 @@ pub(crate) fn check(
         // Writing to a String cannot fail.
         let _infallible = writeln!(text, "drive {} ({rx:03X}, {tx:03X}): {about}", axis.node);
     }
+    session.look_at_interlocks();
+    let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = session.release();
     let text = match for_tools {
         true => format!(

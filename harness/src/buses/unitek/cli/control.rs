@@ -42,7 +42,7 @@ pub(super) fn go(
         }
         let has_ports = !session.rig().is_simulated();
         let orders: Vec<_> = drives.iter().flat_map(|axis| start_up(*axis)).collect();
-        refuse_denied(&mut session.watched_driver(), &orders)?;
+        refuse_denied(&mut session.driver(), &orders)?;
         output.say(&format!("{warning}\n"));
         let exit = each(session, &drives, output, |driver, axis| {
             driver.release(axis).map(|()| "released")
@@ -120,7 +120,7 @@ pub(super) fn delete_error(
         let drives = crate::cli::port_bench::select(&select.drives, session)?;
         let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
         let orders: Vec<_> = drives.iter().map(order).collect();
-        refuse_denied(&mut session.watched_driver(), &orders)?;
+        refuse_denied(&mut session.driver(), &orders)?;
         each(session, &drives, output, |driver, axis| {
             let _never_answered = driver.write(axis, CANCEL.0, Data::Short(CANCEL.1))?;
             Ok("errors cleared")
@@ -135,7 +135,7 @@ fn each(
     output: &mut Output,
     call: impl Fn(&mut Driver<'_>, Axis) -> Result<&'static str, Error>,
 ) -> Result<Exit, Failure> {
-    let mut driver = session.watched_driver();
+    let mut driver = session.driver();
     let done: Vec<_> = drives.iter().map(|axis| call(&mut driver, *axis)).collect();
     driver.run(SCANS)?;
     let mut exit = Exit::Passed;

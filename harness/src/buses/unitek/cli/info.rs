@@ -79,7 +79,7 @@ pub(super) fn top(
             }
             // Clears the screen, and begins in its upper left corner.
             output.result(&format!("\x1b[2J\x1b[H{page}"))?;
-            session.watched_driver().run(arguments.every)?;
+            session.driver().run(arguments.every)?;
         }
     })
 }

@@ -118,7 +118,7 @@ pub(super) fn load(
                 (axis, Register::of(register), Data::Short(level))
             });
             let all: Vec<_> = orders.iter().copied().chain(store).collect();
-            let mut driver = session.watched_driver();
+            let mut driver = session.driver();
             refuse_denied(&mut driver, &all)?;
             for (axis, register, data) in &all {
                 driver.write(*axis, register.number, *data)?;

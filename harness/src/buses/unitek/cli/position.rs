@@ -49,7 +49,7 @@ pub(super) fn position(
                 axis.node
             )));
         }
-        let mut driver = session.watched_driver();
+        let mut driver = session.driver();
         make_ready(&mut driver, axis, output)?;
         if arguments.reference {
             home(&mut driver, axis)?;

@@ -65,7 +65,7 @@ pub(super) fn find(
     drives: &[Axis],
     registers: &[&'static Register],
 ) -> Result<Vec<Found>, Failure> {
-    let mut driver = session.watched_driver();
+    let mut driver = session.driver();
     let mut found = Vec::new();
     for &axis in drives {
         let scaling = match registers.iter().any(|own| usual(own.unit).is_some()) {

@@ -43,7 +43,7 @@ impl WatchBench for WatchedRegisters<'_> {
     const DRIVE: &'static str = "drive";
 
     fn now(&mut self) -> Instant {
-        self.session.watched_driver().now()
+        self.session.driver().now()
     }
 
     fn look(&mut self) -> Result<Vec<WatchedCell>, Failure> {
@@ -52,7 +52,7 @@ impl WatchBench for WatchedRegisters<'_> {
     }
 
     fn run(&mut self, time: Span) -> Result<(), Failure> {
-        Ok(self.session.watched_driver().run(time)?)
+        Ok(self.session.driver().run(time)?)
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) fn write(
     };
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(std::slice::from_ref(&arguments.drives), session)?;
-        let mut driver = session.watched_driver();
+        let mut driver = session.driver();
         let mut orders = Vec::new();
         for axis in drives {
             let scaling = scaling(&mut driver, axis)?;

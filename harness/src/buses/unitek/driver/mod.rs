@@ -7,9 +7,8 @@ mod error;
 
 pub use error::Error;
 
-use super::interlock::RegisterInterlock;
 use super::rig::Axis;
-use crate::link::{Line, Trouble};
+use crate::link::Line;
 use crate::medium::{Heard, Out};
 use harness_proto::can::{self, BusError, Frame};
 use harness_proto::time::{Instant, Span};
@@ -47,10 +46,6 @@ pub struct Driver<'l> {
     events: VecDeque<(Instant, Axis, Event)>,
     /// What went wrong on the bus.
     errors: Vec<BusError>,
-    /// What must hold while it is used.
-    interlocks: Vec<RegisterInterlock>,
-    /// An interlock that did not hold, or could not be read: nothing more is done.
-    tripped: Option<Trouble>,
 }
 
 struct Drive {
@@ -86,51 +81,7 @@ impl<'l> Driver<'l> {
             drives: axes.iter().map(drive).collect(),
             events: VecDeque::new(),
             errors: Vec::new(),
-            interlocks: Vec::new(),
-            tripped: None,
         }
-    }
-
-    /// Looks at these interlocks from now on, between jobs and while time passes.
-    pub(super) fn watch(&mut self, interlocks: Vec<RegisterInterlock>) {
-        self.interlocks = interlocks;
-    }
-
-    /// Whether a register has a cycle that this driver has started.
-    pub(super) fn has_cycle(&self, axis: Axis, register: u8) -> bool {
-        let drive = self.drives.iter().find(|drive| drive.axis == axis);
-        drive.is_some_and(|own| own.master.slots().any(|slot| slot.register == register))
-    }
-
-    /// Looks at the interlocks that are due.
-    fn look(&mut self) -> Result<(), Error> {
-        if let Some(trouble) = &self.tripped {
-            return Err(Error::Link(trouble.clone()));
-        }
-        // A look reads registers itself.
-        let mut all = std::mem::take(&mut self.interlocks);
-        let now = self.now();
-        let due = all.iter_mut().filter(|own| own.next <= now);
-        let found = due.map(|own| own.look(self)).find_map(Result::err);
-        self.interlocks = all;
-        match found {
-            Some(trouble) => {
-                self.tripped = Some(trouble.clone());
-                Err(Error::Link(trouble))
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// Looks at every interlock that is due now.
-    ///
-    /// # Errors
-    /// [`Trouble::Interlock`] for one that does not hold, [`Trouble::Lost`] for one that cannot be read.
-    pub(super) fn look_at_interlocks(&mut self) -> Result<(), Trouble> {
-        self.look().map_err(|error| match error {
-            Error::Link(trouble) => trouble,
-            error => Trouble::Lost(error.to_string()),
-        })
     }
 
     /// Its drives.
@@ -230,13 +181,23 @@ impl<'l> Driver<'l> {
     /// [`Error::Link`].
     pub fn run(&mut self, time: Span) -> Result<(), Error> {
         let end = self.now() + time;
-        loop {
-            self.look()?;
-            let due = self.interlocks.iter().map(|own| own.next).min();
-            self.pump(due.map_or(end, |due| due.min(end)), |_| false)?;
-            if self.now() >= end {
-                return self.look();
-            }
+        while self.now() < end {
+            self.pause();
+            let now = self.now();
+            // A pause that is not possible now is not waited for.
+            let due = self.line.pause_due().filter(|due| *due > now);
+            self.pump(due.unwrap_or(end).min(end), |_| false)?;
+        }
+        self.pump(end, |_| false)
+    }
+
+    /// Lets the line make its own queries where they are due: nothing is under way.
+    fn pause(&mut self) {
+        let now = self.now();
+        if self.line.pause_due().is_some_and(|due| due <= now) {
+            self.receive();
+            self.collect();
+            self.line.pause();
         }
     }
 
@@ -288,9 +249,9 @@ impl<'l> Driver<'l> {
 
     /// Runs a job to its end.
     fn run_job(&mut self, axis: Axis, job: Job) -> Result<Outcome, Error> {
-        self.look()?;
         let place = self.drives.iter().position(|drive| drive.axis == axis);
         let place = place.ok_or(Error::NoSuchDrive(axis.node))?;
+        self.pause();
         let submitted = self.drives[place].master.submit(job);
         let id = submitted.map_err(Error::Refused)?;
         let has_ended =

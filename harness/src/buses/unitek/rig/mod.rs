@@ -1,5 +1,6 @@
 //! Rig files of UNITEK drives: identifiers, limits, and the simulated bench.
 
+mod interlock;
 mod known;
 mod observed;
 mod permitted;
@@ -15,7 +16,6 @@ use permitted::special_register;
 use player::Player;
 pub use session::{Session, UnitekDrives};
 
-use super::interlock::RegisterInterlock;
 use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
@@ -25,7 +25,6 @@ use crate::cli::fuzz::LineFuzz;
 use crate::cli::port_bench::PortBench;
 use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
-use crate::rig::port_session::PortSession;
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
@@ -55,17 +54,13 @@ pub(crate) const PORT: PortRow = PortRow {
     },
     setup_mistakes: |port, source| setup(port, source).err(),
     special_register,
-    interlock: Some(|own| RegisterInterlock::read(own).map(|_| ())),
+    interlock: ("register", interlock::checked),
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: Some(|rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
     }),
     command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
-    hold: |rig, options| {
-        Ok(Box::new(HeldPort::<UnitekDrives>(PortSession::open(
-            rig, options,
-        )?)))
-    },
+    hold: |rig, options| Ok(Box::new(HeldPort::<UnitekDrives>::open(rig, options)?)),
     check: super::cli::check,
     fuzz: LineFuzz::of::<Unitek>(),
 };

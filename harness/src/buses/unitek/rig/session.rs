@@ -1,13 +1,12 @@
 //! UNITEK drives of a rig in use: opened behind their gate, found to answer, and taken to their safe state.
 
+use super::interlock::Interlocks;
 use super::{Axis, axes, limits, rate, setup};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::gate::guarded;
-use crate::buses::unitek::interlock::RegisterInterlock;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
-use crate::guard::{Guarded, Safe, Standstill};
-use crate::link::Trouble;
+use crate::guard::{Guarded, Safe, Standstill, Watch};
 use crate::link::frames::{AdapterSettings, FrameLink};
 use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
@@ -64,8 +63,8 @@ impl PortDrives for UnitekDrives {
         ask(session, ill_as_well)
     }
 
-    fn look_at_interlocks(session: &mut Session) -> Result<(), Trouble> {
-        session.watched_driver().look_at_interlocks()
+    fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
+        Interlocks::of(rig, &self.axes, self.patience).map(|own| Box::new(own) as Box<dyn Watch>)
     }
 
     fn listed(&self) -> Vec<Axis> {
@@ -103,14 +102,6 @@ impl Session {
     pub fn driver(&mut self) -> Driver<'_> {
         let (link, drives) = self.parts();
         Driver::new(Box::new(link), &drives.axes, drives.patience)
-    }
-
-    /// The same for a command: it looks at the interlocks of the rig's file between jobs.
-    pub fn watched_driver(&mut self) -> Driver<'_> {
-        let interlocks = RegisterInterlock::all(self.rig());
-        let mut driver = self.driver();
-        driver.watch(interlocks);
-        driver
     }
 }
 

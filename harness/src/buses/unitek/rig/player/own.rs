@@ -46,6 +46,14 @@ impl Own {
         })
     }
 
+    /// Whether it writes a register, in its header or by a line.
+    pub(super) fn writes(&self, number: u8) -> bool {
+        let drives = &self.plan.setup.setup.drives;
+        let mut header = drives.iter().flat_map(|own| &own.registers);
+        header.any(|(register, _)| *register == number)
+            || self.frames().any(|frame| writes(frame, number))
+    }
+
     /// The registers whose contents its lines ask for.
     pub(super) fn asks_for(&self) -> BTreeSet<u8> {
         let first = |wanted: &WantedFrame| match wanted.data.first() {
@@ -66,7 +74,12 @@ impl Own {
 
 /// Whether a frame may store parameters in the EEPROM.
 pub(in super::super) fn stores(frame: &Frame) -> bool {
+    writes(frame, 0x84)
+}
+
+/// Whether a frame writes a register.
+fn writes(frame: &Frame, number: u8) -> bool {
     let rx = u16::try_from(frame.id().number()).unwrap_or(0);
     let request = Request::decode(frame, rx, Dlc4::As3);
-    matches!(request, Ok(Request::Write { register: 0x84, .. }))
+    matches!(request, Ok(Request::Write { register, .. }) if register == number)
 }
