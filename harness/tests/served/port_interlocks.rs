@@ -16,12 +16,16 @@ const SPEED: &str = "[[interlock]]\ndrive = 1\nregister = \"SPEED_ACTUAL\"\nmin 
 const TRIPPED: &str = "interlock on SPEED_ACTUAL of drive 1 (the belt comes off): ";
 
 /// A scenario with a speed command in it.
-fn faster(command: &str, more: &str) -> String {
+fn faster(command: &str) -> String {
     format!(
-        "title faster\nsource unitek ex 3\nbus unitek\ndrive 1\n\n{more}> 201 31 {command}\nwait 2s\n> 201 3D 31 00\n\
+        "title faster\nsource unitek ex 3\nbus unitek\ndrive 1\n\n> 201 31 {command}\nwait 2s\n> 201 3D 31 00\n\
          < 181 31 {command} xx\n"
     )
 }
+
+/// The same with a cycle of the register that the interlock is on.
+const SENT_BY_ITSELF: &str = "title cycle\nsource unitek ex 8\nbus unitek\ndrive 1\n\n> 201 3D 30 64\n> 201 31 00 40\nfor k in 1..20\n\
+                              < 181 30 xx xx xx\nend\n> 201 3D 30 FF\n";
 
 #[test]
 fn a_drive_on_can_that_turns_too_fast_is_stopped() {
@@ -31,8 +35,8 @@ fn a_drive_on_can_that_turns_too_fast_is_stopped() {
         std::fs::write(desk.path("faster.scn"), text).expect("room");
         desk.run(&format!("run faster.scn --allow-motion{more}"))
     };
-    ended(&run(&faster("CD 0C", ""), ""), 0, "1 passed");
-    let fast = run(&faster("00 40", ""), " --evidence kept --junit kept.xml");
+    ended(&run(&faster("CD 0C"), ""), 0, "1 passed");
+    let fast = run(&faster("00 40"), " --evidence kept --junit kept.xml");
     ended(&fast, 6, TRIPPED);
     ended(&fast, 6, "at least -20% and at most 20% is required");
     ended(&fast, 6, drives_on_can::SAFE);
@@ -43,7 +47,7 @@ fn a_drive_on_can_that_turns_too_fast_is_stopped() {
     let junit = std::fs::read_to_string(desk.path("kept.xml")).expect("a report");
     assert!(junit.contains("the belt comes off"), "{junit}");
     // A drive that sends the register by itself is not asked for it: its own frames are compared.
-    let cycle = run(&faster("00 40", "> 201 3D 30 64\n"), "");
+    let cycle = run(SENT_BY_ITSELF, "");
     ended(&cycle, 6, TRIPPED);
     ended(&cycle, 6, drives_on_can::SAFE);
     // Commands are watched as well.
@@ -86,25 +90,31 @@ fn a_drive_on_can_that_is_not_ready_is_not_used() {
     ended(&check.expect("the program"), 6, "FRG is 0");
 }
 
+/// What cannot be read is an error of the bench; a drive that does not answer cannot be seen in its safe state either.
 #[test]
 fn an_interlock_that_cannot_be_read_is_an_error_of_the_bench() {
     let desk = drives_on_can::Desk::of("slcan", "allow_motion = true\n", "drive 1\n");
-    add(&desk.path("desk.toml"), "\n[health]\nbefore = false\n");
+    let rig = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&rig).expect("a rig");
+    let text = text.replace("\"2s\"", "\"200ms\"");
+    let text = text.replace("node = 2", "node = 5") + "[health]\nbefore = false\n";
+    std::fs::write(&rig, text + &SPEED.replace("drive = 1", "drive = 5")).expect("room");
+    let output = desk.run("read 1 MODE");
+    ended(&output, 7, "interlock on SPEED_ACTUAL of drive 5");
+    ended(&output, 7, "cannot be read: the drive does not answer");
+    let setup = "slave 8 ppo 4\nslave 8 parameter 1621 = 2\n";
+    let desk = inverters_on_line::Desk::of("tcp", "", setup);
     add(
         &desk.path("desk.toml"),
-        &SPEED.replace("drive = 1", "drive = 2"),
+        "[[interlock]]\ndrive = 8\nparameter = \"1202\"\nmax = \"9s\"\n",
     );
-    let text = std::fs::read_to_string(desk.path("desk.toml")).expect("a rig");
-    let text = text.replace("patience = \"2s\"", "patience = \"200ms\"");
-    std::fs::write(
-        desk.path("desk.toml"),
-        text.replace("node = 2", "node = 5")
-            .replace("drive = 2", "drive = 5"),
-    )
-    .expect("room");
-    let output = desk.run("read 1 MODE");
-    ended(&output, 3, "interlock on SPEED_ACTUAL of drive 5");
-    ended(&output, 3, "cannot be read: the drive does not answer");
+    let output = desk.run("info 8 --rig desk.toml");
+    ended(
+        &output,
+        3,
+        "interlock on 1202 Accel. time of drive 8 cannot be read: ",
+    );
+    ended(&output, 3, "no parameter channel");
 }
 
 const FREQUENCY: &str = "[[interlock]]\ndrive = 8\nparameter = \"HIW\"\nmax = \"30%\"\nmessage = \"the belt comes off\"\n";
@@ -127,7 +137,7 @@ fn an_inverter_that_turns_too_fast_is_stopped() {
         ended(&fast, 6, inverters_on_line::SAFE);
         // The same in the middle of a scenario.
         let scenario = "title faster\nsource nordac 3.2.3\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\n\nstart 8 ppo 1\non 8\n\
-                        repeat 40 {\n  exchange 8 STW=047F HSW=60%\n  wait 100ms\n}\n";
+                        for k in 1..40\nexchange 8 STW=047F HSW=60%\nwait 100ms\nend\n";
         std::fs::write(desk.path("faster.scn"), scenario).expect("room");
         let run = desk.run("run faster.scn --allow-motion --rig desk.toml --evidence kept");
         ended(&run, 6, words);
@@ -142,10 +152,15 @@ fn a_parameter_of_an_inverter_is_watched() {
     let desk = inverters_on_line::Desk::new("tcp", "");
     let rig = desk.path("desk.toml");
     let plain = std::fs::read_to_string(&rig).expect("a rig");
-    let current = "[[interlock]]\ndrive = 8\nparameter = \"Actual frequency\"\nmax = \"10.0Hz\"\nevery = \"50ms\"\n";
-    add(&rig, current);
-    let on = desk.run("on 8 --at 60% --for 6s --move --rig desk.toml");
-    ended(&on, 6, "interlock on 1000 Actual frequency of drive 8: ");
+    let word = "[[interlock]]\ndrive = 8\nparameter = \"Control word\"\nmax = \"1150\"\nevery = \"50ms\"\n";
+    add(&rig, word);
+    ended(&desk.run("read 8 1202 --rig desk.toml"), 0, "5.00 s");
+    let on = desk.run("on 8 --setpoint 20% --for 6s --move --rig desk.toml");
+    ended(
+        &on,
+        6,
+        "interlock on 967 Control word of drive 8: 1151 was read",
+    );
     ended(&on, 6, inverters_on_line::SAFE);
     let local =
         "[[interlock]]\ndrive = 8\nparameter = \"ZSW\"\nbit = \"warning\"\nlevel = \"high\"\n";
