@@ -12,6 +12,7 @@ mod named;
 mod on_can;
 mod on_can_qualify;
 mod on_profibus;
+mod port_interlocks;
 #[path = "../common/program.rs"]
 mod program;
 mod simulated;

@@ -126,8 +126,32 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
         (
             "what only rings have",
             port(
-                "slcan = \"/dev/ttyACM0\"\n[limits]\nallow_reset = true\n[[interlock]]\ndrive = 0",
+                "slcan = \"/dev/ttyACM0\"\n[limits]\nallow_reset = true\n[[interlock]]\ndrive = 0\ncell = \"nist\"\nmax = \"9rpm\"",
             ),
+        ),
+        (
+            "interlocks on what no drive has",
+            port("slcan = \"/dev/ttyACM0\"").replace(
+                "[limits]",
+                "",
+            ) + "\n[[interlock]]\ndrive = 1\nregister = \"SPED_ACTUAL\"\nmax = \"20%\"\n\
+                 [[interlock]]\ndrive = 2\nregister = \"SPEED_ACTUAL\"\nmax = \"20\"\n\
+                 [[interlock]]\ndrive = 1\nregister = \"STATUS\"\nbit = \"Enable\"\nlevel = \"high\"\n\
+                 [[interlock]]\ndrive = 1\nregister = \"T_MOTOR\"\nmin = \"9\"\nmax = \"8\"\n\
+                 [[interlock]]\ndrive = 1\nparameter = \"1202\"\nmax = \"9s\"\n\
+                 [[interlock]]\ndrive = 1\nregister = \"T_MOTOR\"\n",
+        ),
+        (
+            "interlocks on what no inverter has",
+            port("tcp = \"lab:4200\"")
+                .replace("unitek", "nordac")
+                .replace("{ node = 1 }", "{ address = 8 }")
+                + "\n[[interlock]]\ndrive = 8\nparameter = \"Accel time\"\nmax = \"9s\"\n\
+                   [[interlock]]\ndrive = 8\nparameter = \"1202\"\nmax = \"9\"\n\
+                   [[interlock]]\ndrive = 8\nparameter = \"HIW\"\nmax = \"20Hz\"\n\
+                   [[interlock]]\ndrive = 8\nparameter = \"ZSW\"\nmax = \"0F37\"\n\
+                   [[interlock]]\ndrive = 8\nregister = \"STATUS\"\nmax = \"1\"\n\
+                   [[interlock]]\ndrive = 8\n",
         ),
         (
             "what only ports have",

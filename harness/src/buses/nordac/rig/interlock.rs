@@ -114,7 +114,10 @@ impl OwnInterlock {
     pub(in crate::buses::nordac) fn broken(&self, number: i64) -> Option<String> {
         let read = match self.cell {
             Cell::Parameter(own) => own.parameter.show(own.index.element, number).to_string(),
-            Cell::Word(ReplyWord::Actual) => percentage(word_of(number)),
+            Cell::Word(ReplyWord::Actual) => {
+                let word = word_of(number);
+                format!("{} ({word:04X})", percentage(word))
+            }
             Cell::Word(ReplyWord::Status) => format!("{:04X}", word_of(number)),
             Cell::Word(ReplyWord::Second) => number.to_string(),
         };
