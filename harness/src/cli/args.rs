@@ -437,7 +437,8 @@ pub struct CampaignArguments {
     /// Show the cases of this class, one per line.
     #[arg(long, value_name = "CLASS", value_enum)]
     pub only: Option<ClassName>,
-    /// Print a scenario that replays this case of a campaign on a ring, LINK:BYTE:WHAT, such as 98->97:10:0.
+    /// Print a scenario that replays this case: on a ring LINK:BYTE:WHAT, such as 98->97:10:0; on CAN and PROFIBUS a name that --format json
+    /// lists, such as 3:lost.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
     /// Write the report into this file, as one HTML page.

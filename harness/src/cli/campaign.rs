@@ -164,15 +164,22 @@ fn replay(
     on_lines: &[Box<dyn LineCampaign>],
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    if campaigns.is_empty() && !on_lines.is_empty() {
-        output.complain(
-            "--case is for campaigns on rings; for another one --format json lists every case",
-        );
-        return Ok(Exit::Usage);
-    }
-    let ([campaign], []) = (campaigns, on_lines) else {
-        output.complain("--case needs exactly one campaign; name the one that the case belongs to");
-        return Ok(Exit::Usage);
+    let campaign = match (campaigns, on_lines) {
+        ([campaign], []) => campaign,
+        ([], [campaign]) => {
+            return match campaign.scenario(name) {
+                Ok(text) => output.result(&text).map(|()| Exit::Passed),
+                Err(wrong) => {
+                    output.complain(&wrong);
+                    Ok(Exit::Usage)
+                }
+            };
+        }
+        _ => {
+            let why = "--case needs exactly one campaign; name the one that the case belongs to";
+            output.complain(why);
+            return Ok(Exit::Usage);
+        }
     };
     let case = match CaseFaults::from_name(name, campaign.shape.drives) {
         Ok(case) => case,

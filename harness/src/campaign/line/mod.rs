@@ -9,6 +9,7 @@ mod report;
 pub(crate) use html::section;
 pub(crate) use report::{json, only, table};
 
+use harness_proto::time::Instant;
 use std::fmt::Debug;
 
 /// A class of outcomes.
@@ -120,6 +121,53 @@ pub trait LineCampaign: Debug {
     /// How many cases it has.
     fn cases(&self) -> usize;
 
+    /// The scenario that replays the case of this name: the fault, what the master sent in this case, and what it received.
+    ///
+    /// # Errors
+    /// There is no such case, in a sentence with the remedy.
+    fn scenario(&self, case: &str) -> Result<String, String>;
+
     /// Plays every case, in order; `progress` is called behind each.
     fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine;
+}
+
+/// The case of this name among those of a campaign.
+///
+/// # Errors
+/// There is none.
+pub(crate) fn case_of<C: Copy>(
+    cases: &[C],
+    name: &str,
+    named: impl Fn(&C) -> String,
+) -> Result<C, String> {
+    let found = cases.iter().find(|own| named(own) == name);
+    found.copied().ok_or_else(|| {
+        let such = cases.first().map(named).unwrap_or_default();
+        format!(
+            "there is no case `{name}`; a name that --format json lists expected, such as `{such}`"
+        )
+    })
+}
+
+/// What stands in front of the steps of a case's scenario: its header lines and, as remarks, its class and what happened.
+pub(crate) fn header_of_case(
+    (campaign, case): (&str, &str),
+    source_and_drive: &str,
+    class: &LineClass,
+    happened: &str,
+) -> String {
+    let campaign = campaign.trim_end_matches(".toml");
+    format!(
+        "title   {case} of {campaign}\n{source_and_drive}\n# {}: {}\n# {happened}\n",
+        class.name, class.about
+    )
+}
+
+/// A time of a case, in milliseconds, as a scenario has it.
+pub(crate) fn time_of_case(at: Instant) -> String {
+    let nanos = at.since_start().as_nanos();
+    match nanos % 1_000_000 {
+        0 => format!("{}ms", nanos / 1_000_000),
+        rest => format!("{}.{rest:06}ms", nanos / 1_000_000),
+    }
 }

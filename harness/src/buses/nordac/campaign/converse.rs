@@ -5,6 +5,7 @@
 
 use super::file::{Step, TelegramCampaignFile};
 use harness_proto::decode::Decoded;
+use harness_proto::line::Received;
 use harness_proto::nordac::master::{Exchange, Startup};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Image, PARAMETERS, PpoType};
@@ -99,6 +100,19 @@ pub struct Conversation {
     pub telegrams: Vec<(bool, Vec<u8>)>,
     /// What the slave holds at the end.
     pub state: Option<SlaveState>,
+    /// What the master sent and received, in order.
+    pub(super) log: Vec<Said>,
+    /// How long it took.
+    pub(super) end: Instant,
+}
+
+/// Octets at the master.
+#[derive(Clone, Debug)]
+pub(super) enum Said {
+    /// A telegram that was to be sent from this time on.
+    Sent(Instant, Vec<u8>),
+    /// What came before the next telegram.
+    Received(Vec<Received>),
 }
 
 /// Plays the steps, with a fault or without.
@@ -114,6 +128,7 @@ pub(super) fn converse(
     }
     let ends = steps.iter().map(|step| desk.step(*step)).collect();
     desk.run(desk.now + REST);
+    let _late = desk.take_heard();
     let state = desk.state();
     Some(Conversation {
         ends,
@@ -121,6 +136,8 @@ pub(super) fn converse(
         starts: desk.starts,
         telegrams: desk.telegrams,
         state,
+        log: desk.log,
+        end: desk.now,
     })
 }
 
@@ -134,6 +151,7 @@ struct Desk {
     repeated: u64,
     starts: u64,
     telegrams: Vec<(bool, Vec<u8>)>,
+    log: Vec<Said>,
 }
 
 impl Desk {
@@ -159,6 +177,7 @@ impl Desk {
             repeated: 0,
             starts: 0,
             telegrams: Vec::new(),
+            log: Vec::new(),
         })
     }
 
@@ -276,6 +295,8 @@ impl Desk {
             ready: self.now,
             idle_bits: SYN_BITS,
         };
+        let _late = self.take_heard();
+        self.log.push(Said::Sent(self.now, octets.to_vec()));
         let host = self.line.station_mut(MASTER).host_mut()?;
         host.forget();
         host.send(wish, own);
@@ -284,10 +305,7 @@ impl Desk {
         while self.line.is_busy() {
             self.run(self.now + slot);
         }
-        let host = self.line.station_mut(MASTER).host_mut()?;
-        let heard: Vec<_> = std::iter::from_fn(|| host.receive())
-            .map(|(_, own)| own)
-            .collect();
+        let heard = self.take_heard();
         if heard.is_empty() {
             return None;
         }
@@ -302,5 +320,16 @@ impl Desk {
             }
             _ => None,
         }
+    }
+
+    /// Takes what has come.
+    fn take_heard(&mut self) -> Vec<Received> {
+        let host = self.line.station_mut(MASTER).host_mut();
+        let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, own)| own));
+        let heard: Vec<_> = heard.into_iter().flatten().collect();
+        if !heard.is_empty() {
+            self.log.push(Said::Received(heard.clone()));
+        }
+        heard
     }
 }

@@ -3,6 +3,7 @@
 //! [`file`](mod@file) says what stands in a campaign file, `converse` plays the conversation with one fault or none, and this module
 //! classifies the outcomes.
 
+mod case;
 mod converse;
 pub mod file;
 #[cfg(test)]
@@ -12,7 +13,7 @@ pub use converse::{Conversation, SlaveState, StepEnd};
 pub use file::{Step, TelegramCampaignFile};
 
 use crate::buses::Bus;
-use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine};
+use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};
 use include_dir::{Dir, include_dir};
@@ -67,6 +68,12 @@ pub struct TelegramCase {
 }
 
 impl TelegramCase {
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{}:{}", self.telegram, self.fault())
+    }
+
     /// The fault, as a scenario writes it, behind the octet that it happens to.
     #[must_use]
     pub fn fault(&self) -> String {
@@ -231,7 +238,7 @@ impl TelegramCampaign {
             .map(|own| format!("{own:02X}"))
             .collect();
         Some(LineOutcome {
-            case: format!("{}:{}", case.telegram, case.fault()),
+            case: case.name(),
             place: case.telegram as u64,
             fault: case.fault(),
             disturbed: octets.join(" ") + more,
@@ -259,6 +266,14 @@ impl LineCampaign for TelegramCampaign {
 
     fn cases(&self) -> usize {
         self.cases.len()
+    }
+
+    fn scenario(&self, case: &str) -> Result<String, String> {
+        let case = case_of(&self.cases, case, TelegramCase::name)?;
+        let played = self.outcome(&case).zip(self.play(case));
+        let (outcome, (_, conversation)) =
+            played.ok_or_else(|| "the case cannot be played".to_owned())?;
+        Ok(case::scenario(self, (&case, &outcome), &conversation))
     }
 
     fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine {

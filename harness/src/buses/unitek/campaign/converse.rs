@@ -75,6 +75,14 @@ pub struct DriveState {
     cycles: Vec<(u8, u8)>,
 }
 
+impl DriveState {
+    /// The registers in which it differs from another state, and what they hold.
+    pub(super) fn differing(&self, other: &Self) -> impl Iterator<Item = (u8, u32)> {
+        let cells = self.cells.into_iter().zip(other.cells).zip(0..=u8::MAX);
+        cells.filter_map(|((own, other), number)| (own != other).then_some((number, own)))
+    }
+}
+
 /// What a conversation gave.
 #[derive(Clone, Debug)]
 pub struct Conversation {
@@ -88,6 +96,19 @@ pub struct Conversation {
     pub frames: Vec<Frame>,
     /// What the drive holds at the end.
     pub state: Option<DriveState>,
+    /// What the master sent and received, in order.
+    pub(super) log: Vec<Said>,
+    /// How long it took.
+    pub(super) end: Instant,
+}
+
+/// A frame at the master.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Said {
+    /// It was given to the controller at this time.
+    Sent(Instant, Frame),
+    /// It was received.
+    Received(Frame),
 }
 
 /// Plays the steps, with a fault or without.
@@ -117,6 +138,8 @@ pub(super) fn converse(
         sent: desk.sent,
         frames,
         state,
+        log: desk.log,
+        end: desk.now,
     }
 }
 
@@ -127,6 +150,7 @@ struct Desk {
     sent: u64,
     troubles: Vec<String>,
     ended: Option<Outcome>,
+    log: Vec<Said>,
 }
 
 impl Desk {
@@ -143,6 +167,7 @@ impl Desk {
             sent: 0,
             troubles: Vec::new(),
             ended: None,
+            log: Vec::new(),
         }
     }
 
@@ -194,6 +219,7 @@ impl Desk {
             }
             let heard = self.host().and_then(Host::receive);
             if let Some((at, Heard::Frame(frame))) = heard {
+                self.log.push(Said::Received(frame));
                 self.master.handle_frame(at, &frame);
             }
         }
@@ -220,6 +246,7 @@ impl Desk {
             if let Some(host) = self.host() {
                 host.send(now, frame);
             }
+            self.log.push(Said::Sent(now, frame));
             self.sent += 1;
         }
     }

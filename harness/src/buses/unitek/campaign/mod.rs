@@ -3,6 +3,7 @@
 //! [`file`](mod@file) says what stands in a campaign file, `converse` plays the conversation with one fault or none, and this module
 //! classifies the outcomes and counts them.
 
+mod case;
 mod converse;
 pub mod file;
 
@@ -10,7 +11,7 @@ pub use converse::{Conversation, JobEnd};
 pub use file::{FrameCampaignFile, Step};
 
 use crate::buses::Bus;
-use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine};
+use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};
 use std::fmt;
@@ -265,6 +266,11 @@ impl LineCampaign for FrameCampaign {
 
     fn cases(&self) -> usize {
         self.cases.len()
+    }
+
+    fn scenario(&self, case: &str) -> Result<String, String> {
+        let case = case_of(&self.cases, case, ToString::to_string)?;
+        Ok(case::scenario(self, &self.play(case)))
     }
 
     fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine {

@@ -2,6 +2,10 @@
 
 use super::*;
 use crate::campaign::line::table;
+use crate::library::Entry;
+use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 
 /// The page with the figures.
 const PAGE: &str = include_str!("../../../../../corpora/campaigns/README.md");
@@ -33,6 +37,57 @@ fn built_in_campaigns_have_the_figures_that_they_pin() {
         let figures = pinned.map(|figure| figure.to_string()).join(" | ");
         let row = format!("| `{name}` | {} | {figures} |", expect.cases.unwrap_or(0));
         assert!(PAGE.contains(&row), "corpora/campaigns/README.md: {row}");
+    }
+}
+
+/// Every so many cases of each built-in campaign as a scenario, and every case in which something was not noticed: a right drive meets it,
+/// and the bus carries the same frames.
+#[test]
+fn cases_are_scenarios_that_show_the_same() {
+    cases_are_scenarios(7);
+}
+
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn every_case_is_a_scenario_that_shows_the_same() {
+    cases_are_scenarios(1);
+}
+
+fn cases_are_scenarios(step: usize) {
+    for name in names() {
+        let campaign = find(Path::new(&name))
+            .expect("it is there")
+            .expect("it can be read");
+        for (place, case) in campaign.cases.iter().enumerate() {
+            let outcome = campaign.play(*case);
+            if place % step > 0 && outcome.class != FrameClass::Unnoticed {
+                continue;
+            }
+            let text = campaign.scenario(&case.to_string()).expect("a case");
+            let class = CLASSES[outcome.class as usize].name;
+            assert!(text.contains(&format!("\n# {class}: ")), "{text}");
+            let source = Source {
+                name: name.clone(),
+                text: text.clone().into(),
+            };
+            let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{text}\n{p:?}"));
+            let plan = entry.other.expect("a plan of this bus");
+            let mut link = plan.simulate();
+            let played = plan.play(&mut *link, AtMismatch::Stop);
+            assert_eq!(played.verdict, Verdict::Passed, "{text}\n{played:?}");
+            let trace = link.trace(0);
+            let frames: Vec<_> = trace.channels[0]
+                .frames()
+                .iter()
+                .map(|own| own.frame)
+                .collect();
+            assert_eq!(frames, outcome.conversation.frames, "{text}");
+        }
+        assert!(
+            campaign
+                .scenario("0:lost")
+                .is_err_and(|why| why.contains("such as `1:lost`"))
+        );
     }
 }
 

@@ -166,6 +166,7 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
         ("delay", FrameHarm::Delay(delay)),
         ("corrupt", FrameHarm::Corrupt),
         ("no-acknowledge", FrameHarm::NoAcknowledge),
+        ("bus-off", FrameHarm::BusOff),
     ];
     let harm = match named(scanner, &kinds, "a fault of a frame")? {
         FrameHarm::Delay(_) => FrameHarm::Delay(times::duration(scanner)?),

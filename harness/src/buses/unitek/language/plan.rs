@@ -631,6 +631,7 @@ impl Planner {
             FrameHarm::Delay(time) => FrameFault::Late(time.on(self.byte_time())),
             FrameHarm::Corrupt => FrameFault::Corrupt,
             FrameHarm::NoAcknowledge => FrameFault::NoAcknowledge,
+            FrameHarm::BusOff => FrameFault::BusOff,
         }
     }
 }

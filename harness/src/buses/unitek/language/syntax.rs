@@ -174,6 +174,8 @@ pub enum FrameHarm {
     Corrupt,
     /// `no-acknowledge`.
     NoAcknowledge,
+    /// `bus-off`.
+    BusOff,
 }
 
 /// What happens to a drive as a whole.

@@ -79,6 +79,7 @@ master deviates never-locks
 @5ms ! drive 1: off
 ! drive 1: on
 ! drive 3: bus-off
+! frame 4: bus-off
 drive 1 input limit1 high
 drive 1 force errors = 00000008
 drive 1 register D4 = 11223344

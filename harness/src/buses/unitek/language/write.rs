@@ -126,6 +126,7 @@ pub(super) fn step(step: &Step) -> String {
                 FrameHarm::Delay(time) => format!("delay {time}"),
                 FrameHarm::Corrupt => "corrupt".to_owned(),
                 FrameHarm::NoAcknowledge => "no-acknowledge".to_owned(),
+                FrameHarm::BusOff => "bus-off".to_owned(),
             };
             format!("! frame {}: {harm}", number.expression)
         }
