@@ -190,7 +190,7 @@ fn octet_harm(scanner: &mut Scanner<'_>) -> Result<OctetHarm, Problem> {
         ("delay", 5),
     ];
     let plain = match named(scanner, &names, "a fault of a byte")? {
-        0 => LinkFault::Flip(telegram::flips(scanner)?),
+        0 => LinkFault::Flip(telegram::flips(scanner, true)?),
         1 => LinkFault::Replace(telegram::byte(scanner)?),
         2 => LinkFault::Drop,
         3 => LinkFault::Duplicate,

@@ -74,6 +74,7 @@ master deviates master-gaps
 < 10 xx*5
 < E5 bad 1
 ! byte 3: flip 0
+! byte 4: flip b 0
 ! master byte 3: replace 16
 ! slave 8 byte 4: drop
 ! slave 8 byte 4: insert 16

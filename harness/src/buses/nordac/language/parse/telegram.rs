@@ -39,7 +39,7 @@ fn damage(scanner: &mut Scanner<'_>) -> Result<Damage, Problem> {
         return Ok(Damage::Stop);
     }
     if scanner.eat_word("flip") {
-        return Ok(Damage::Flip(flips(scanner)?));
+        return Ok(Damage::Flip(flips(scanner, false)?));
     }
     if scanner.eat_word("gap") {
         return Ok(Damage::Gap(times::duration(scanner)?));
@@ -47,8 +47,8 @@ fn damage(scanner: &mut Scanner<'_>) -> Result<Damage, Problem> {
     Err(scanner.unexpected("what is wrong with the byte (parity, stop, flip, gap)"))
 }
 
-/// Bits 0 to 7, `p` and `s`.
-pub(super) fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
+/// Bits 0 to 7, `p` and `s`; on the line also `b`, the start bit.
+pub(super) fn flips(scanner: &mut Scanner<'_>, start: bool) -> Result<Flips, Problem> {
     let mut flips = Flips::default();
     loop {
         let mut ahead = scanner.clone();
@@ -57,6 +57,7 @@ pub(super) fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
             [bit @ b'0'..=b'7'] => flips.data ^= 1 << (bit - b'0'),
             b"p" => flips.parity = true,
             b"s" => flips.stop = true,
+            b"b" if start => flips.start = true,
             _ if flips == Flips::default() => {
                 return Err(scanner.unexpected("a bit: 0 to 7, p (parity) or s (stop)"));
             }
