@@ -35,7 +35,9 @@ fn a_drive_on_can_that_turns_too_fast_is_stopped() {
         std::fs::write(desk.path("faster.scn"), text).expect("room");
         desk.run(&format!("run faster.scn --allow-motion{more}"))
     };
-    ended(&run(&faster("CD 0C"), ""), 0, "1 passed");
+    ended(&run(&faster("CD 0C"), " --evidence slow"), 0, "1 passed");
+    let verify = desk.command("verify slow").output().expect("the program");
+    ended(&verify, 0, "0 things wrong");
     let fast = run(&faster("00 40"), " --evidence kept --junit kept.xml");
     ended(&fast, 6, TRIPPED);
     ended(&fast, 6, "at least -20% and at most 20% is required");
