@@ -171,3 +171,28 @@ pub(crate) fn time_of_case(at: Instant) -> String {
         rest => format!("{}.{rest:06}ms", nanos / 1_000_000),
     }
 }
+
+/// Plays the scenario of a case, which a right drive must meet and which states its class: the text, and what the line carried.
+#[cfg(test)]
+pub(crate) fn replayed(
+    campaign: &dyn LineCampaign,
+    case: &str,
+    class: LineClass,
+) -> (String, harness_sim::record::Trace) {
+    use crate::scenario::run::AtMismatch;
+    use crate::scenario::verdict::Verdict;
+    let text = campaign.scenario(case).expect("a case");
+    assert!(text.contains(&format!("\n# {}: ", class.name)), "{text}");
+    let source = crate::scenario::source::Source {
+        name: case.to_owned(),
+        text: text.clone().into(),
+    };
+    let entry = crate::library::Entry::new(source, None);
+    let entry = entry.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
+    let plan = entry.other.expect("a plan of its bus");
+    let mut link = plan.simulate();
+    let played = plan.play(&mut *link, AtMismatch::Stop);
+    assert_eq!(played.verdict, Verdict::Passed, "{text}\n{played:?}");
+    let trace = link.trace(0);
+    (text, trace)
+}

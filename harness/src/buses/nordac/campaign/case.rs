@@ -1,6 +1,6 @@
 //! One case as a scenario, to be looked at with `drivebench trace` and played with `drivebench run`.
 
-use super::converse::{Conversation, Said};
+use super::converse::{Conversation, MasterOctets};
 use super::{CLASSES, TelegramCampaign, TelegramCase};
 use crate::campaign::line::{LineOutcome, header_of_case, time_of_case};
 use harness_proto::line::{LineError, Received};
@@ -31,11 +31,11 @@ pub(super) fn scenario(
     };
     for said in &played.log {
         let _infallible = match said {
-            Said::Sent(at, octets) => {
+            MasterOctets::Sent(at, octets) => {
                 let octets: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
                 writeln!(text, "@{} > {}", time_of_case(*at), octets.join(" "))
             }
-            Said::Received(octets) => writeln!(text, "< {}", received(octets)),
+            MasterOctets::Received(octets) => writeln!(text, "< {}", received(octets)),
         };
     }
     let _infallible = writeln!(text, "@{} ? quiet", time_of_case(played.end));

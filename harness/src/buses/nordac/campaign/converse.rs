@@ -101,14 +101,14 @@ pub struct Conversation {
     /// What the slave holds at the end.
     pub state: Option<SlaveState>,
     /// What the master sent and received, in order.
-    pub(super) log: Vec<Said>,
+    pub(super) log: Vec<MasterOctets>,
     /// How long it took.
     pub(super) end: Instant,
 }
 
 /// Octets at the master.
 #[derive(Clone, Debug)]
-pub(super) enum Said {
+pub(super) enum MasterOctets {
     /// A telegram that was to be sent from this time on.
     Sent(Instant, Vec<u8>),
     /// What came before the next telegram.
@@ -151,7 +151,7 @@ struct Desk {
     repeated: u64,
     starts: u64,
     telegrams: Vec<(bool, Vec<u8>)>,
-    log: Vec<Said>,
+    log: Vec<MasterOctets>,
 }
 
 impl Desk {
@@ -296,7 +296,7 @@ impl Desk {
             idle_bits: SYN_BITS,
         };
         let _late = self.take_heard();
-        self.log.push(Said::Sent(self.now, octets.to_vec()));
+        self.log.push(MasterOctets::Sent(self.now, octets.to_vec()));
         let host = self.line.station_mut(MASTER).host_mut()?;
         host.forget();
         host.send(wish, own);
@@ -328,7 +328,7 @@ impl Desk {
         let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, own)| own));
         let heard: Vec<_> = heard.into_iter().flatten().collect();
         if !heard.is_empty() {
-            self.log.push(Said::Received(heard.clone()));
+            self.log.push(MasterOctets::Received(heard.clone()));
         }
         heard
     }

@@ -1,7 +1,7 @@
 //! The master of a bench.
 
 use crate::buses::nordac::driver::{Driver, Options, Timing};
-use crate::buses::nordac::rig::interlock::OwnInterlock;
+use crate::buses::nordac::rig::interlock::InverterInterlock;
 use crate::buses::nordac::rig::{Session, rate};
 use crate::link::Line;
 use crate::medium::{Heard, Medium, Out};
@@ -80,7 +80,7 @@ pub(super) fn driver(session: &mut Session) -> Master<'_> {
     }
     let watchdog = Options::WATCHDOG;
     let options = Options { timing, watchdog };
-    let interlocks = OwnInterlock::parameters(session.rig());
+    let interlocks = InverterInterlock::parameters(session.rig());
     let parked = Arc::clone(&session.drives().parked);
     let kept = parked.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = Box::new(session.link());

@@ -14,7 +14,7 @@ pub use error::{Error, fault_name};
 pub use motion::{Reached, percent};
 pub use phy::Timing;
 
-use super::rig::interlock::OwnInterlock;
+use super::rig::interlock::InverterInterlock;
 use crate::link::{Line, Trouble};
 use harness_proto::nordac::master::{Exchange, ExchangeError};
 use harness_proto::nordac::{Answer, IDENT, Image, PpoType};
@@ -94,7 +94,7 @@ pub struct Driver<'l> {
     slaves: Vec<Slave>,
     options: Options,
     /// What must hold of parameters while it is used.
-    interlocks: Vec<OwnInterlock>,
+    interlocks: Vec<InverterInterlock>,
 }
 
 impl fmt::Debug for Driver<'_> {
@@ -122,7 +122,7 @@ impl<'l> Driver<'l> {
     }
 
     /// Looks at these interlocks from now on, before a motor is switched on and while time passes.
-    pub(super) fn watch(&mut self, interlocks: Vec<OwnInterlock>) {
+    pub(super) fn watch(&mut self, interlocks: Vec<InverterInterlock>) {
         self.interlocks = interlocks;
     }
 
@@ -146,7 +146,7 @@ impl<'l> Driver<'l> {
         }
     }
 
-    fn look_at(&mut self, own: &mut OwnInterlock) -> Result<(), Error> {
+    fn look_at(&mut self, own: &mut InverterInterlock) -> Result<(), Error> {
         own.seen_at(self.now());
         let Some(parameter) = own.parameter().filter(|_| self.place(own.slave).is_ok()) else {
             return Ok(());

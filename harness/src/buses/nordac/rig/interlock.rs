@@ -1,4 +1,4 @@
-//! Interlocks on words and parameters of NORDAC inverters: what must hold of inverters while a rig is used.
+//! InverterInterlocks on words and parameters of NORDAC inverters: what must hold of inverters while a rig is used.
 //!
 //! The words of a reply (ZSW, HIW, PZD4) are compared in every exchange that passes. A parameter takes a task of the parameter channel,
 //! which is the master's own: it is read before each attempt at a scenario and each command, and by the [driver](super::super::driver)
@@ -28,7 +28,7 @@ const LONGEST: usize = 29;
 
 /// An interlock.
 #[derive(Clone, Debug)]
-pub(in crate::buses::nordac) struct OwnInterlock {
+pub(in crate::buses::nordac) struct InverterInterlock {
     pub(in crate::buses::nordac) slave: u8,
     cell: Cell,
     condition: Condition<i64>,
@@ -43,10 +43,10 @@ pub(in crate::buses::nordac) struct OwnInterlock {
 /// # Errors
 /// What is wrong with it.
 pub(super) fn checked(own: &Interlock) -> Result<(), Mistake> {
-    OwnInterlock::read(own).map(|_| ())
+    InverterInterlock::read(own).map(|_| ())
 }
 
-impl OwnInterlock {
+impl InverterInterlock {
     fn read(own: &Interlock) -> Result<Self, Mistake> {
         let name = own.parameter.clone().unwrap_or_default();
         let wrong = |message| {
@@ -185,18 +185,18 @@ fn bound(text: &str, cell: Cell) -> Result<i64, (String, String)> {
 
 /// The interlocks of a rig.
 #[derive(Debug)]
-pub(super) struct Interlocks {
-    all: Vec<OwnInterlock>,
+pub(super) struct InverterInterlocks {
+    all: Vec<InverterInterlock>,
     slaves: Vec<RigSlave>,
     patience: Span,
     /// The last octets that were received, without damage.
     heard: Vec<u8>,
 }
 
-impl Interlocks {
+impl InverterInterlocks {
     /// Those of a rig with these slaves; `None` where it has none.
     pub(super) fn of(rig: &Rig, slaves: &[RigSlave], patience: Span) -> Option<Self> {
-        let all = OwnInterlock::all(rig);
+        let all = InverterInterlock::all(rig);
         (!all.is_empty()).then(|| Self {
             all,
             slaves: slaves.to_vec(),
@@ -206,7 +206,7 @@ impl Interlocks {
     }
 }
 
-impl Watch for Interlocks {
+impl Watch for InverterInterlocks {
     fn due(&self) -> Option<Instant> {
         None
     }
@@ -273,7 +273,7 @@ impl Watch for Interlocks {
             let Some((address, image)) = reply(&self.heard, slave) else {
                 continue;
             };
-            let broken = |own: &OwnInterlock| own.broken_in(&image);
+            let broken = |own: &InverterInterlock| own.broken_in(&image);
             let mut own = self.all.iter().filter(|own| own.slave == address);
             if let Some(why) = own.find_map(broken) {
                 return Err(why);

@@ -1,6 +1,6 @@
 //! NORDAC inverters of a rig in use: opened behind their gate, found to answer, and taken to their safe state.
 
-use super::interlock::Interlocks;
+use super::interlock::InverterInterlocks;
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
 use crate::buses::nordac::cli::Parked;
@@ -77,7 +77,8 @@ impl PortDrives for Inverters {
     }
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
-        Interlocks::of(rig, &self.slaves, self.patience).map(|own| Box::new(own) as Box<dyn Watch>)
+        InverterInterlocks::of(rig, &self.slaves, self.patience)
+            .map(|own| Box::new(own) as Box<dyn Watch>)
     }
 
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {

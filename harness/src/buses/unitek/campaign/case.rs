@@ -1,6 +1,6 @@
 //! One case as a scenario, to be looked at with `drivebench trace` and played with `drivebench run`.
 
-use super::converse::Said;
+use super::converse::MasterFrame;
 use super::{CLASSES, FrameCampaign, FrameClass, FrameOutcome};
 use crate::buses::unitek::language::written;
 use crate::campaign::line::{header_of_case, time_of_case};
@@ -22,10 +22,10 @@ pub(super) fn scenario(campaign: &FrameCampaign, outcome: &FrameOutcome) -> Stri
     let _infallible = writeln!(text, "! frame {}: {}\n", case.frame, case.fault);
     for said in &played.log {
         let _infallible = match said {
-            Said::Sent(at, frame) => {
+            MasterFrame::Sent(at, frame) => {
                 writeln!(text, "@{} > {}", time_of_case(*at), written(frame))
             }
-            Said::Received(frame) => writeln!(text, "< {}", written(frame)),
+            MasterFrame::Received(frame) => writeln!(text, "< {}", written(frame)),
         };
     }
     let _infallible = writeln!(text, "@{} ? quiet", time_of_case(played.end));

@@ -97,14 +97,14 @@ pub struct Conversation {
     /// What the drive holds at the end.
     pub state: Option<DriveState>,
     /// What the master sent and received, in order.
-    pub(super) log: Vec<Said>,
+    pub(super) log: Vec<MasterFrame>,
     /// How long it took.
     pub(super) end: Instant,
 }
 
 /// A frame at the master.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Said {
+pub(super) enum MasterFrame {
     /// It was given to the controller at this time.
     Sent(Instant, Frame),
     /// It was received.
@@ -150,7 +150,7 @@ struct Desk {
     sent: u64,
     troubles: Vec<String>,
     ended: Option<Outcome>,
-    log: Vec<Said>,
+    log: Vec<MasterFrame>,
 }
 
 impl Desk {
@@ -219,7 +219,7 @@ impl Desk {
             }
             let heard = self.host().and_then(Host::receive);
             if let Some((at, Heard::Frame(frame))) = heard {
-                self.log.push(Said::Received(frame));
+                self.log.push(MasterFrame::Received(frame));
                 self.master.handle_frame(at, &frame);
             }
         }
@@ -246,7 +246,7 @@ impl Desk {
             if let Some(host) = self.host() {
                 host.send(now, frame);
             }
-            self.log.push(Said::Sent(now, frame));
+            self.log.push(MasterFrame::Sent(now, frame));
             self.sent += 1;
         }
     }

@@ -1,4 +1,4 @@
-//! Interlocks on registers of UNITEK drives: what must hold of drives while a rig is used.
+//! RegisterInterlocks on registers of UNITEK drives: what must hold of drives while a rig is used.
 //!
 //! A register is asked for in the pauses of a conversation. Nothing tells its reply from a frame that the drive sends by itself (5.2):
 //! while a register has a cycle, or STATUS is sent by event, those frames are compared, and the register is not asked for.
@@ -32,9 +32,9 @@ const TRIES: u8 = 3;
 
 /// A bound: a number, and its unit where the register has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Bound(f64, Option<Given>);
+struct RegisterBound(f64, Option<Given>);
 
-impl PartialOrd for Bound {
+impl PartialOrd for RegisterBound {
     /// Numbers of different units are not compared: that needs the drive's scale.
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let same = self.1 == other.1;
@@ -50,7 +50,7 @@ pub(super) fn checked(own: &Interlock) -> Result<(), Mistake> {
     read(own).map(|_| ())
 }
 
-fn read(own: &Interlock) -> Result<(&'static Register, Condition<Bound>), Mistake> {
+fn read(own: &Interlock) -> Result<(&'static Register, Condition<RegisterBound>), Mistake> {
     let name = own.register.as_deref().unwrap_or_default();
     let expected = "a register of `drivebench cells --bus unitek` expected here";
     let register = register(name).map_err(|message| ("register", message, expected.to_owned()))?;
@@ -61,7 +61,7 @@ fn read(own: &Interlock) -> Result<(&'static Register, Condition<Bound>), Mistak
 }
 
 /// Reads a bound: a number with a unit of the register, or a whole number where it has none.
-fn bound(text: &str, register: &Register) -> Result<Bound, (String, String)> {
+fn bound(text: &str, register: &Register) -> Result<RegisterBound, (String, String)> {
     let end = text.trim_end_matches(|c: char| c.is_ascii_alphabetic() || c == '%');
     let (number, unit) = (end.trim(), &text[end.len()..]);
     let given = Given::from_name(unit);
@@ -81,7 +81,7 @@ fn bound(text: &str, register: &Register) -> Result<Bound, (String, String)> {
     };
     let parsed = number.parse::<f64>().ok().filter(|own| own.is_finite());
     match parsed.filter(|_| fits) {
-        Some(parsed) => Ok(Bound(parsed, given)),
+        Some(parsed) => Ok(RegisterBound(parsed, given)),
         None => Err((
             format!("`{text}` is no bound of {}", register.name),
             expected,
@@ -91,18 +91,18 @@ fn bound(text: &str, register: &Register) -> Result<Bound, (String, String)> {
 
 /// The interlocks of a rig.
 #[derive(Debug)]
-pub(super) struct Interlocks {
-    all: Vec<Entry>,
+pub(super) struct RegisterInterlocks {
+    all: Vec<RegisterInterlock>,
     patience: Span,
     /// What came during a look and is for the conversation.
     unasked: Vec<(Instant, Heard)>,
 }
 
 #[derive(Debug)]
-struct Entry {
+struct RegisterInterlock {
     axis: Axis,
     register: &'static Register,
-    condition: Condition<Bound>,
+    condition: Condition<RegisterBound>,
     own: Interlock,
     every: Span,
     /// On a clock that is never set back.
@@ -114,20 +114,20 @@ struct Entry {
 }
 
 /// What a look has found.
-enum Look {
+enum LookedAt {
     Holds,
     Broken(String),
     Silent,
 }
 
-impl Interlocks {
+impl RegisterInterlocks {
     /// Those of a rig with these drives; `None` where it has none.
     pub(super) fn of(rig: &Rig, axes: &[Axis], patience: Span) -> Option<Self> {
         let entry = |own: &Interlock| {
             // The file was checked.
             let (register, condition) = read(own).ok()?;
             let every = u64::try_from(own.every.0.as_nanos()).unwrap_or(u64::MAX);
-            Some(Entry {
+            Some(RegisterInterlock {
                 axis: axes.iter().copied().find(|axis| axis.node == own.drive)?,
                 register,
                 condition,
@@ -147,7 +147,7 @@ impl Interlocks {
     }
 }
 
-impl Watch for Interlocks {
+impl Watch for RegisterInterlocks {
     fn due(&self) -> Option<Instant> {
         let asked = self.all.iter();
         let asked = asked.filter(|own| !own.sends_itself || own.lacks_scale());
@@ -164,7 +164,7 @@ impl Watch for Interlocks {
                 unasked: &mut self.unasked,
             };
             // In the middle of a scenario a drive may be silent on purpose; between scenarios it must answer.
-            if let Look::Broken(why) = entry.look(&mut asks) {
+            if let LookedAt::Broken(why) = entry.look(&mut asks) {
                 return Err(why);
             }
         }
@@ -182,9 +182,9 @@ impl Watch for Interlocks {
                 unasked: &mut self.unasked,
             };
             match entry.look(&mut asks) {
-                Look::Holds => {}
-                Look::Broken(why) => return Err(Trouble::Interlock(why)),
-                Look::Silent => {
+                LookedAt::Holds => {}
+                LookedAt::Broken(why) => return Err(Trouble::Interlock(why)),
+                LookedAt::Silent => {
                     let why = format!(
                         "{} cannot be read: the drive does not answer",
                         entry.own.words(entry.register.name)
@@ -223,7 +223,7 @@ impl Watch for Interlocks {
     }
 }
 
-impl Entry {
+impl RegisterInterlock {
     /// Notes what a request of the conversation changes.
     fn follow(&mut self, request: Request) {
         let number = self.register.number;
@@ -243,13 +243,13 @@ impl Entry {
         self.scaling.is_none() && usual(self.register.unit).is_some()
     }
 
-    fn look(&mut self, asks: &mut Asks<'_, '_>) -> Look {
+    fn look(&mut self, asks: &mut Asks<'_, '_>) -> LookedAt {
         if self.lacks_scale() {
             let read = [0xCE, 0xC6, 0xD9].map(|number| asks.ask(self, number));
             let [Some(rpm_max), Some(device_current), Some(units_at_200)] =
                 read.map(|own| own.map(|reply| low(reply.data)))
             else {
-                return Look::Silent;
+                return LookedAt::Silent;
             };
             self.scaling = Some(Scaling {
                 rpm_max,
@@ -258,11 +258,11 @@ impl Entry {
             });
         }
         if self.sends_itself {
-            return Look::Holds;
+            return LookedAt::Holds;
         }
         match asks.ask(self, self.register.number) {
-            None => Look::Silent,
-            Some(reply) => self.broken(reply).map_or(Look::Holds, Look::Broken),
+            None => LookedAt::Silent,
+            Some(reply) => self.broken(reply).map_or(LookedAt::Holds, LookedAt::Broken),
         }
     }
 
@@ -312,7 +312,7 @@ struct Asks<'a, 'l> {
 
 impl Asks<'_, '_> {
     /// Reads a register; `None` where no reply comes.
-    fn ask(&mut self, entry: &Entry, register: u8) -> Option<Reply> {
+    fn ask(&mut self, entry: &RegisterInterlock, register: u8) -> Option<Reply> {
         let frame = Request::Read { register }.encode(entry.axis.rx).ok()?;
         (0..self.tries).find_map(|_| {
             let sent = self.line.send(0, Out::Frames(&[frame]));

@@ -1,6 +1,6 @@
 //! UNITEK drives of a rig in use: opened behind their gate, found to answer, and taken to their safe state.
 
-use super::interlock::Interlocks;
+use super::interlock::RegisterInterlocks;
 use super::{Axis, axes, limits, rate, setup};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::gate::guarded;
@@ -64,7 +64,8 @@ impl PortDrives for UnitekDrives {
     }
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
-        Interlocks::of(rig, &self.axes, self.patience).map(|own| Box::new(own) as Box<dyn Watch>)
+        RegisterInterlocks::of(rig, &self.axes, self.patience)
+            .map(|own| Box::new(own) as Box<dyn Watch>)
     }
 
     fn listed(&self) -> Vec<Axis> {

@@ -44,9 +44,6 @@ const MODE: u8 = 0x51;
 /// The commands of torque and of speed. The last one decides what the drive controls.
 const COMMANDS: [u8; 2] = [0x90, 0x31];
 
-/// CAN_TIMEOUT (T-Out).
-const TIME_OUT: u8 = 0xD0;
-
 /// Identifiers and bit rate: a drive that stores new ones may be lost.
 const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
 
@@ -284,7 +281,7 @@ impl Player {
             Ok(at_rest) => at_rest,
             Err(error) => return Gone::Unanswered(error),
         };
-        if self.may_time_out(own) {
+        if own.may_time_out(self.known()) {
             link.without_pauses();
         }
         link.begin();
@@ -295,12 +292,6 @@ impl Player {
         let settings = written.filter(|(_, register)| BUS_SETTINGS.contains(register));
         self.moved.extend(settings.map(|(rx, _)| rx));
         Gone::Played(Box::new(outcome), [at_rest, model])
-    }
-
-    /// Whether a drive may supervise the time between frames in this scenario: every query of the bench would begin that time again.
-    fn may_time_out(&self, own: &Own) -> bool {
-        let held = self.known().iter().any(|known| known.cell(TIME_OUT) != 0);
-        held || own.writes(TIME_OUT)
     }
 
     /// Reads the drives; the first time everything, and what the manual leaves open is settled.

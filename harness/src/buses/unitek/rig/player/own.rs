@@ -1,6 +1,6 @@
 //! A scenario of this bus, read for a rig.
 
-use super::AT_REST;
+use super::{AT_REST, Known};
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::language::plan::{Act, WantedFrame};
 use crate::scenario::parse::parse;
@@ -13,6 +13,9 @@ use harness_proto::can::Frame;
 use harness_proto::unitek::frame::Request;
 use harness_proto::unitek::properties::Dlc4;
 use std::collections::BTreeSet;
+
+/// CAN_TIMEOUT.
+const TIME_OUT: u8 = 0xD0;
 
 /// A scenario of this bus.
 #[derive(Debug)]
@@ -46,12 +49,13 @@ impl Own {
         })
     }
 
-    /// Whether it writes a register, in its header or by a line.
-    pub(super) fn writes(&self, number: u8) -> bool {
-        let drives = &self.plan.setup.setup.drives;
-        let mut header = drives.iter().flat_map(|own| &own.registers);
-        header.any(|(register, _)| *register == number)
-            || self.frames().any(|frame| writes(frame, number))
+    /// Whether a drive may supervise the time between frames in it (T-Out): every query of the bench would begin that time again.
+    pub(super) fn may_time_out(&self, drives: &[Known]) -> bool {
+        let held = drives.iter().any(|known| known.cell(TIME_OUT) != 0);
+        let header = self.plan.setup.setup.drives.iter();
+        let mut header = header.flat_map(|own| &own.registers);
+        held || header.any(|(register, _)| *register == TIME_OUT)
+            || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
 
     /// The registers whose contents its lines ask for.
