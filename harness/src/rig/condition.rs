@@ -7,7 +7,7 @@ pub(crate) type Mistake = (&'static str, String, String);
 
 /// What must hold, with bounds as the bus counts them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Condition<B> {
+pub(crate) enum PortCondition<B> {
     /// The value stays within these bounds, both included.
     Within(Option<B>, Option<B>),
     /// The bit of this number stays at its level.
@@ -24,7 +24,7 @@ impl Interlock {
         key: &'static str,
         bits: &[(u8, &str)],
         bound: impl Fn(&str) -> Result<B, (String, String)>,
-    ) -> Result<Condition<B>, Mistake> {
+    ) -> Result<PortCondition<B>, Mistake> {
         match (&self.bit, self.level, &self.min, &self.max) {
             (Some(name), Some(level), None, None) => {
                 let names: Vec<_> = bits.iter().map(|(_, own)| *own).collect();
@@ -36,7 +36,7 @@ impl Interlock {
                     };
                     ("bit", format!("there is no bit `{name}`"), expected)
                 })?;
-                Ok(Condition::Bit(*number, level))
+                Ok(PortCondition::Bit(*number, level))
             }
             (None, None, min, max) if min.is_some() || max.is_some() => {
                 let read = |key, text: &Option<String>| {
@@ -48,7 +48,7 @@ impl Interlock {
                     let message = "`min` is above `max`".to_owned();
                     return Err(("min", message, "a smaller value expected here".to_owned()));
                 }
-                Ok(Condition::Within(min, max))
+                Ok(PortCondition::Within(min, max))
             }
             _ => {
                 let message = "it is not clear what must hold".to_owned();
@@ -68,13 +68,13 @@ impl Interlock {
     /// Why it does not hold, with what was read; `None` if it does. `within` compares with the bounds.
     pub(crate) fn broken<B>(
         &self,
-        condition: &Condition<B>,
+        condition: &PortCondition<B>,
         raw: u32,
         read: &str,
         within: impl Fn(Option<&B>, Option<&B>) -> bool,
     ) -> Option<String> {
         match condition {
-            Condition::Bit(bit, level) => {
+            PortCondition::Bit(bit, level) => {
                 let is_high = raw >> bit & 1 == 1;
                 let digit = |high: bool| u8::from(high);
                 let wanted = *level == Level::High;
@@ -84,7 +84,7 @@ impl Interlock {
                     format!("{name} is {is} in {read}, {wanted} is required")
                 })
             }
-            Condition::Within(min, max) => (!within(min.as_ref(), max.as_ref())).then(|| {
+            PortCondition::Within(min, max) => (!within(min.as_ref(), max.as_ref())).then(|| {
                 let bounds = [("at least", &self.min), ("at most", &self.max)];
                 let bounds = bounds
                     .into_iter()

@@ -12,7 +12,7 @@ use crate::guard::Watch;
 use crate::link::{Line, Trouble};
 use crate::medium::Heard;
 use crate::rig::Rig;
-use crate::rig::condition::{Condition, Mistake};
+use crate::rig::condition::{Mistake, PortCondition};
 use crate::rig::file::Interlock;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::ZSW;
@@ -31,7 +31,7 @@ const LONGEST: usize = 29;
 pub(in crate::buses::nordac) struct InverterInterlock {
     pub(in crate::buses::nordac) slave: u8,
     cell: Cell,
-    condition: Condition<i64>,
+    condition: PortCondition<i64>,
     own: Interlock,
     every: Span,
     /// On the clock of the driver.

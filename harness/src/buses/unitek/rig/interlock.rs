@@ -9,7 +9,7 @@ use crate::guard::Watch;
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Out};
 use crate::rig::Rig;
-use crate::rig::condition::{Condition, Mistake};
+use crate::rig::condition::{Mistake, PortCondition};
 use crate::rig::file::Interlock;
 use harness_proto::can;
 use harness_proto::time::{Instant, Span};
@@ -50,7 +50,7 @@ pub(super) fn checked(own: &Interlock) -> Result<(), Mistake> {
     read(own).map(|_| ())
 }
 
-fn read(own: &Interlock) -> Result<(&'static Register, Condition<RegisterBound>), Mistake> {
+fn read(own: &Interlock) -> Result<(&'static Register, PortCondition<RegisterBound>), Mistake> {
     let name = own.register.as_deref().unwrap_or_default();
     let expected = "a register of `drivebench cells --bus unitek` expected here";
     let register = register(name).map_err(|message| ("register", message, expected.to_owned()))?;
@@ -102,7 +102,7 @@ pub(super) struct RegisterInterlocks {
 struct RegisterInterlock {
     axis: Axis,
     register: &'static Register,
-    condition: Condition<RegisterBound>,
+    condition: PortCondition<RegisterBound>,
     own: Interlock,
     every: Span,
     /// On a clock that is never set back.
@@ -284,14 +284,14 @@ impl RegisterInterlock {
             None => Some(self.register.number_of(raw) as f64),
         };
         let unit = match self.condition {
-            Condition::Within(min, max) => min.or(max).and_then(|own| own.1),
-            Condition::Bit(..) => None,
+            PortCondition::Within(min, max) => min.or(max).and_then(|own| own.1),
+            PortCondition::Bit(..) => None,
         };
         let read = unit.and_then(|unit| shown(self.register, raw, unit, scaling));
         let read = match (read, self.condition) {
             (Some(read), _) => read.to_string(),
-            (None, Condition::Bit(..)) => format!("{raw:X}"),
-            (None, Condition::Within(..)) => self.register.number_of(raw).to_string(),
+            (None, PortCondition::Bit(..)) => format!("{raw:X}"),
+            (None, PortCondition::Within(..)) => self.register.number_of(raw).to_string(),
         };
         let why = self.own.broken(&self.condition, raw, &read, |min, max| {
             // What has no meaning is within no bounds.
