@@ -130,8 +130,11 @@ impl<P: PortPlayer> PortRun<P> {
             self.session.guarded().trouble(),
             Some(Trouble::Interlock(_))
         );
-        // The way to the safe state behind an interlock is that of the end of the run.
-        if outcome.verdict != Verdict::Skipped && !anew && !tripped {
+        let played = outcome.verdict != Verdict::Skipped && !anew;
+        if played && tripped {
+            // The drives go to their safe state at the end of the run, and what the scenario has changed is set back then.
+            self.unfinished = Some(Arc::clone(own));
+        } else if played {
             let safe = self.session.make_safe();
             match safe.confirmed {
                 true => {
