@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 /// The version of the session's JSON.
 pub(crate) const SCHEMA: u32 = 1;
 
-/// DriveWords drives: a number, or a text as on the command line (`"2:3"`, `"0..2"`, `"all"`).
+/// The drives: a number, or a text as on the command line (`"2:3"`, `"0..2"`, `"all"`).
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum DriveWords {
@@ -35,14 +35,14 @@ pub(crate) enum SessionRequest {
     Info {},
     /// Reads cells, registers or parameters by their names.
     Read {
-        /// DriveWords drives.
+        /// The drives.
         drive: DriveWords,
         /// Their names or addresses.
         cells: Vec<String>,
     },
     /// Writes cells, registers or parameters and reads them back.
     Write {
-        /// DriveWords drives.
+        /// The drives.
         drive: DriveWords,
         /// `name=value`, with units: `nsoll=100rpm`.
         values: Vec<String>,
@@ -54,27 +54,27 @@ pub(crate) enum SessionRequest {
     },
     /// The drives' modes, errors and states, as `info --format json` has them.
     State {
-        /// DriveWords drives; all by default.
+        /// The drives; all by default.
         drive: Option<DriveWords>,
     },
     /// Releases drives: their motors may turn.
     Go {
-        /// DriveWords drives.
+        /// The drives.
         drive: DriveWords,
     },
     /// Stops drives; without a drive all of them. Overtakes: what is under way ends, and what waits is cancelled.
     Stop {
-        /// DriveWords drives; all by default.
+        /// The drives; all by default.
         drive: Option<DriveWords>,
     },
     /// Blocks drives: no torque.
     Block {
-        /// DriveWords drives.
+        /// The drives.
         drive: DriveWords,
     },
     /// Switches motors off on their ramps, on slaves with a cyclic master.
     Off {
-        /// DriveWords drives.
+        /// The drives.
         drive: DriveWords,
     },
     /// Brings rings out of the error mode and counts their drives.

@@ -1,4 +1,4 @@
-//! InverterInterlocks on words and parameters of NORDAC inverters: what must hold of inverters while a rig is used.
+//! Interlocks on words and parameters of NORDAC inverters: what must hold of inverters while a rig is used.
 //!
 //! The words of a reply (ZSW, HIW, PZD4) are compared in every exchange that passes. A parameter takes a task of the parameter channel,
 //! which is the master's own: it is read before each attempt at a scenario and each command, and by the [driver](super::super::driver)

@@ -1,4 +1,4 @@
-//! RegisterInterlocks on registers of UNITEK drives: what must hold of drives while a rig is used.
+//! Interlocks on registers of UNITEK drives: what must hold of drives while a rig is used.
 //!
 //! A register is asked for in the pauses of a conversation. Nothing tells its reply from a frame that the drive sends by itself (5.2):
 //! while a register has a cycle, or STATUS is sent by event, those frames are compared, and the register is not asked for.
