@@ -71,6 +71,8 @@ pub mod manual;
 #[doc(hidden)]
 pub mod medium;
 #[doc(hidden)]
+pub mod partition;
+#[doc(hidden)]
 pub mod port;
 #[doc(hidden)]
 pub mod qualify;

@@ -10,6 +10,7 @@ pub mod file;
 pub mod find;
 mod html;
 pub mod line;
+pub mod part;
 pub mod plan;
 pub mod replay;
 pub(crate) mod run;

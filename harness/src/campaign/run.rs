@@ -14,6 +14,7 @@ use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -26,6 +27,8 @@ const BATCH: usize = 32;
 pub struct Campaign {
     /// Its name, for messages: a path, or the name of a built-in one.
     pub name: String,
+    /// The text of its file.
+    text: Arc<str>,
     /// What its file says.
     pub file: CampaignFile,
     /// The scenario whose conversation is disturbed.
@@ -194,12 +197,19 @@ impl Campaign {
         })?;
         Ok(Self {
             name: source.name.clone(),
+            text: source.text.clone(),
             file: read.file,
             entry,
             shape,
             cases,
             played,
         })
+    }
+
+    /// The texts of its file and of its scenario.
+    #[must_use]
+    pub fn texts(&self) -> [&str; 2] {
+        [&self.text, &self.entry.source.text]
     }
 
     /// Whether the driver plays, and not a master by the manual alone.

@@ -13,7 +13,9 @@ use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
 use crate::buses::rings::rig::named::ring_size;
 use crate::capture::{NamedLink, UartFormat};
+use crate::evidence::Keep;
 use crate::file::values::{Time, ValueError};
+use crate::partition::Partition;
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
 use std::path::PathBuf;
@@ -113,6 +115,10 @@ pub enum Command {
     Qualify(QualifyArguments),
     /// Repeat every verdict of an evidence folder from its recorded bytes.
     Verify(VerifyArguments),
+    /// Make one folder of evidence of the parts of a run (`run --partition`), or add the counts of the parts of campaigns.
+    ///
+    /// The exit code is that of the whole run, or of the whole campaigns. It is 5 if a part is missing.
+    Merge(MergeArguments),
     /// Write the reports of a run again from its evidence folder.
     Report(ReportArguments),
     /// Print a JSON schema (draft 2020-12).
@@ -203,6 +209,15 @@ pub struct RunArguments {
     /// Sign the evidence with this `ssh-keygen` key; `verify --allowed-signers` checks the signature.
     #[arg(long, value_name = "KEY", requires = "evidence")]
     pub sign: Option<PathBuf>,
+    /// The captures in the evidence: all, failed (those of attempts that did not pass), or N (these, and every N-th that passed).
+    #[arg(long, value_name = "N", requires = "evidence")]
+    pub keep: Option<Keep>,
+    /// Play one part of the selected scenarios: slice:M/N takes every N-th, hash:M/N takes them by name. `merge` joins the evidence of the parts.
+    #[arg(long, value_name = "PART")]
+    pub partition: Option<Partition>,
+    /// Play only what did not pass in this folder of evidence, what it did not come to, and what is new. May repeat: a later folder counts.
+    #[arg(long, value_name = "FOLDER", requires = "rig")]
+    pub rerun: Vec<PathBuf>,
     /// Write the verdicts into this file, as JUnit XML.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
@@ -235,6 +250,9 @@ pub struct QualifyArguments {
     /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
+    /// Play one part of the selected scenarios, slice:M/N or hash:M/N, and everything that a qualification plays besides.
+    #[arg(long, value_name = "PART")]
+    pub partition: Option<Partition>,
     /// The folder for the evidence, which must be new or empty; by default evidence-RIG-DATE.
     #[arg(long, value_name = "FOLDER")]
     pub evidence: Option<PathBuf>,
@@ -260,6 +278,20 @@ pub struct VerifyArguments {
     /// The signer, as the file of allowed signers names them.
     #[arg(long, value_name = "ID", requires = "allowed_signers")]
     pub identity: Option<String>,
+}
+
+/// For `merge`.
+#[derive(Clone, Debug, Args)]
+pub struct MergeArguments {
+    /// The evidence folders of the parts of a run, or the files that `campaign --output` wrote.
+    #[arg(value_name = "PART", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// The folder for the merged evidence, which must be new or empty, and which `verify` checks; or the file for the added counts.
+    #[arg(long, short, value_name = "PATH")]
+    pub output: PathBuf,
+    /// Let a skipped scenario make the run incomplete (exit code 5).
+    #[arg(long)]
+    pub require_all: bool,
 }
 
 /// For `report`.
@@ -441,6 +473,12 @@ pub struct CampaignArguments {
     /// lists, such as 3:lost.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
+    /// Play one part of the cases of each campaign: slice:M/N takes every N-th, hash:M/N takes them by name. `merge` adds the counts of the parts.
+    #[arg(long, value_name = "PART", requires = "output", conflicts_with_all = ["case", "html"])]
+    pub partition: Option<Partition>,
+    /// Write the counts into this file, as JSON.
+    #[arg(long, short, value_name = "FILE", conflicts_with = "case")]
+    pub output: Option<PathBuf>,
     /// Write the report into this file, as one HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

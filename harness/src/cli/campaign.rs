@@ -3,14 +3,16 @@
 use super::args::{CampaignArguments, TableFormat};
 use super::exit::Exit;
 use super::output::Output;
-use super::page::{writable, write};
+use super::page::{save, writable, write};
 use super::run::progress_bar;
 use crate::buses::{line_campaign, line_campaigns};
 use crate::campaign::find::{FindCampaignError, find, names};
 use crate::campaign::line::{self, LineCampaign, PlayedLine};
+use crate::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line as case_line, table};
-use crate::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign};
+use crate::campaign::{Campaign, CaseClass, CaseFaults, Contradiction, PlayedCampaign};
+use crate::partition::Partition;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -19,70 +21,28 @@ pub(crate) fn campaign(
     arguments: &CampaignArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let wanted = if arguments.campaigns.is_empty() {
-        let on_lines = line_campaigns().into_iter().map(PathBuf::from);
-        names()
-            .into_iter()
-            .map(PathBuf::from)
-            .chain(on_lines)
-            .collect()
-    } else {
-        arguments.campaigns.clone()
+    let mut found = match find_all(&arguments.campaigns, output) {
+        Ok(found) => found,
+        Err(exit) => return Ok(exit),
     };
-    let mut campaigns = Vec::new();
-    let mut on_lines = Vec::new();
-    for name in &wanted {
-        match line_campaign(name) {
-            Some(Ok(campaign)) => {
-                on_lines.push(campaign);
-                continue;
-            }
-            Some(Err(error)) => {
-                output.complain(&error);
-                return Ok(Exit::Usage);
-            }
-            None => {}
-        }
-        match find(name) {
-            Ok(campaign) => campaigns.push(campaign),
-            Err(error) => {
-                complain(&error, output);
-                return Ok(Exit::Usage);
-            }
-        }
-    }
     if let Some(name) = &arguments.case {
-        return replay(name, &campaigns, &on_lines, output);
+        return replay(name, &found.on_rings, &found.on_lines, output);
     }
-    if let Some(path) = &arguments.html
-        && writable(path, output).is_err()
-    {
-        return Ok(Exit::Usage);
-    }
-    let threads = arguments.threads.unwrap_or_else(cores);
-    let mut all = Vec::new();
-    for campaign in &campaigns {
-        let bar = progress_bar(campaign.cases.len(), output.progress);
-        bar.set_message(campaign.name.clone());
-        let finished = campaign.run(threads, &|done| bar.inc(done));
-        bar.finish_and_clear();
-        match finished {
-            Ok(finished) => {
-                if arguments.format == TableFormat::Table {
-                    output.result(&shown(&finished, arguments.only))?;
-                }
-                all.push(finished);
-            }
-            Err(contradiction) => {
-                output.complain(&contradiction.to_string());
-                return Ok(Exit::RigError);
-            }
+    for path in arguments.html.iter().chain(&arguments.output) {
+        if writable(path, output).is_err() {
+            return Ok(Exit::Usage);
         }
     }
+    let wholes = found.divide(arguments.partition);
+    let all = match play_rings(&found.on_rings, arguments, output)? {
+        Ok(all) => all,
+        Err(contradiction) => {
+            output.complain(&contradiction.to_string());
+            return Ok(Exit::RigError);
+        }
+    };
     let mut listed = json(&all, arguments.only.and_then(ClassName::of_rings));
-    let mut differs = all.iter().any(|finished| !finished.differs().is_empty());
-    let played = play_lines(&on_lines, arguments, &mut listed, output)?;
-    differs |= played.iter().any(|own| !own.differs().is_empty());
+    let played = play_lines(&found.on_lines, arguments, &mut listed, output)?;
     if arguments.format == TableFormat::Json {
         output.result(&format!("{listed}\n"))?;
     }
@@ -91,7 +51,132 @@ pub(crate) fn campaign(
     {
         return Ok(Exit::RigError);
     }
-    Ok(if differs { Exit::Failed } else { Exit::Passed })
+    let counts = CountsFile::new(arguments.partition, wholes.counts(&all, &played));
+    if let Some(path) = &arguments.output
+        && !save(path, &counts.text(), "the counts are", output)
+    {
+        return Ok(Exit::RigError);
+    }
+    let differs = all.iter().any(|own| !own.differs().is_empty());
+    let differs = differs || played.iter().any(|own| !own.differs().is_empty());
+    let nothing = counts.campaigns.iter().all(|own| own.played() == Some(0));
+    Ok(match (&arguments.partition, differs) {
+        (_, true) => Exit::Failed,
+        (Some(part), false) if nothing => {
+            output.complain(&format!("{part} has no case"));
+            Exit::NothingSelected
+        }
+        (Some(part), false) => {
+            output.say(&format!(
+                "{part} was counted; `merge` adds all parts and compares them with [expect]\n"
+            ));
+            Exit::Passed
+        }
+        (None, false) => Exit::Passed,
+    })
+}
+
+/// The campaigns that were found.
+#[derive(Default)]
+struct FoundCampaigns {
+    on_rings: Vec<Campaign>,
+    on_lines: Vec<Box<dyn LineCampaign>>,
+}
+
+/// What each of them is as a whole.
+struct Wholes {
+    of_rings: Vec<WholeCampaign>,
+    of_lines: Vec<WholeCampaign>,
+}
+
+impl FoundCampaigns {
+    /// Keeps the cases of the part, if one is given.
+    fn divide(&mut self, part: Option<Partition>) -> Wholes {
+        let of_rings = self.on_rings.iter_mut();
+        let of_lines = self.on_lines.iter_mut();
+        Wholes {
+            of_rings: of_rings
+                .map(|own| WholeCampaign::of_rings(own, part))
+                .collect(),
+            of_lines: of_lines
+                .map(|own| WholeCampaign::of_line(&mut **own, part))
+                .collect(),
+        }
+    }
+}
+
+impl Wholes {
+    fn counts(self, all: &[PlayedCampaign], played: &[PlayedLine]) -> Vec<CampaignCounts> {
+        let of_rings = self.of_rings.into_iter().zip(all);
+        let of_lines = self.of_lines.into_iter().zip(played);
+        of_rings
+            .map(|(whole, own)| whole.counts(own))
+            .chain(of_lines.map(|(whole, own)| whole.counts_of_line(own)))
+            .collect()
+    }
+}
+
+/// Finds the named campaigns, or all built-in ones. The exit code where one cannot be played, which has been reported.
+fn find_all(named: &[PathBuf], output: &mut Output) -> Result<FoundCampaigns, Exit> {
+    let built_in = || {
+        let on_lines = line_campaigns().into_iter().map(PathBuf::from);
+        names()
+            .into_iter()
+            .map(PathBuf::from)
+            .chain(on_lines)
+            .collect()
+    };
+    let wanted: Vec<PathBuf> = match named {
+        [] => built_in(),
+        named => named.to_vec(),
+    };
+    let mut found = FoundCampaigns::default();
+    for name in &wanted {
+        match line_campaign(name) {
+            Some(Ok(campaign)) => {
+                found.on_lines.push(campaign);
+                continue;
+            }
+            Some(Err(error)) => {
+                output.complain(&error);
+                return Err(Exit::Usage);
+            }
+            None => {}
+        }
+        match find(name) {
+            Ok(campaign) => found.on_rings.push(campaign),
+            Err(error) => {
+                complain(&error, output);
+                return Err(Exit::Usage);
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Plays campaigns on rings, and shows them.
+fn play_rings(
+    campaigns: &[Campaign],
+    arguments: &CampaignArguments,
+    output: &mut Output,
+) -> std::io::Result<Result<Vec<PlayedCampaign>, Contradiction>> {
+    let threads = arguments.threads.unwrap_or_else(cores);
+    let mut all = Vec::new();
+    for campaign in campaigns {
+        let bar = progress_bar(campaign.cases.len(), output.progress);
+        bar.set_message(campaign.name.clone());
+        let finished = campaign.run(threads, &|done| bar.inc(done));
+        bar.finish_and_clear();
+        let finished = match finished {
+            Ok(finished) => finished,
+            Err(contradiction) => return Ok(Err(contradiction)),
+        };
+        if arguments.format == TableFormat::Table {
+            output.result(&shown(&finished, arguments.only))?;
+        }
+        all.push(finished);
+    }
+    Ok(Ok(all))
 }
 
 fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// The groups of commands in the order of `--help`; every command is in one of them.
 const GROUPS: [(&str, &[&str]); 7] = [
-    ("Play", &["run", "check", "qualify", "verify"]),
+    ("Play", &["run", "check", "qualify", "verify", "merge"]),
     ("Look", &["list", "trace", "manual", "cells", "deviations"]),
     (
         "Drives",

@@ -18,6 +18,8 @@ mod junit;
 mod list;
 mod man;
 mod manual;
+mod merge;
+mod merge_counts;
 pub(crate) mod output;
 mod page;
 pub(crate) mod port_bench;
@@ -94,6 +96,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Cells(arguments) => crate::buses::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify(arguments) => verify::verify(&arguments, output),
+        Command::Merge(arguments) => merge::merge(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
         Command::Schema { of } => schema::schema(of, output),
         Command::Shell(arguments) => shell::shell(&arguments, output),

@@ -91,9 +91,14 @@ pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), NotWritab
 
 /// Writes a page atomically. Returns false after reporting a failure.
 pub(crate) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
+    save(path, text, "the report is", output)
+}
+
+/// Writes a file atomically, and says that `what` is in it. Returns false after reporting a failure.
+pub(crate) fn save(path: &Path, text: &str, what: &str, output: &mut Output) -> bool {
     match regular::write_text(path, text) {
         Ok(()) => {
-            output.say(&format!("the report is in {}\n", path.display()));
+            output.say(&format!("{what} in {}\n", path.display()));
             true
         }
         Err(error) => {

@@ -9,9 +9,10 @@ use super::rig_failure::find_any_rig;
 use super::run::{of_rig, select};
 use super::run_rig::{PlayOrder, Stop, over, play, show, work};
 use super::run_segment;
+use super::tally::EarlierVerdicts;
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
-use crate::evidence::{DEVIATIONS, Folder, PROFILE};
+use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
 use crate::library::Entry;
 use crate::qualify::{Bench, Qualification};
 use crate::rig::{Played, Run, state};
@@ -31,6 +32,14 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
             errors.iter().for_each(|error| output.library_error(error));
             return Ok(Exit::Usage);
         }
+    };
+    let filter = arguments.selection.filter.as_deref();
+    let part = arguments
+        .partition
+        .map(|own| SplitRun::new(own, filter, &entries, |_| false));
+    let entries = match &part {
+        Some(part) => part.share(entries),
+        None => entries,
     };
     let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
         return Ok(Exit::Usage);
@@ -52,6 +61,9 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         qualify: true,
         thorough: arguments.thorough,
         sign: arguments.sign.clone(),
+        part,
+        keep: Keep::All,
+        earlier: EarlierVerdicts::default(),
     };
     match rig.port() {
         Some(_) => run_segment::work(&rig, &entries, &job, page, output),

@@ -6,12 +6,12 @@ use super::junit::Cases;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_any_rig;
-use super::run_rig::{PlayOrder, reports, work};
+use super::run_rig::{PlayOrder, reports, state_size, work};
 use super::run_segment;
-use super::tally::Tally;
+use super::tally::{EarlierVerdicts, Tally};
 use crate::buses::Bus;
 use crate::counted::counted;
-use crate::evidence::{AboutRun, EvidenceError, Folder, too_large};
+use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_large};
 use crate::library::{Entry, LibraryError, is_named, sources};
 use crate::link::Recording;
 use crate::report::finding::explain;
@@ -84,76 +84,149 @@ pub(crate) fn of_rig(mut entries: Vec<Entry>, rig: &Rig, output: &mut Output) ->
     entries
 }
 
-/// Plays scenarios, one line each.
-pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let rig = match arguments
-        .rig
-        .as_deref()
-        .map(|name| find_any_rig(name, output))
-    {
+/// The rig and the scenarios of a run.
+struct Chosen {
+    rig: Option<Rig>,
+    entries: Vec<Entry>,
+    part: Option<SplitRun>,
+    earlier: EarlierVerdicts,
+}
+
+impl Chosen {
+    /// The rig, if it is more than a number of drives.
+    fn in_use(&self) -> Option<&Rig> {
+        self.rig.as_ref().filter(|rig| !rig.is_bare())
+    }
+}
+
+/// Reads the rig and the scenarios that the filter selects; those for other buses are left out. The exit code where there is nothing to play,
+/// which has been reported.
+fn read_rig_and_scenarios(
+    arguments: &RunArguments,
+    output: &mut Output,
+) -> Result<(Option<Rig>, Vec<Entry>), Exit> {
+    let rig = match arguments.rig.as_deref() {
         None => None,
-        Some(Some(rig)) => Some(rig),
-        Some(None) => return Ok(Exit::Usage),
+        Some(name) => Some(find_any_rig(name, output).ok_or(Exit::Usage)?),
     };
     let own = rig.as_ref().map(Rig::ring_size).filter(|own| *own > 0);
     let selected = match arguments.ring {
         Some(asked) => select_of_size(&arguments.selection, asked),
         None => select(&arguments.selection, own),
     };
-    let entries = match selected {
-        Ok(entries) => entries,
-        Err(errors) => {
-            errors.iter().for_each(|error| output.library_error(error));
-            output.say("nothing was played\n");
-            return Ok(Exit::Usage);
-        }
-    };
-    let in_use = rig.as_ref().filter(|rig| !rig.is_bare());
-    let entries = match in_use {
+    let entries = selected.map_err(|errors| {
+        errors.iter().for_each(|error| output.library_error(error));
+        output.say("nothing was played\n");
+        Exit::Usage
+    })?;
+    let entries = match rig.as_ref().filter(|rig| !rig.is_bare()) {
         Some(rig) => of_rig(entries, rig, output),
         None => entries,
     };
     if entries.is_empty() {
         output.complain("no scenario was selected; `drivebench list` shows what there is");
-        return Ok(Exit::NothingSelected);
+        return Err(Exit::NothingSelected);
     }
+    Ok((rig, entries))
+}
+
+/// Chooses what is played of the selected scenarios: what no earlier run has shown, and of this the part. The exit code where there is
+/// nothing to play, which has been reported.
+fn choose(arguments: &RunArguments, output: &mut Output) -> Result<Chosen, Exit> {
+    let (rig, mut entries) = read_rig_and_scenarios(arguments, output)?;
+    let none = Cases::new(
+        rig.as_ref().map_or("sim", Rig::id),
+        arguments.junit.as_deref(),
+    );
+    let mut earlier = EarlierVerdicts::default();
+    if let Some(rig) = rig.as_ref().filter(|_| !arguments.rerun.is_empty()) {
+        let known = Earlier::read(&arguments.rerun, rig).map_err(|error| {
+            output.complain(&error.to_string());
+            Exit::of_evidence(&error)
+        })?;
+        (entries, earlier) = EarlierVerdicts::of(&known, entries);
+        if entries.is_empty() {
+            output.say(&earlier.to_string());
+            let exit = Tally::after(earlier).exit(arguments.require_all);
+            return Err(none.write(exit, output));
+        }
+    }
+    let filter = arguments.selection.filter.as_deref();
+    let named = &arguments.selection.paths;
+    let part = arguments
+        .partition
+        .map(|own| SplitRun::new(own, filter, &entries, |entry| is_named(named, &entry.name)));
+    if let Some(part) = &part {
+        entries = part.share(entries);
+        if entries.is_empty() {
+            output.complain(&format!(
+                "{} has no scenario; `merge` needs no folder of it",
+                part.partition
+            ));
+            return Err(none.write(Exit::NothingSelected, output));
+        }
+    }
+    Ok(Chosen {
+        rig,
+        entries,
+        part,
+        earlier,
+    })
+}
+
+/// Plays scenarios, one line each.
+pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let mut chosen = match choose(arguments, output) {
+        Ok(chosen) => chosen,
+        Err(exit) => return Ok(exit),
+    };
     let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
         return Ok(Exit::Usage);
     };
-    if let Some(rig) = in_use {
-        let job = PlayOrder {
-            purpose: "run",
-            named: arguments.selection.paths.clone(),
-            allow_motion: arguments.allow_motion,
-            wait: arguments.wait.unwrap_or_default(),
-            evidence: arguments.evidence.clone(),
-            records: arguments.records,
-            require_all: arguments.require_all,
-            junit: arguments.junit.clone(),
-            qualify: false,
-            thorough: false,
-            sign: arguments.sign.clone(),
-        };
-        return match rig.port() {
-            Some(_) => run_segment::work(rig, &entries, &job, page, output),
-            None => work(rig, &entries, &job, page, output),
-        };
+    let job = PlayOrder {
+        purpose: "run",
+        named: arguments.selection.paths.clone(),
+        allow_motion: arguments.allow_motion,
+        wait: arguments.wait.unwrap_or_default(),
+        evidence: arguments.evidence.clone(),
+        records: arguments.records,
+        require_all: arguments.require_all,
+        junit: arguments.junit.clone(),
+        qualify: false,
+        thorough: false,
+        sign: arguments.sign.clone(),
+        part: chosen.part.take(),
+        keep: arguments.keep.unwrap_or_default(),
+        earlier: std::mem::take(&mut chosen.earlier),
+    };
+    state_size(&chosen.entries, &job, output);
+    match chosen.in_use() {
+        Some(rig) if rig.port().is_some() => {
+            run_segment::work(rig, &chosen.entries, &job, page, output)
+        }
+        Some(rig) => work(rig, &chosen.entries, &job, page, output),
+        None => {
+            let done = on_simulated(&job, &chosen.entries, chosen.rig.as_ref(), page, output);
+            output.say(&other_sizes(&chosen.entries, arguments.ring));
+            done
+        }
     }
-    on_simulated(arguments, &entries, rig.as_ref(), page, output)
 }
 
 /// Plays scenarios on simulated drives, each of its own, and keeps evidence where it is asked for.
 fn on_simulated(
-    arguments: &RunArguments,
+    job: &PlayOrder,
     entries: &[Entry],
     rig: Option<&Rig>,
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let folder = rig.zip(arguments.evidence.as_deref());
+    let folder = rig.zip(job.evidence.as_deref());
     let folder = folder.map(|(rig, path)| {
         let about = AboutRun {
-            sign: arguments.sign.as_deref(),
+            sign: job.sign.as_deref(),
+            part: job.part.as_ref(),
+            keep: job.keep,
             selected: entries.iter().map(|entry| &*entry.source.text).collect(),
             ..AboutRun::own_rings(rig)
         };
@@ -167,9 +240,9 @@ fn on_simulated(
         }
     };
     let bar = progress_bar(entries.len(), output.progress);
-    let mut tally = Tally::default();
+    let mut tally = Tally::after(job.earlier.clone());
     let name = rig.map_or("sim", |rig| rig.id());
-    let mut cases = Cases::new(name, arguments.junit.as_deref());
+    let mut cases = Cases::new(name, job.junit.as_deref());
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
         let played = match keep(entry, rig, folder.as_mut()) {
@@ -183,7 +256,7 @@ fn on_simulated(
         tally.note(entry, outcome);
         cases.note(entry, outcome, &played.traces);
         let mut line = line(entry, outcome, output);
-        if arguments.records || entries.len() == 1 {
+        if job.records || entries.len() == 1 {
             line.push_str(&records(outcome));
         }
         bar.suspend(|| output.result(&line))?;
@@ -196,7 +269,6 @@ fn on_simulated(
     }
     bar.finish_and_clear();
     output.result(&tally.summary())?;
-    output.say(&other_sizes(entries, arguments.ring));
     let head = Head {
         found: Vec::new(),
         title: "drivebench: scenarios on simulated drives",
@@ -209,7 +281,7 @@ fn on_simulated(
     if !written {
         return Ok(Exit::RigError);
     }
-    Ok(cases.write(tally.exit(arguments.require_all), output))
+    Ok(cases.write(tally.exit(job.require_all), output))
 }
 
 /// How many scenarios were not played on rings of the size that was asked for.

@@ -7,9 +7,9 @@ use super::page::{Page, write};
 use super::qualify::{Live, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
-use super::tally::Tally;
+use super::tally::{EarlierVerdicts, Tally};
 use crate::counted::counted;
-use crate::evidence::{AboutRun, EvidenceError, Folder, PAGE};
+use crate::evidence::{AboutRun, EvidenceError, Folder, Keep, PAGE, SplitRun, size};
 use crate::library::Entry;
 use crate::link::{Line, Octets, Trouble};
 use crate::qualify::{Qualification, QualificationFacts};
@@ -40,6 +40,12 @@ pub(crate) struct PlayOrder {
     pub(crate) thorough: bool,
     /// The key to sign the evidence with.
     pub(crate) sign: Option<PathBuf>,
+    /// Which part of a run that is split it is.
+    pub(crate) part: Option<SplitRun>,
+    /// Which captures the evidence keeps.
+    pub(crate) keep: Keep,
+    /// What earlier runs have shown of the scenarios that are not played again.
+    pub(crate) earlier: EarlierVerdicts,
 }
 
 /// Why work ends early.
@@ -119,6 +125,31 @@ pub(crate) fn work(
     })
 }
 
+/// From this estimate on the size of the evidence is stated before the run, in bytes.
+const LARGE: u64 = 200_000_000;
+
+/// A size in megabytes.
+fn megabytes(bytes: u64) -> String {
+    let tenths = bytes.div_ceil(100_000);
+    format!("{}.{} MB", tenths / 10, tenths % 10)
+}
+
+/// States before a run how large its captures may become, where `--keep` is given or where they may become large.
+pub(super) fn state_size(entries: &[Entry], job: &PlayOrder, output: &mut Output) {
+    let Some(path) = &job.evidence else { return };
+    let estimate = job.keep.estimate(entries);
+    let beside = match job.keep {
+        Keep::All if estimate < LARGE => return,
+        Keep::All => "; --keep 10 keeps those of every tenth attempt that passes",
+        _ => ", and those of attempts that do not pass",
+    };
+    output.say(&format!(
+        "captures in {}: about {} (an estimate){beside}\n",
+        path.display(),
+        megabytes(estimate)
+    ));
+}
+
 /// Ends the folder and writes the page. Returns false after reporting a failure. A run with a folder writes the folder's page.
 pub(crate) fn reports(
     rig: &Rig,
@@ -135,9 +166,14 @@ pub(crate) fn reports(
         };
         return page.is_none_or(|page| page.write(&head, output));
     };
+    let left_out = folder.left_out();
     match folder.finish(safe) {
         Ok(path) => {
             output.say(&format!("evidence in {}\n", path.display()));
+            if left_out > 0 {
+                let count = counted(left_out, "capture");
+                output.say(&format!("{}; {count} left out\n", megabytes(size(&path))));
+            }
             let Some(page) = page else { return true };
             match std::fs::read_to_string(path.join(PAGE)) {
                 Ok(text) => write(page.path(), &text, output),
@@ -279,7 +315,7 @@ pub(super) fn course_of(
     let bar = progress_bar(entries.len(), output.progress);
     let name = course.name();
     let mut cases = Cases::new(&name, job.junit.as_deref());
-    let mut tally = Tally::of_named(&job.named);
+    let mut tally = Tally::of_named(&job.named, job.earlier.clone());
     let mut left = entries.iter();
     for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());
@@ -388,6 +424,8 @@ fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> 
         own_rings: false,
         purpose: job.purpose,
         selected: selected.map(|entry| &*entry.source.text).collect(),
+        part: job.part.as_ref(),
+        keep: job.keep,
         sign: job.sign.as_deref(),
         rig: run.session().rig(),
     }

@@ -91,6 +91,8 @@ fn all(
             own_rings: false,
             purpose: job.purpose,
             selected: entries.iter().map(|entry| &*entry.source.text).collect(),
+            part: job.part.as_ref(),
+            keep: job.keep,
             sign: job.sign.as_deref(),
         };
         *folder = Some(Folder::create(path, &about)?);

@@ -3,11 +3,13 @@
 
 use super::exit::Exit;
 use crate::counted::counted;
+use crate::evidence::Earlier;
 use crate::library::{Entry, is_named};
 use crate::scenario::run::{Outcome, Unlock, Why, together};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -28,13 +30,60 @@ pub(crate) struct Tally {
     named: Vec<PathBuf>,
     /// The rig's limits deny one of those.
     named_denied: bool,
+    /// What is not played again.
+    earlier: EarlierVerdicts,
+}
+
+/// What earlier runs have shown of the selected scenarios that are not played again.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EarlierVerdicts {
+    verdicts: Vec<Verdict>,
+    /// The names of scenarios that did not pass in an earlier run and were not selected now.
+    left: Vec<String>,
+}
+
+impl EarlierVerdicts {
+    /// Divides the selected scenarios: those that are to be played, and what is known of the others.
+    pub(crate) fn of(earlier: &Earlier, entries: Vec<Entry>) -> (Vec<Entry>, Self) {
+        let left = earlier.left(&entries);
+        let verdicts = entries.iter().filter_map(|entry| earlier.shown(entry));
+        let verdicts = verdicts.collect();
+        let mut entries = entries;
+        entries.retain(|entry| earlier.shown(entry).is_none());
+        (entries, Self { verdicts, left })
+    }
+}
+
+impl fmt::Display for EarlierVerdicts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.verdicts.is_empty() {
+            let count = counted(self.verdicts.len(), "scenario");
+            writeln!(f, "not played again, passed before: {count}")?;
+        }
+        if !self.left.is_empty() {
+            writeln!(
+                f,
+                "still outstanding, not selected: {}",
+                self.left.join(", ")
+            )?;
+        }
+        Ok(())
+    }
 }
 
 impl Tally {
     /// A run for which the user named these scenarios, files and folders. A scenario that is named itself and denied is the user's mistake.
-    pub(crate) fn of_named(named: &[PathBuf]) -> Self {
+    pub(crate) fn of_named(named: &[PathBuf], earlier: EarlierVerdicts) -> Self {
         Self {
             named: named.to_vec(),
+            ..Self::after(earlier)
+        }
+    }
+
+    /// A run that plays what earlier runs have not shown.
+    pub(crate) fn after(earlier: EarlierVerdicts) -> Self {
+        Self {
+            earlier,
             ..Self::default()
         }
     }
@@ -75,8 +124,12 @@ impl Tally {
     /// The exit code; `require_all` counts skipped scenarios as missing. A scenario that was named and is denied asks for what the rig's file
     /// does not permit: wrong usage.
     pub(crate) fn exit(&self, require_all: bool) -> Exit {
-        match Exit::of(&self.verdicts, require_all || self.ended_early) {
+        let verdicts = [&self.verdicts[..], &self.earlier.verdicts].concat();
+        match Exit::of(&verdicts, require_all || self.ended_early) {
             Exit::Passed | Exit::Incomplete if self.named_denied => Exit::Usage,
+            Exit::Passed | Exit::NothingSelected if !self.earlier.left.is_empty() => {
+                Exit::Incomplete
+            }
             exit => exit,
         }
     }
@@ -103,18 +156,7 @@ impl Tally {
 
     /// The counts in a line, and others for what was not played and what was covered.
     pub(crate) fn summary(&self) -> String {
-        let count = |wanted: Verdict| self.verdicts.iter().filter(|v| **v == wanted).count();
-        let mut text = format!(
-            "{} passed, {} failed",
-            count(Verdict::Passed),
-            count(Verdict::Failed)
-        );
-        // Writing to a String cannot fail.
-        for verdict in Verdict::REST {
-            if count(verdict) > 0 {
-                let _infallible = write!(text, ", {} {verdict}", count(verdict));
-            }
-        }
+        let mut text = counts(&self.verdicts);
         let (all, took) = (self.verdicts.len(), self.took);
         let _infallible = writeln!(text, " ({}, {took} on the line)", counted(all, "scenario"));
         let reasons = self.skipped.iter();
@@ -125,8 +167,26 @@ impl Tally {
             let _infallible = writeln!(text, "not played: {}", reasons.join(", "));
             text.push_str(&self.coverage());
         }
+        let _infallible = write!(text, "{}", self.earlier);
         text
     }
+}
+
+/// How many there are of each verdict: `3 passed, 0 failed, 1 skipped`.
+pub(crate) fn counts(verdicts: &[Verdict]) -> String {
+    let count = |wanted: Verdict| verdicts.iter().filter(|v| **v == wanted).count();
+    let mut text = format!(
+        "{} passed, {} failed",
+        count(Verdict::Passed),
+        count(Verdict::Failed)
+    );
+    // Writing to a String cannot fail.
+    for verdict in Verdict::REST {
+        if count(verdict) > 0 {
+            let _infallible = write!(text, ", {} {verdict}", count(verdict));
+        }
+    }
+    text
 }
 
 #[cfg(test)]
@@ -209,7 +269,7 @@ mod tests {
             ..passed()
         };
         let exit = |named: &str, outcomes: &[Outcome]| {
-            let mut tally = Tally::of_named(&[PathBuf::from(named)]);
+            let mut tally = Tally::of_named(&[PathBuf::from(named)], EarlierVerdicts::default());
             note(&mut tally, outcomes);
             tally.exit(false)
         };

@@ -6,7 +6,7 @@ use super::fuzz;
 use super::output::Output;
 use crate::buses::verify_shared;
 use crate::counted::counted;
-use crate::evidence::{Signer, verify as judge_again};
+use crate::evidence::{MERGE, Signer, verify as judge_again, verify_merged};
 use crate::explore::read as read_run;
 
 /// Judges a folder again.
@@ -16,13 +16,18 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
         .as_deref()
         .zip(arguments.identity.as_deref());
     let signer = signer.map(|(allowed, identity)| Signer { allowed, identity });
+    let is_merged = arguments.folder.join(MERGE).exists();
     if let Ok((kept, _)) = read_run(&arguments.folder) {
         return fuzz::verify(&arguments.folder, &kept, signer, output);
     }
     if let Some(exit) = verify_shared(&arguments.folder, signer, output) {
         return exit;
     }
-    let verified = match judge_again(&arguments.folder, signer) {
+    let judged = match is_merged {
+        true => verify_merged(&arguments.folder, signer).map(|(verified, _)| verified),
+        false => judge_again(&arguments.folder, signer),
+    };
+    let verified = match judged {
         Ok(verified) => verified,
         Err(error) => {
             output.complain(&error.to_string());

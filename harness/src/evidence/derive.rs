@@ -7,6 +7,7 @@
 use super::files::{self, CAPTURES, DEVIATIONS, PROFILE, SCENARIOS};
 use super::folder::EvidenceError;
 use super::junit::{JunitCase, junit};
+use super::merge::{MERGE, derive_merged};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened, is_name, scenarios};
 use crate::capture::read;
@@ -39,6 +40,9 @@ pub struct Derived {
 /// # Errors
 /// It is no folder of evidence, or its record or a capture is damaged; with the place.
 pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
+    if path.join(MERGE).exists() {
+        return derive_merged(path);
+    }
     let opened = Opened::folder(path)?;
     let judged = opened.judged(&scenarios(path))?;
     derived(path, &opened, &judged)
@@ -50,6 +54,31 @@ pub(super) fn derived(
     opened: &Opened,
     judged: &[Judged],
 ) -> Result<Derived, EvidenceError> {
+    let all = case_reports(path, opened, judged, &|place| place + 1)?;
+    let (cases, shown) = all
+        .into_iter()
+        .map(|own| (own.junit, own.shown))
+        .unzip::<_, _, Vec<_>, _>();
+    Ok(Derived {
+        html: run(&head(path, opened), shown),
+        junit: junit(&suite(opened.rig.id()), &cases),
+    })
+}
+
+/// What the reports say of one scenario.
+pub(super) struct CaseReport {
+    pub(super) settled: Settled,
+    pub(super) junit: JunitCase,
+    pub(super) shown: ShownScenario,
+}
+
+/// What the reports say of each scenario of a folder, in its order; `number` gives the number of a section by its place.
+pub(super) fn case_reports(
+    path: &Path,
+    opened: &Opened,
+    judged: &[Judged],
+    number: &dyn Fn(usize) -> usize,
+) -> Result<Vec<CaseReport>, EvidenceError> {
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
     for own in judged {
         let again = own.again.as_ref().ok();
@@ -69,10 +98,9 @@ pub(super) fn derived(
             settled.push(Settled::unsettled(name, attempt));
         }
     }
-    let mut shown = Vec::new();
-    let mut cases = Vec::new();
+    let mut reports = Vec::new();
     let texts = scenarios(path);
-    for case in &settled {
+    for (place, case) in settled.into_iter().enumerate() {
         let attempt = attempts.get(&case.name);
         let traces = match attempt {
             Some(attempt) if is_name(&case.name) => {
@@ -88,21 +116,22 @@ pub(super) fn derived(
         let entry = text.and_then(|text| entry(&case.name, &text));
         let judged = attempt.and_then(|attempt| attempt.outcome.as_ref());
         let outcome = case.outcome(judged);
-        cases.push(JunitCase {
+        let junit = JunitCase {
             class: entry.as_ref().map_or_else(String::new, class),
             details: match (&entry, &outcome.finding) {
                 (Some(entry), Some(found)) => explain(entry, found, &traces),
                 _ => String::new(),
             },
             ..case.case(path, opened.rig.id())
+        };
+        let shown_as = (number(place), opened.rate());
+        reports.push(CaseReport {
+            shown: show(shown_as, &case, attempt, (&outcome, &traces), opened),
+            settled: case,
+            junit,
         });
-        let shown_as = (shown.len() + 1, opened.rate());
-        shown.push(show(shown_as, case, attempt, (&outcome, &traces)));
     }
-    Ok(Derived {
-        html: run(&head(path, opened), shown),
-        junit: junit(&suite(opened.rig.id()), &cases),
-    })
+    Ok(reports)
 }
 
 /// The last attempt at a scenario.
@@ -116,16 +145,29 @@ struct Attempt {
 /// The outcome of a scenario, as recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Settled {
-    name: String,
+    pub(super) name: String,
     title: String,
     drives: String,
     pub(super) verdict: Verdict,
     finding: Option<String>,
     remarks: Vec<String>,
-    took: Span,
+    pub(super) took: Span,
 }
 
 impl Settled {
+    /// A scenario that was to be played and was not, for this reason.
+    pub(super) fn not_run(name: &str, why: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            title: "not run".to_owned(),
+            drives: String::new(),
+            verdict: Verdict::Skipped,
+            finding: None,
+            remarks: vec![why.to_owned()],
+            took: Span::ZERO,
+        }
+    }
+
     /// Reads its line; `None` for all others.
     pub(super) fn of(line: &RecordLine) -> Option<Self> {
         let RecordLine::Case {
@@ -171,7 +213,7 @@ impl Settled {
     }
 
     /// The case of JUnit, without class and details, with the files that the scenario left in a folder.
-    fn case(&self, path: &Path, rig: &str) -> JunitCase {
+    pub(super) fn case(&self, path: &Path, rig: &str) -> JunitCase {
         let messages: Vec<_> = self.messages().map(String::as_str).collect();
         JunitCase {
             name: format!("{}[rig={rig},drives={}]", self.name, self.drives),
@@ -207,6 +249,12 @@ impl Settled {
         }
     }
 
+    /// Whether it was skipped for a reason that begins with these words.
+    pub(super) fn begins_with(&self, words: &str) -> bool {
+        let first = self.remarks.first();
+        self.verdict == Verdict::Skipped && first.is_some_and(|own| own.starts_with(words))
+    }
+
     /// What there is to say beside the verdict.
     pub(super) fn messages(&self) -> impl Iterator<Item = &String> {
         self.finding.iter().chain(&self.remarks)
@@ -235,17 +283,20 @@ pub(super) fn bare(path: &Path, rig: &str, settled: &[Settled]) -> String {
 }
 
 /// The name of the suite of a rig.
-fn suite(rig: &str) -> String {
+pub(super) fn suite(rig: &str) -> String {
     format!("rig {rig}")
 }
+
+/// The most attempts at a scenario that a rig's file can ask for.
+const MOST_ATTEMPTS: usize = 10;
 
 /// The text of a scenario and the captures of its attempts.
 fn attachments(path: &Path, name: &str) -> Vec<String> {
     if !is_name(name) {
         return Vec::new();
     }
-    let captures = (1..).map(|attempt: usize| format!("{CAPTURES}/{name}.{attempt}.json"));
-    let captures = captures.take_while(|file| path.join(file).is_file());
+    let captures = (1..=MOST_ATTEMPTS).map(|attempt| format!("{CAPTURES}/{name}.{attempt}.json"));
+    let captures = captures.filter(|file| path.join(file).is_file());
     let text = format!("{SCENARIOS}/{name}.scn");
     std::iter::once(text)
         .filter(|file| path.join(file).is_file())
@@ -286,6 +337,7 @@ fn show(
     case: &Settled,
     attempt: Option<&Attempt>,
     (outcome, traces): (&Outcome, &[Trace]),
+    opened: &Opened,
 ) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
     let report = entry.as_ref().and_then(Entry::report);
@@ -293,11 +345,12 @@ fn show(
         let sources = entry.scenario.sources.into_iter();
         sources.map(|source| source.text).collect()
     });
+    let file = |attempt: &Attempt| format!("{CAPTURES}/{}.{}.json", case.name, attempt.number);
     let again = match attempt {
-        Some(attempt) => format!(
-            "drivebench import {CAPTURES}/{}.{}.json --format table",
-            case.name, attempt.number
-        ),
+        Some(attempt) if opened.left_out.contains(&file(attempt)) => {
+            format!("its capture was left out (--keep {})", opened.header.keep)
+        }
+        Some(attempt) => format!("drivebench import {} --format table", file(attempt)),
         None => "it was not played".to_owned(),
     };
     section(

@@ -73,6 +73,14 @@ pub(super) fn names(path: &Path) -> Vec<String> {
     listing.map_or_else(|_| Vec::new(), |own| own.sums.into_keys().collect())
 }
 
+/// How many bytes the files of a folder have together.
+#[must_use]
+pub fn size(path: &Path) -> u64 {
+    let files = names(path).into_iter().chain([SUMS.to_owned()]);
+    let sizes = files.filter_map(|file| Some(path.join(file).metadata().ok()?.len()));
+    sizes.sum()
+}
+
 /// What is wrong with the files of a folder. Without sums, as of a run that did not end, only that one is no regular file.
 pub(super) fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
     let listing = Listing::of(path)?;

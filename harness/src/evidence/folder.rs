@@ -4,6 +4,9 @@ use super::derive::{Settled, bare, derive, plain};
 use super::files::{
     CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
 };
+use super::keep::{Keep, Keeping};
+use super::names::Names;
+use super::part::SplitRun;
 use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
@@ -15,7 +18,6 @@ use crate::scenario::run::Outcome;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
-use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -44,6 +46,12 @@ pub enum EvidenceError {
     /// It is no folder of a run.
     #[error("{0} is not an evidence folder: {1}")]
     Foreign(String, String),
+    /// A folder of an earlier run that cannot be continued.
+    #[error("failed to continue an earlier run: {0}")]
+    Earlier(String),
+    /// Folders that are no parts of one run.
+    #[error("failed to merge: {0}")]
+    Merge(String),
 }
 
 /// What a record begins with.
@@ -65,6 +73,10 @@ pub struct AboutRun<'r> {
     pub purpose: &'static str,
     /// The texts of the scenarios that were selected, in order.
     pub selected: Vec<&'r str>,
+    /// Which part of a run that was split it is; `None` for a whole run.
+    pub part: Option<&'r SplitRun>,
+    /// Which captures are kept.
+    pub keep: Keep,
     /// The key to sign the folder with, a file of `ssh-keygen`; `None` for no signature.
     pub sign: Option<&'r Path>,
 }
@@ -82,6 +94,8 @@ impl<'r> AboutRun<'r> {
             own_rings: true,
             purpose: "run",
             selected: Vec::new(),
+            part: None,
+            keep: Keep::All,
             sign: None,
         }
     }
@@ -92,7 +106,10 @@ impl<'r> AboutRun<'r> {
 pub struct Folder {
     path: PathBuf,
     writer: Writer,
-    names: BTreeSet<String>,
+    names: Names,
+    keeping: Keeping,
+    /// How many captures were left out.
+    left_out: usize,
     cases: Vec<Settled>,
     rig: String,
     /// When the run began, in UTC.
@@ -125,7 +142,9 @@ impl Folder {
         let mut folder = Self {
             path: path.to_owned(),
             writer: Writer::new(file),
-            names: BTreeSet::new(),
+            names: about.part.map_or_else(Names::default, SplitRun::names),
+            keeping: Keeping::new(about.keep),
+            left_out: 0,
             cases: Vec::new(),
             rig: about.rig.id().to_owned(),
             began: started.clone(),
@@ -155,6 +174,10 @@ impl Folder {
             own_rings: about.own_rings,
             purpose: Some(about.purpose.to_owned()),
             selected: Some(selected.collect()),
+            part: about.part.map(SplitRun::recorded),
+            keep: Some(about.keep)
+                .filter(|own| *own != Keep::All)
+                .map(|own| own.to_string()),
         });
         folder.check()?;
         Ok(folder)
@@ -166,6 +189,12 @@ impl Folder {
         &self.path
     }
 
+    /// How many captures were left out so far.
+    #[must_use]
+    pub const fn left_out(&self) -> usize {
+        self.left_out
+    }
+
     /// When the run began, as a date and time of day in UTC.
     #[must_use]
     pub fn began(&self) -> &str {
@@ -174,7 +203,7 @@ impl Folder {
 
     /// Keeps the attempts at a scenario of this name and text.
     pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> KeptAttempts<'f> {
-        let name = self.unique(name);
+        let name = self.names.next(name);
         let file = format!("{SCENARIOS}/{name}.scn");
         self.text = Some(sum(text.as_bytes()));
         KeptAttempts {
@@ -224,27 +253,6 @@ impl Folder {
             signature::sign(&self.path, key)?;
         }
         page.map(|()| self.path)
-    }
-
-    fn unique(&mut self, name: &str) -> String {
-        let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
-        let bare = name.strip_suffix(".scn").unwrap_or(name);
-        let own: String = bare
-            .chars()
-            .map(|c| if safe(c) { c } else { '_' })
-            .take(120)
-            .collect();
-        let own = match own.trim_matches(['_', '.']) {
-            "" => "scenario".to_owned(),
-            own => own.to_owned(),
-        };
-        let mut unique = own.clone();
-        let mut number = 1;
-        while !self.names.insert(unique.clone()) {
-            number += 1;
-            unique = format!("{own}_{number}");
-        }
-        unique
     }
 
     /// Written beside and then renamed: a file is there whole or not at all.
@@ -311,6 +319,11 @@ impl Keeper for KeptAttempts<'_> {
 
     fn ends(&mut self, number: usize, attempt: &Attempt) {
         self.folder.writer.line(&RecordLine::of_verdict(attempt));
+        let verdict = attempt.outcome.verdict.name();
+        if !self.folder.keeping.keeps(verdict) {
+            self.folder.left_out += 1;
+            return;
+        }
         let file = format!("{CAPTURES}/{}.{number}.json", self.name);
         let capture = capture(&attempt.traces, &attempt.outcome);
         let written = self.folder.write(&file, &capture);

@@ -1,7 +1,9 @@
 //! The first line of a record: all of it but date and version follows from the rig's file.
 
 use super::files::{RIG, sum};
-use super::record::{RecordLine, capabilities};
+use super::keep::Keep;
+use super::part;
+use super::record::{RecordLine, RunPart, capabilities};
 use crate::buses::rings::rig::named::rings;
 use crate::buses::twin::Exactness;
 use crate::buses::{SimulatedLink, judge_of};
@@ -32,6 +34,10 @@ pub(super) struct Header {
     pub(super) qualified: bool,
     /// The sums of the texts of the scenarios that were selected, in order, where the record has them.
     pub(super) selected: Option<Vec<String>>,
+    /// Which part of a run that was split it is.
+    pub(super) part: Option<RunPart>,
+    /// Which captures the folder keeps.
+    pub(super) keep: Keep,
     pub(super) limits: Limits,
     pub(super) way: Way,
     /// Of a rig with a port: whether motors could turn.
@@ -62,10 +68,24 @@ pub(super) fn header(
         own_rings,
         purpose,
         selected,
+        part,
+        keep,
     }) = lines.first()
     else {
         return Err("the record of a run expected here".to_owned());
     };
+    let keep = match keep.as_deref().map(str::parse::<Keep>) {
+        None => Keep::All,
+        Some(Ok(keep)) => keep,
+        Some(Err(why)) => {
+            wrong.push(format!("run.jsonl, line 1: `keep`: {why}"));
+            Keep::All
+        }
+    };
+    wrong.extend(
+        part.iter()
+            .flat_map(|own| part::differences(own, selected.as_ref())),
+    );
     if *rig_sha256 != sum(rig.text.as_bytes()) {
         wrong.push(format!("{RIG} is not the file that was used"));
     }
@@ -164,6 +184,8 @@ pub(super) fn header(
         own_rings: *own_rings,
         qualified: purpose.as_deref() == Some("qualify"),
         selected: selected.clone(),
+        part: part.clone(),
+        keep,
         limits,
         way: Way {
             rings,

@@ -58,6 +58,12 @@ pub enum RecordLine {
         /// The sums of the texts of the scenarios that were selected, in order: none of them is left out without a trace.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         selected: Option<Vec<String>>,
+        /// Of one part of a run that was split (`--partition`): which part of what.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        part: Option<RunPart>,
+        /// Which captures of attempts that passed were kept (`--keep`): `failed` for none, N for the first and each N-th behind it. By default all.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        keep: Option<String>,
     },
     /// An attempt at a scenario begins.
     Scenario {
@@ -257,6 +263,37 @@ pub enum RecordLine {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         safe: Option<bool>,
     },
+}
+
+/// Which part of a run that was split a record is, and the whole that was split. Parts of one run say the same but for their numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunPart {
+    /// The part, as on the command line: `slice:3/16`.
+    #[schemars(regex(pattern = "^(slice|hash):[0-9]+/[0-9]+$"))]
+    pub partition: String,
+    /// The filter of the command, if it had one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
+    /// The sum of the names and texts of all scenarios that were split.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    pub corpus: String,
+    /// All scenarios that were split, in order, those of other parts included.
+    pub scenarios: Vec<PartItem>,
+}
+
+/// A scenario of a run that was split.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartItem {
+    /// Its name in the folder of a run that is not split.
+    pub name: String,
+    /// Whether the user named it itself: it is wrong usage if the rig's limits deny it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub named: bool,
+    /// The sum of its text.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    pub sha256: String,
 }
 
 /// A fault on a link, as the schema has it.

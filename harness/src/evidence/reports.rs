@@ -32,7 +32,9 @@ pub(super) fn differences(
     let settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
     let mut wrong = Vec::new();
     wrong.extend(file(path, REPORT, |_| plain(opened.rig.id(), &settled)));
-    wrong.extend(file(path, JUNIT, |stated| moved(&made.junit, path, stated)));
+    wrong.extend(file(path, JUNIT, |stated| {
+        moved(&made.junit, path, stated, SCENARIOS)
+    }));
     wrong.extend(versions(path, opened));
     for own in judged {
         wrong.extend(of_attempt(path, opened, own));
@@ -47,7 +49,7 @@ pub(super) fn page(path: &Path, made: &Derived) -> Option<String> {
 }
 
 /// Compares a file with what is made of its own text; `None` where they are the same.
-fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -> Option<String> {
+pub(super) fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -> Option<String> {
     let stated = match files::read_text(path, name) {
         Ok(stated) => stated,
         Err(why) => return Some(why),
@@ -65,10 +67,11 @@ fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -> Option<St
 }
 
 /// JUnit's output names files by the path that the folder had during the run; everything else follows from the record.
-fn moved(made: &str, path: &Path, stated: &str) -> String {
+/// `inner` is the folder in it that each such path leads through.
+pub(super) fn moved(made: &str, path: &Path, stated: &str, inner: &str) -> String {
     let own = |text: &str| {
         let from = text.find(ATTACHMENT)? + ATTACHMENT.len();
-        let end = from + text[from..].find(&format!("/{SCENARIOS}/"))?;
+        let end = from + text[from..].find(&format!("/{inner}/"))?;
         Some(text[from..end].to_owned())
     };
     match (own(made), own(stated)) {
@@ -110,6 +113,9 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
         "{CAPTURES}/{}.{}.json",
         own.recorded.name, own.recorded.attempt
     );
+    if opened.left_out.contains(&name) {
+        return None;
+    }
     if let Some(made) = &again.capture {
         return file(path, &name, |_| made.clone());
     }
@@ -307,6 +313,9 @@ fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
         if let RecordLine::Case { name, .. } = line {
             known.insert(format!("{SCENARIOS}/{name}.scn"));
         }
+    }
+    for file in &opened.left_out {
+        known.remove(file);
     }
     let there = files::names(path);
     let foreign = there.iter().filter(|file| !known.contains(*file));

@@ -114,7 +114,7 @@ fn scenario(
     }
     for (number, made) in (1..).zip(&tape.captures) {
         let file = format!("{CAPTURES}/{name}.{number}.json");
-        if read_text(path, &file)? != *made {
+        if !opened.left_out.contains(&file) && read_text(path, &file)? != *made {
             wrong.push(format!("{file} differs from the scenario played again"));
         }
     }

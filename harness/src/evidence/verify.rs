@@ -9,6 +9,7 @@ use super::files::{
 };
 use super::folder::EvidenceError;
 use super::header::{Header, header};
+use super::keep::left_out;
 use super::qualified;
 use super::read::{RecordError, read};
 use super::record::RecordLine;
@@ -17,6 +18,7 @@ use super::rerun::rerun;
 use super::selection;
 use super::signature::{self, Signer};
 use crate::buses::judge_of;
+use crate::counted::counted;
 use crate::rig::judge::known;
 use crate::rig::run::twin;
 use crate::rig::segment::{Qualified, SegmentJudge};
@@ -24,6 +26,7 @@ use crate::rig::{Rig, parse_beside};
 use crate::scenario::source::Source;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What was found out about one attempt.
@@ -58,7 +61,15 @@ pub struct Verified {
 impl Verified {
     /// Whether nothing is wrong.
     fn is_right(&self) -> bool {
-        self.files.is_empty() && self.attempts.iter().all(|own| own.differs.is_none())
+        self.first_wrong().is_none()
+    }
+
+    /// The first thing that is wrong, in a sentence.
+    #[must_use]
+    pub fn first_wrong(&self) -> Option<&String> {
+        let attempts = self.attempts.iter();
+        let differs = attempts.filter_map(|own| own.differs.as_ref());
+        self.files.iter().chain(differs).next()
     }
 }
 
@@ -155,6 +166,8 @@ pub(super) struct Opened {
     whole: bool,
     pub(super) rig: Rig,
     pub(super) header: Header,
+    /// The captures that were left out on purpose.
+    pub(super) left_out: BTreeSet<String>,
     /// What is wrong with the files that it names.
     files: Vec<String>,
 }
@@ -188,6 +201,7 @@ impl Opened {
             message,
         })?;
         Ok(Self {
+            left_out: left_out(&lines, header.keep),
             lines,
             whole,
             rig,
@@ -348,7 +362,15 @@ impl Opened {
         if header.qualified && !header.simulated {
             all.push("on a ring with ports which scenarios the limits left out");
         }
-        all.into_iter().map(str::to_owned).collect()
+        let mut all: Vec<_> = all.into_iter().map(str::to_owned).collect();
+        if !self.left_out.is_empty() {
+            all.push(format!(
+                "{} of attempts that passed: left out on purpose (`--keep {}`); the attempts were judged by the record",
+                counted(self.left_out.len(), "capture"),
+                header.keep
+            ));
+        }
+        all
     }
 }
 

@@ -8,6 +8,7 @@ mod embedded;
 mod evidence;
 mod explore;
 mod inverters_on_rig;
+mod merge;
 mod named;
 mod on_can;
 mod on_can_qualify;
@@ -16,3 +17,4 @@ mod port_interlocks;
 #[path = "../common/program.rs"]
 mod program;
 mod simulated;
+mod spread;

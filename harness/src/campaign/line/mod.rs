@@ -118,6 +118,18 @@ pub trait LineCampaign: Debug {
     /// Its name, for messages: a path, or the name of a built-in one.
     fn name(&self) -> &str;
 
+    /// The text of its file.
+    fn text(&self) -> &str;
+
+    /// The names of its cases, in order.
+    fn names(&self) -> Vec<String>;
+
+    /// The figures that its file pins: of a class, or of all `cases`.
+    fn pinned(&self) -> Vec<(&'static str, u64)>;
+
+    /// Keeps only the cases at the places for which this is true, and no pinned figure, as these are of all cases.
+    fn keep(&mut self, at: &dyn Fn(usize) -> bool);
+
     /// How many cases it has.
     fn cases(&self) -> usize;
 

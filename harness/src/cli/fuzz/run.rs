@@ -15,6 +15,7 @@ use crate::explore::{
     OnSim, Planted, RingSetup, RunEnd, Spiced as _, Target, page, read, rig_of,
 };
 use crate::guard::Limits;
+use crate::partition::Partition;
 use crate::rig::{Rig, state};
 use crate::scenario::problem::nearest;
 use clap::Args;
@@ -40,6 +41,9 @@ pub struct FuzzRunArguments {
     /// The seed: the same seed gives the same run.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
+    /// Play one part of the run, slice:M/N or hash:M/N: its share of --cases, with a seed of its own that follows from --seed, M and N.
+    #[arg(long, value_name = "PART", conflicts_with = "resume")]
+    pub partition: Option<Partition>,
     /// Number of cases; by default 10000 on simulated rings.
     #[arg(long, value_name = "NUMBER")]
     pub cases: Option<u64>,
@@ -145,9 +149,34 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     let Some(rig) = find_any_rig(&name, output) else {
         return Ok(Exit::Usage);
     };
+    let part = match arguments.partition {
+        None => None,
+        Some(part) => {
+            let own = share(arguments, part, &rig);
+            if own.cases == Some(0) {
+                output.complain(&format!("{part} has no case"));
+                return Ok(Exit::NothingSelected);
+            }
+            output.say(&format!("{part} has the seed {}\n", own.seed));
+            Some(own)
+        }
+    };
+    let arguments = part.as_ref().unwrap_or(arguments);
     match rig.port().and_then(|port| line_fuzz(port.bus.bus())) {
         Some(own) => (own.run)(&rig, arguments, output),
         None => on_rings(rig, arguments, output),
+    }
+}
+
+/// The run that is one part of this one: its seed and its share of the cases. A time on the line is that of each part.
+fn share(arguments: &FuzzRunArguments, part: Partition, rig: &Rig) -> FuzzRunArguments {
+    let by_number = rig.is_simulated() && !arguments.behind_port && arguments.wire_time.is_none();
+    let cases = arguments.cases.or(by_number.then_some(CASES));
+    FuzzRunArguments {
+        seed: part.seed(arguments.seed),
+        cases: cases.map(|cases| part.share(cases)),
+        partition: None,
+        ..arguments.clone()
     }
 }
 

@@ -92,6 +92,8 @@ impl TelegramCase {
 #[derive(Clone, Debug)]
 pub struct TelegramCampaign {
     name: String,
+    /// The text of its file.
+    text: String,
     file: TelegramCampaignFile,
     ppo: PpoType,
     steps: Vec<Step>,
@@ -151,6 +153,7 @@ impl TelegramCampaign {
         }
         let mut campaign = Self {
             name: name.to_owned(),
+            text: text.to_owned(),
             cases: Vec::new(),
             file,
             ppo,
@@ -264,6 +267,26 @@ impl LineCampaign for TelegramCampaign {
         &self.name
     }
 
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.cases.iter().map(TelegramCase::name).collect()
+    }
+
+    fn pinned(&self) -> Vec<(&'static str, u64)> {
+        let names = std::iter::once("cases").chain(CLASSES.iter().map(|own| own.name));
+        let pinned = names.filter_map(|name| Some((name, *self.file.expect.get(name)?)));
+        pinned.collect()
+    }
+
+    fn keep(&mut self, at: &dyn Fn(usize) -> bool) {
+        let mut place = 0..;
+        self.cases.retain(|_| place.next().is_some_and(at));
+        self.file.expect = Default::default();
+    }
+
     fn cases(&self) -> usize {
         self.cases.len()
     }
@@ -282,8 +305,6 @@ impl LineCampaign for TelegramCampaign {
             progress(1);
             outcome
         };
-        let names = std::iter::once("cases").chain(CLASSES.iter().map(|own| own.name));
-        let pinned = names.filter_map(|name| Some((name, *self.file.expect.get(name)?)));
         PlayedLine {
             name: self.name.trim_end_matches(".toml").to_owned(),
             bus: Bus::Nordac.name(),
@@ -292,7 +313,7 @@ impl LineCampaign for TelegramCampaign {
             count: self.telegrams(),
             heading: "First octets",
             classes: &CLASSES,
-            expect: pinned.collect(),
+            expect: self.pinned(),
             outcomes: self.cases.iter().filter_map(play).collect(),
         }
     }

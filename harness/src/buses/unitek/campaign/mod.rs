@@ -107,6 +107,8 @@ pub struct FrameOutcome {
 pub struct FrameCampaign {
     /// Its name, for messages: a path, or the name of a built-in one.
     pub name: String,
+    /// The text of its file.
+    text: String,
     /// What its file says.
     pub file: FrameCampaignFile,
     steps: Vec<Step>,
@@ -177,6 +179,7 @@ impl FrameCampaign {
             frames.flat_map(|frame| faults.iter().map(move |&fault| FrameCase { frame, fault }));
         Ok(Self {
             name: name.to_owned(),
+            text: text.to_owned(),
             cases: cases.collect(),
             file,
             steps,
@@ -264,6 +267,28 @@ impl LineCampaign for FrameCampaign {
         &self.name
     }
 
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.cases.iter().map(FrameCase::to_string).collect()
+    }
+
+    fn pinned(&self) -> Vec<(&'static str, u64)> {
+        let expect = &self.file.expect;
+        let all = expect.cases.map(|count| ("cases", count));
+        let classes = CLASSES.iter().zip(FrameClass::ALL);
+        let pinned = classes.filter_map(|(class, own)| Some((class.name, expect.of(own)?)));
+        all.into_iter().chain(pinned).collect()
+    }
+
+    fn keep(&mut self, at: &dyn Fn(usize) -> bool) {
+        let mut place = 0..;
+        self.cases.retain(|_| place.next().is_some_and(at));
+        self.file.expect = Default::default();
+    }
+
     fn cases(&self) -> usize {
         self.cases.len()
     }
@@ -279,10 +304,6 @@ impl LineCampaign for FrameCampaign {
             progress(1);
             outcome
         };
-        let expect = &self.file.expect;
-        let all = expect.cases.map(|count| ("cases", count));
-        let classes = CLASSES.iter().zip(FrameClass::ALL);
-        let pinned = classes.filter_map(|(class, own)| Some((class.name, expect.of(own)?)));
         PlayedLine {
             name: self.name.trim_end_matches(".toml").to_owned(),
             bus: Bus::Unitek.name(),
@@ -291,7 +312,7 @@ impl LineCampaign for FrameCampaign {
             count: self.frames(),
             heading: "As candump writes it",
             classes: &CLASSES,
-            expect: all.into_iter().chain(pinned).collect(),
+            expect: self.pinned(),
             outcomes: self.cases.iter().map(play).collect(),
         }
     }

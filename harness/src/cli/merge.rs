@@ -1,0 +1,59 @@
+//! `drivebench merge`: one folder of evidence of the parts of a run. Parts that are files go to `merge_counts`.
+
+use super::args::MergeArguments;
+use super::exit::Exit;
+use super::merge_counts::merge_counts;
+use super::output::Output;
+use super::tally::counts;
+use crate::counted::counted;
+use crate::evidence::{Merged, merge as join};
+use crate::scenario::verdict::Verdict;
+
+/// Merges the folders of parts.
+pub(crate) fn merge(arguments: &MergeArguments, output: &mut Output) -> std::io::Result<Exit> {
+    if arguments.folders.iter().any(|own| own.is_file()) {
+        return merge_counts(arguments, output);
+    }
+    let merged = match join(&arguments.folders, &arguments.output) {
+        Ok(merged) => merged,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(Exit::of_evidence(&error));
+        }
+    };
+    for (name, verdict) in merged
+        .verdicts
+        .iter()
+        .filter(|own| own.1 != Verdict::Passed)
+    {
+        output.result(&format!("{} {name}\n", output.verdict(*verdict)))?;
+    }
+    for why in &merged.missing {
+        output.result(&format!("incomplete   {why}\n"))?;
+    }
+    let verdicts: Vec<_> = merged
+        .verdicts
+        .iter()
+        .map(|(_, verdict)| *verdict)
+        .collect();
+    let (there, of) = &merged.parts;
+    output.result(&format!(
+        "{} ({}, {} on the line); {} of {of} parts\n",
+        counts(&verdicts),
+        counted(verdicts.len(), "scenario"),
+        merged.took,
+        there.len()
+    ))?;
+    output.say(&format!("evidence in {}\n", arguments.output.display()));
+    Ok(exit(&merged, &verdicts, arguments.require_all))
+}
+
+/// The exit code of the whole run, as `run` has it. A part that is missing leaves a failure a failure, and makes all else incomplete.
+fn exit(merged: &Merged, verdicts: &[Verdict], require_all: bool) -> Exit {
+    match Exit::of(verdicts, require_all) {
+        _ if !merged.safe => Exit::NotSafe,
+        Exit::Passed | Exit::Incomplete if merged.named_denied => Exit::Usage,
+        Exit::Passed | Exit::NothingSelected if !merged.missing.is_empty() => Exit::Incomplete,
+        exit => exit,
+    }
+}

@@ -1,0 +1,73 @@
+//! `drivebench merge` of files: the counts of parts of campaigns.
+
+use super::args::MergeArguments;
+use super::exit::Exit;
+use super::output::Output;
+use super::page::save;
+use crate::campaign::part::{CampaignCounts, CountsError, MergedCounts, merge};
+use crate::campaign::report::share;
+use std::fmt::Write as _;
+
+/// Adds the counts of parts, and compares them with the pinned figures.
+pub(crate) fn merge_counts(
+    arguments: &MergeArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let merged = match merge(&arguments.folders) {
+        Ok(merged) => merged,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(match &error {
+                CountsError::File { error, .. } => Exit::of_file(error),
+                CountsError::Wrong(_) => Exit::Usage,
+            });
+        }
+    };
+    if arguments.output.exists() {
+        let path = arguments.output.display();
+        output.complain(&format!("{path} exists; name a new file for the counts"));
+        return Ok(Exit::Usage);
+    }
+    if !save(
+        &arguments.output,
+        &merged.file.text(),
+        "the counts are",
+        output,
+    ) {
+        return Ok(Exit::RigError);
+    }
+    let MergedCounts { file, missing } = merged;
+    for own in &file.campaigns {
+        output.result(&table(own, missing.is_empty()))?;
+    }
+    for part in &missing {
+        output.result(&format!("incomplete   part {part} is missing\n"))?;
+    }
+    let nothing = file.campaigns.iter().all(|own| own.played() == Some(0));
+    let differs = file.campaigns.iter().any(|own| !own.differs().is_empty());
+    Ok(match (missing.is_empty(), differs) {
+        (false, _) => Exit::Incomplete,
+        (true, true) => Exit::Failed,
+        (true, false) if nothing => Exit::NothingSelected,
+        (true, false) => Exit::Passed,
+    })
+}
+
+/// The counts of a campaign; what is pinned is compared only where no part is missing.
+fn table(own: &CampaignCounts, whole: bool) -> String {
+    let played = own.played().unwrap_or(u64::MAX);
+    let mut text = format!("{}: {played} of {} cases\n\n", own.name, own.cases);
+    // Writing to a String cannot fail.
+    let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
+    for count in &own.counts {
+        let part = share(count.cases, played);
+        let _infallible = writeln!(text, "  {:18} {:>8} {part:>9}", count.class, count.cases);
+    }
+    for (class, expected, found) in own.differs().into_iter().filter(|_| whole) {
+        let _infallible = writeln!(
+            text,
+            "  differs: {class} is {found}, the file pins {expected}"
+        );
+    }
+    text + "\n"
+}

@@ -1,0 +1,577 @@
+//! One folder of the parts of a run that was split.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `merge.json` | which parts there are, which are missing, and what came of each scenario |
+//! | `parts/N` | the folder of part N as it was |
+//! | `junit.xml`, `report.txt`, `report.html` | the verdicts of all parts in the order of the whole run |
+//!
+//! Each part was played on drives of its own, so each is judged by its own record. All else is made from the parts, and `verify` makes it again.
+
+use super::derive::{CaseReport, Derived, Settled, case_reports, plain, suite};
+use super::files::{self, CAPTURES, JUNIT, PAGE, REPORT, SCENARIOS, SIGNATURE, SUMS, sum};
+use super::folder::EvidenceError;
+use super::junit::{JunitCase, junit};
+use super::record::{PartItem, RecordLine};
+use super::reports::{file, moved};
+use super::signature::Signer;
+use super::verify::{Opened, Verified, scenarios, verify};
+use crate::counted::counted;
+use crate::partition::Partition;
+use crate::regular;
+use crate::report::html::{Head, ShownScenario, run};
+use crate::scenario::run::DENIED;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The record of a merged folder.
+pub const MERGE: &str = "merge.json";
+/// The folder of the parts.
+const PARTS: &str = "parts";
+
+/// What the parts of a run come to.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// The name and the verdict of each scenario, in the order of the whole run.
+    pub verdicts: Vec<(String, Verdict)>,
+    /// How long they took on the line.
+    pub took: Span,
+    /// The numbers of the parts that are there, and how many there are.
+    pub parts: (Vec<u32>, u32),
+    /// What was not played and should have been, in sentences; with any of it the run is incomplete.
+    pub missing: Vec<String>,
+    /// Whether a scenario that the user named itself was denied by the rig's limits.
+    pub named_denied: bool,
+    /// Whether no part has left its drives in a state that is not known to be safe.
+    pub safe: bool,
+}
+
+/// The files of a merged folder.
+struct Made {
+    merged: Merged,
+    record: String,
+    junit: String,
+    report: String,
+    page: String,
+    /// The version of the program that played the parts.
+    program: String,
+}
+
+/// A part that was read.
+struct ReadPart {
+    path: PathBuf,
+    partition: Partition,
+    opened: Opened,
+}
+
+/// Merges the folders of parts into a new folder.
+///
+/// # Errors
+/// A folder is no part, was changed, is there twice, is part of another run, or was written by another version of this program; or the new
+/// folder cannot be written.
+pub fn merge(parts: &[PathBuf], output: &Path) -> Result<Merged, EvidenceError> {
+    if fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
+        return Err(EvidenceError::NotEmpty(output.display().to_string()));
+    }
+    let all = read(parts)?;
+    for own in &all {
+        let path = own.path.display();
+        let program = &own.opened.header.program;
+        if program != env!("CARGO_PKG_VERSION") {
+            return Err(EvidenceError::Merge(format!(
+                "drivebench {program} wrote {path}, and this is {}; merge with the version that played the parts",
+                env!("CARGO_PKG_VERSION")
+            )));
+        }
+        let verified = verify(&own.path, None)?;
+        if let Some(why) = verified.first_wrong() {
+            return Err(EvidenceError::Merge(format!(
+                "{path} is not what its record gives: {why}; `drivebench verify {path}` shows all of it"
+            )));
+        }
+    }
+    let whole = |path: &Path| std::path::absolute(path).map_err(failed(path));
+    let into = whole(output)?;
+    for own in &all {
+        if into.starts_with(whole(&own.path)?) {
+            return Err(EvidenceError::Merge(format!(
+                "{} lies in {}, which must stay as it is; name another folder",
+                output.display(),
+                own.path.display()
+            )));
+        }
+    }
+    for own in &all {
+        copy(&own.path, &place(output, own.partition.number))?;
+    }
+    let made = make(output)?;
+    let texts = [
+        (JUNIT, &made.junit),
+        (REPORT, &made.report),
+        (PAGE, &made.page),
+        (MERGE, &made.record),
+    ];
+    for (name, text) in texts {
+        let path = output.join(name);
+        regular::write_text(&path, text).map_err(failed(&path))?;
+    }
+    Ok(made.merged)
+}
+
+/// Judges a merged folder again: each part by its own record and its signature where a signer is given, and all else by the parts.
+///
+/// # Errors
+/// It is no merged folder, or a part of it is none.
+pub fn verify_merged(
+    path: &Path,
+    signer: Option<Signer<'_>>,
+) -> Result<(Verified, Merged), EvidenceError> {
+    let made = make(path)?;
+    let mut verified = Verified {
+        complete: made.merged.missing.is_empty(),
+        ..Verified::default()
+    };
+    let mut unconfirmed = BTreeSet::new();
+    for number in &made.merged.parts.0 {
+        let own = verify(&place(path, *number), signer)?;
+        let named = |what: String| format!("{PARTS}/{number}: {what}");
+        verified.files.extend(own.files.into_iter().map(named));
+        verified.attempts.extend(own.attempts);
+        verified.complete &= own.complete;
+        unconfirmed.extend(own.unconfirmed);
+    }
+    verified.unconfirmed.extend(unconfirmed);
+    verified
+        .unconfirmed
+        .extend(made.merged.missing.iter().cloned());
+    if made.program == env!("CARGO_PKG_VERSION") {
+        let wrong = [
+            file(path, MERGE, |_| made.record.clone()),
+            file(path, REPORT, |_| made.report.clone()),
+            file(path, JUNIT, |stated| {
+                moved(&made.junit, path, stated, PARTS)
+            }),
+            file(path, PAGE, |_| made.page.clone()),
+        ];
+        verified.files.extend(wrong.into_iter().flatten());
+    }
+    for name in entries(path)? {
+        if ![MERGE, REPORT, JUNIT, PAGE, PARTS].contains(&name.as_str()) {
+            verified
+                .files
+                .push(format!("{name} is not a file of a merged run"));
+        }
+    }
+    Ok((verified, made.merged))
+}
+
+/// Makes the reports of a merged folder again.
+///
+/// # Errors
+/// It is no merged folder, or a part of it is damaged.
+pub(super) fn derive_merged(path: &Path) -> Result<Derived, EvidenceError> {
+    make(path).map(|made| Derived {
+        html: made.page,
+        junit: made.junit,
+    })
+}
+
+/// The records of the parts of a merged folder.
+pub(super) fn opened_parts(path: &Path) -> Result<Vec<Opened>, EvidenceError> {
+    let parts = parts_of(path)?.into_iter();
+    Ok(parts.map(|part| part.opened).collect())
+}
+
+/// Where a part stands in a merged folder.
+fn place(path: &Path, number: u32) -> PathBuf {
+    path.join(PARTS).join(number.to_string())
+}
+
+/// The names in a folder, in order.
+fn entries(path: &Path) -> Result<Vec<String>, EvidenceError> {
+    let all = fs::read_dir(path).map_err(failed(path))?;
+    let mut names = Vec::new();
+    for entry in all {
+        names.push(
+            entry
+                .map_err(failed(path))?
+                .file_name()
+                .to_string_lossy()
+                .into_owned(),
+        );
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn failed(path: &Path) -> impl Fn(std::io::Error) -> EvidenceError {
+    move |error| EvidenceError::File {
+        path: path.display().to_string(),
+        error,
+    }
+}
+
+/// Copies the files of a folder of evidence.
+fn copy(from: &Path, to: &Path) -> Result<(), EvidenceError> {
+    for folder in ["", SCENARIOS, CAPTURES] {
+        let path = to.join(folder);
+        fs::create_dir_all(&path).map_err(failed(&path))?;
+    }
+    let mut names = files::names(from);
+    names.extend([SUMS, SIGNATURE].map(str::to_owned));
+    for name in names.iter().filter(|name| from.join(name).exists()) {
+        let bytes = files::read(from, name).map_err(failed(&from.join(name)))?;
+        fs::write(to.join(name), bytes).map_err(failed(&to.join(name)))?;
+    }
+    Ok(())
+}
+
+/// Reads folders that are to be parts of one run, in the order of their numbers.
+fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> {
+    let mut parts: Vec<ReadPart> = Vec::new();
+    for path in folders {
+        let opened = Opened::folder(path)?;
+        let Some(partition) = opened.header.partition() else {
+            return Err(EvidenceError::Merge(format!(
+                "{} is no part of a run: its record has no partition; `run --partition slice:M/N --evidence FOLDER` writes one",
+                path.display()
+            )));
+        };
+        let own = ReadPart {
+            path: path.clone(),
+            partition,
+            opened,
+        };
+        if own.opened.header.qualified {
+            return Err(EvidenceError::Merge(format!(
+                "{} is of `qualify`: each part of a qualification stands for itself, with a profile of its own; only parts of `run` are merged",
+                path.display()
+            )));
+        }
+        if let Some(first) = parts.first() {
+            own.is_of_one_run_with(first)?;
+        }
+        if let Some(other) = parts.iter().find(|other| other.partition == partition) {
+            return Err(EvidenceError::Merge(format!(
+                "{} and {} are both {partition}; name each part once",
+                other.path.display(),
+                path.display()
+            )));
+        }
+        parts.push(own);
+    }
+    parts.sort_by_key(|own| own.partition.number);
+    match parts.is_empty() {
+        true => Err(EvidenceError::Merge("there is no part".to_owned())),
+        false => Ok(parts),
+    }
+}
+
+impl ReadPart {
+    /// What must be the same in all parts of a run: the name of each fact, and what it is here.
+    fn fingerprint(&self) -> Vec<(&'static str, String)> {
+        let header = &self.opened.header;
+        let part = header.part.as_ref();
+        let names: Vec<_> = header.capabilities.iter().map(|own| own.name()).collect();
+        vec![
+            ("version of drivebench", header.program.clone()),
+            ("schema", header.schema.to_string()),
+            ("spread", self.partition.spread.name().to_owned()),
+            ("number of parts", self.partition.of.to_string()),
+            ("rig", self.opened.rig.id().to_owned()),
+            (
+                "sum of the rig's file",
+                sum(self.opened.rig.text.as_bytes()),
+            ),
+            (
+                "filter",
+                part.and_then(|own| own.filter.clone())
+                    .unwrap_or_else(|| "none".to_owned()),
+            ),
+            (
+                "corpus",
+                part.map_or_else(String::new, |own| own.corpus.clone()),
+            ),
+            (
+                "purpose",
+                if header.qualified { "qualify" } else { "run" }.to_owned(),
+            ),
+            ("list of capabilities", names.join(", ")),
+            ("rate", header.rate.bits_per_second().to_string()),
+            (
+                "choice of drives",
+                match header.own_rings {
+                    true => "simulated drives for each scenario",
+                    false => "those of the rig",
+                }
+                .to_owned(),
+            ),
+            (
+                "sum of the profile that the rig's file names",
+                self.opened
+                    .rig
+                    .profile
+                    .as_ref()
+                    .map_or_else(|| "none".to_owned(), |own| sum(own.text.as_bytes())),
+            ),
+        ]
+    }
+
+    fn is_of_one_run_with(&self, first: &Self) -> Result<(), EvidenceError> {
+        let both = first.fingerprint().into_iter().zip(self.fingerprint());
+        let mut differing = both.filter(|((_, theirs), (_, own))| theirs != own);
+        match differing.next() {
+            None => Ok(()),
+            Some(((what, theirs), (_, own))) => Err(EvidenceError::Merge(format!(
+                "{} and {} are no parts of one run: the {what} is {theirs} in the first and {own} in the second",
+                first.path.display(),
+                self.path.display()
+            ))),
+        }
+    }
+
+    fn scenarios(&self) -> &[PartItem] {
+        self.opened
+            .header
+            .part
+            .as_ref()
+            .map_or(&[], |own| &own.scenarios)
+    }
+}
+
+/// The parts of a merged folder.
+fn parts_of(path: &Path) -> Result<Vec<ReadPart>, EvidenceError> {
+    let folder = path.join(PARTS);
+    let names = entries(&folder)?;
+    let all: Vec<_> = names.iter().map(|name| folder.join(name)).collect();
+    if let Some(link) = all
+        .iter()
+        .find(|own| !fs::symlink_metadata(own).is_ok_and(|own| own.is_dir()))
+    {
+        return Err(EvidenceError::Merge(format!(
+            "{} is not a folder",
+            link.display()
+        )));
+    }
+    let parts = read(&all)?;
+    match parts
+        .iter()
+        .find(|own| place(path, own.partition.number) != own.path)
+    {
+        None => Ok(parts),
+        Some(own) => Err(EvidenceError::Merge(format!(
+            "{} holds {}, which belongs into {PARTS}/{}",
+            own.path.display(),
+            own.partition,
+            own.partition.number
+        ))),
+    }
+}
+
+/// A scenario of the whole run.
+struct Row {
+    settled: Settled,
+    junit: JunitCase,
+    /// `None` for one that was not run.
+    shown: Option<ShownScenario>,
+}
+
+impl From<CaseReport> for Row {
+    fn from(report: CaseReport) -> Self {
+        Self {
+            settled: report.settled,
+            junit: report.junit,
+            shown: Some(report.shown),
+        }
+    }
+}
+
+/// The scenarios of the whole run, gathered part by part.
+struct Gathering<'g> {
+    path: &'g Path,
+    rig: &'g str,
+    all: &'g [PartItem],
+    /// By their places.
+    rows: BTreeMap<usize, Row>,
+    missing: Vec<String>,
+}
+
+impl Gathering<'_> {
+    /// Takes the scenarios of a part that is there; `own` has their places.
+    fn part(&mut self, part: &ReadPart, own: &[usize]) -> Result<(), EvidenceError> {
+        let judged = part.opened.judged(&scenarios(&part.path))?;
+        let number = |at: usize| own.get(at).map_or(0, |place| place + 1);
+        let made = case_reports(&part.path, &part.opened, &judged, &number)?;
+        let played = made.len();
+        let planned = own.iter().map(|place| &self.all[*place].name);
+        let names = made.iter().map(|report| &report.settled.name);
+        if played > own.len() || !planned.zip(names).all(|(planned, name)| planned == name) {
+            return Err(EvidenceError::Merge(format!(
+                "{}: its cases are not the scenarios of {} of its list",
+                part.path.display(),
+                part.partition
+            )));
+        }
+        for (place, report) in own.iter().zip(made) {
+            self.rows.insert(*place, report.into());
+        }
+        if !part.has_ended() || played < own.len() {
+            self.missing.push(format!(
+                "part {} did not come to its end: {} not run",
+                part.partition,
+                counted(own.len() - played, "scenario")
+            ));
+        }
+        self.not_run(
+            &own[played..],
+            &format!("part {} ended before it", part.partition),
+        );
+        Ok(())
+    }
+
+    /// Takes the scenarios of a part that is not there. A part without any is not missed.
+    fn no_part(&mut self, partition: Partition, own: &[usize]) {
+        if !own.is_empty() {
+            let count = counted(own.len(), "scenario");
+            self.missing
+                .push(format!("part {partition} is missing: {count} not run"));
+        }
+        self.not_run(own, &format!("part {partition} is missing"));
+    }
+
+    fn not_run(&mut self, places: &[usize], why: &str) {
+        for place in places {
+            let settled = Settled::not_run(&self.all[*place].name, why);
+            let row = Row {
+                junit: settled.case(self.path, self.rig),
+                settled,
+                shown: None,
+            };
+            self.rows.insert(*place, row);
+        }
+    }
+}
+
+/// Makes the files of a merged folder from its parts.
+fn make(path: &Path) -> Result<Made, EvidenceError> {
+    let parts = parts_of(path)?;
+    let first = &parts[0];
+    let (rig, all, of) = (first.opened.rig.id(), first.scenarios(), first.partition.of);
+    let mut places: BTreeMap<u32, Vec<usize>> = (1..=of).map(|own| (own, Vec::new())).collect();
+    for (place, item) in all.iter().enumerate() {
+        let owner = first.partition.owner(place, &item.name);
+        places.entry(owner).or_default().push(place);
+    }
+    let mut gathering = Gathering {
+        path,
+        rig,
+        all,
+        rows: BTreeMap::new(),
+        missing: Vec::new(),
+    };
+    for (number, own) in &places {
+        let place = parts.binary_search_by_key(number, |part| part.partition.number);
+        match place {
+            Ok(place) => gathering.part(&parts[place], own)?,
+            Err(_) => gathering.no_part(
+                Partition {
+                    number: *number,
+                    ..first.partition
+                },
+                own,
+            ),
+        }
+    }
+    let Gathering { rows, missing, .. } = gathering;
+    let denied =
+        |(place, row): (&usize, &Row)| all[*place].named && row.settled.begins_with(DENIED);
+    let merged = Merged {
+        took: rows
+            .values()
+            .fold(Span::ZERO, |sum, own| sum + own.settled.took),
+        verdicts: rows
+            .values()
+            .map(|own| (own.settled.name.clone(), own.settled.verdict))
+            .collect(),
+        parts: (parts.iter().map(|own| own.partition.number).collect(), of),
+        missing,
+        named_denied: rows.iter().any(denied),
+        safe: !parts.iter().any(ReadPart::is_unsafe),
+    };
+    let head = Head {
+        found: Vec::new(),
+        title: "drivebench: scenarios on a rig, merged of parts",
+        facts: facts(&merged, first),
+    };
+    let (mut settled, mut cases, mut shown) = (Vec::new(), Vec::new(), Vec::new());
+    for row in rows.into_values() {
+        settled.push(row.settled);
+        cases.push(row.junit);
+        shown.extend(row.shown);
+    }
+    Ok(Made {
+        record: record(&merged, &parts),
+        junit: junit(&suite(rig), &cases),
+        report: plain(rig, &settled),
+        page: run(&head, shown),
+        program: first.opened.header.program.clone(),
+        merged,
+    })
+}
+
+fn facts(merged: &Merged, first: &ReadPart) -> Vec<(&'static str, String)> {
+    let (there, of) = &merged.parts;
+    let mut facts = vec![
+        ("Rig", first.opened.rig.id().to_owned()),
+        (
+            "Played by",
+            format!("drivebench {}", first.opened.header.program),
+        ),
+        ("Parts", format!("{} of {of}", there.len())),
+    ];
+    facts.extend(merged.missing.iter().map(|own| ("Incomplete", own.clone())));
+    facts
+}
+
+impl ReadPart {
+    fn end(&self) -> Option<Option<bool>> {
+        match self.opened.lines.last() {
+            Some(RecordLine::End { safe, .. }) => Some(*safe),
+            _ => None,
+        }
+    }
+
+    fn has_ended(&self) -> bool {
+        self.end().is_some() && self.path.join(SUMS).exists()
+    }
+
+    fn is_unsafe(&self) -> bool {
+        self.end() == Some(Some(false))
+    }
+}
+
+fn record(merged: &Merged, parts: &[ReadPart]) -> String {
+    let of_part = |own: &ReadPart| {
+        let sums = files::read(&own.path, SUMS).ok().map(|bytes| sum(&bytes));
+        serde_json::json!({ "part": own.partition.to_string(), "folder": format!("{PARTS}/{}", own.partition.number), "sums_sha256": sums })
+    };
+    let cases = merged.verdicts.iter();
+    let cases =
+        cases.map(|(name, verdict)| serde_json::json!({ "name": name, "verdict": verdict.name() }));
+    let fingerprint: serde_json::Map<_, _> = parts[0]
+        .fingerprint()
+        .into_iter()
+        .map(|(what, own)| (what.replace(' ', "_"), own.into()))
+        .collect();
+    let value = serde_json::json!({
+        "schema": 1,
+        "fingerprint": fingerprint,
+        "parts": parts.iter().map(of_part).collect::<Vec<_>>(),
+        "missing": merged.missing,
+        "cases": cases.collect::<Vec<_>>(),
+    });
+    format!("{value:#}\n")
+}
