@@ -88,6 +88,8 @@ pub enum Command {
     ///
     /// The exit code is 1 if they differ.
     Diff(DiffArguments),
+    /// Compare recorded values: draw them over the same times, and print what tells their steps apart.
+    Plot(PlotArguments),
     /// Print the Wireshark dissector for `trace --format pcapng`.
     Dissector {
         /// The bus.
@@ -379,6 +381,33 @@ pub struct ImportArguments {
     /// How it is shown and where it goes.
     #[command(flatten)]
     pub showing: TraceOutput,
+}
+
+/// What is at time 0 where recordings are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PlotAlignment {
+    /// The first sample of each recording.
+    #[default]
+    First,
+    /// The trigger of each recording of `scope`.
+    Trigger,
+}
+
+/// For `plot`.
+#[derive(Clone, Debug, Args)]
+pub struct PlotArguments {
+    /// The recordings: files of `watch --csv` or `scope --csv`, or of `trace --format json` with the records of a scenario.
+    #[arg(value_name = "FILE", required = true, num_args = 1..=16)]
+    pub files: Vec<PathBuf>,
+    /// Draw them into this file: .html is a page with a cursor, .svg a picture.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// What is at time 0.
+    #[arg(long, value_enum, default_value_t = PlotAlignment::First)]
+    pub align: PlotAlignment,
+    /// Only curves with this text in their name, such as nist.
+    #[arg(long, value_name = "TEXT")]
+    pub only: Vec<String>,
 }
 
 /// For `diff`.

@@ -24,6 +24,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "top",
             "params",
             "scope",
+            "plot",
             "position",
             "go",
             "stop",

@@ -6,6 +6,7 @@ mod capture;
 mod check;
 mod complete;
 pub(crate) mod deviations;
+pub(crate) mod drawing;
 pub(crate) mod exit;
 mod extcap;
 pub(crate) mod failure;
@@ -22,6 +23,7 @@ mod merge;
 mod merge_counts;
 pub(crate) mod output;
 mod page;
+pub(crate) mod plot;
 pub(crate) mod port_bench;
 mod promote;
 mod qualify;
@@ -88,6 +90,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Import(arguments) => import::import(&arguments, output),
         Command::Capture(arguments) => capture::capture(&arguments, output),
         Command::Extcap(arguments) => extcap::extcap(&arguments, output),
+        Command::Plot(arguments) => plot::plot(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector { bus } => import::dissector(bus, output),
         Command::Dbc { drives } => import::dbc(drives, output),

@@ -1,5 +1,6 @@
 //! `--html FILE`: the page of a run, collected while it goes on and written at its end.
 
+use super::file;
 use super::output::Output;
 use crate::library::Entry;
 use crate::regular;
@@ -74,19 +75,10 @@ pub(crate) struct NotWritable;
 
 /// Checks that a file could be written.
 pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), NotWritable> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let why = if path.is_dir() {
-        "it is a folder; name a file in it"
-    } else if !folder.is_dir() {
-        "there is no such folder; make it first"
-    } else {
-        return Ok(());
-    };
-    output.complain(&format!("failed to write {}: {why}", path.display()));
-    Err(NotWritable)
+    file::check(path).map_err(|failure| {
+        failure.tell(output);
+        NotWritable
+    })
 }
 
 /// Writes a page atomically. Returns false after reporting a failure.

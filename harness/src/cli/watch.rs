@@ -2,17 +2,26 @@
 
 use super::exit::Exit;
 use super::failure::Failure;
+use super::file;
 use super::output::Output;
 use crate::buses::commands::{WatchArguments, WatchForm};
+use crate::report::chart::{Chart, Curve, MAX_CURVES, number_of};
+use crate::signals::interrupt_flag;
+use crate::trouble::Trouble;
 use harness_proto::time::{Instant, Span};
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Maximum number of lines of one command.
 const MOST: u64 = 1_000_000;
+/// Maximum number of readings that are drawn.
+const MOST_DRAWN: u64 = 100_000;
 
-/// The unit of a column whose values are hexadecimal digits.
-pub(crate) const HEX: &str = "hex";
+pub(crate) use crate::report::chart::HEX;
 
 /// What stood in a cell when it was read.
+#[derive(Clone, Debug)]
 pub(crate) struct WatchedCell {
     /// The drive's number.
     pub(crate) drive: String,
@@ -35,6 +44,15 @@ pub(crate) fn decimal(value: f64) -> String {
 impl WatchedCell {
     fn is_of(&self, column: &Self) -> bool {
         (&self.drive, &self.name) == (&column.drive, &column.name)
+    }
+
+    /// Its curve, without samples.
+    fn curve(&self) -> Curve {
+        Curve {
+            name: format!("{} {}", self.drive, self.name),
+            unit: self.unit.to_owned(),
+            ..Curve::default()
+        }
     }
 }
 
@@ -59,63 +77,163 @@ pub(crate) trait WatchBench {
     fn run(&mut self, time: Span) -> Result<(), Failure>;
 }
 
-/// Refuses times that no table can hold.
-///
-/// # Errors
-/// [`Failure`] names the option.
-pub(crate) fn check_times(arguments: &WatchArguments) -> Result<(), Failure> {
+/// Refuses times that no table and no picture can hold.
+fn check_times(arguments: &WatchArguments) -> Result<(), Failure> {
     let every = arguments.every;
-    match every == Span::ZERO || arguments.length.units() / every.units() > MOST {
+    let longer = |most| every == Span::ZERO || arguments.length.units() / every.units() > most;
+    if longer(MOST) {
+        return Err(Failure::refused(format!(
+            "--every must be longer than nothing, and --for at most {MOST} times as long"
+        )));
+    }
+    match arguments.drawing.wanted() && longer(MOST_DRAWN) {
         false => Ok(()),
         true => Err(Failure::refused(format!(
-            "--every must be longer than nothing, and --for at most {MOST} times as long"
+            "--html and --svg draw at most {MOST_DRAWN} readings: make --every longer or --for shorter, or use --csv"
         ))),
     }
 }
 
-/// Shows values, a line each time.
+/// Watches values on a bench that `on` opens and gives back. The files that are asked for are written behind that, also where the watching
+/// was interrupted or has failed.
 ///
 /// # Errors
-/// [`Failure`] of the bench or of the output.
-pub(crate) fn watch<W: WatchBench>(
+/// [`Failure`] of the bench, of the output or of a file.
+pub(crate) fn watch(
     arguments: &WatchArguments,
-    watched: &mut W,
     output: &mut Output,
+    on: impl FnOnce(&mut Readings<'_>, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    let again = arguments.format == WatchForm::Text && output.full_screen;
-    let start = watched.now();
-    let end = start + arguments.length;
-    let mut next = start;
-    let mut columns: Option<Vec<WatchedCell>> = None;
-    loop {
-        let at = watched.now().since(start);
-        let found = watched.look()?;
-        let line = match (arguments.format, &columns) {
-            (WatchForm::Text, _) => text::<W>(at, &found),
-            (WatchForm::Csv, Some(columns)) => row(at, columns, &found),
-            (WatchForm::Csv, None) => {
-                output.result(&format!("{}\n", heading(&found)))?;
-                let line = row(at, &found, &found);
-                columns = Some(found);
-                line
+    check_times(arguments)?;
+    arguments.drawing.check()?;
+    let ((ended, curves), written) = match &arguments.csv {
+        None => (watched(arguments, None, output, on).0, Ok(())),
+        Some(path) => {
+            file::check(path)?;
+            file::write_while(path, |csv| watched(arguments, Some(csv), output, on))?
+        }
+    };
+    let drawn = match curves.is_empty() {
+        true => Ok(()),
+        false => arguments.drawing.write(&Chart {
+            id: "watch",
+            title: &format!("Values read every {}", arguments.every),
+            note: "Times count from the first reading and tell when a reading began. Between two samples nothing is known.",
+            curves: &curves,
+            ..Chart::default()
+        }),
+    };
+    let files = written.and(drawn);
+    match (ended, files) {
+        (Ok(exit), Err(failure)) => {
+            let own = failure.tell(output);
+            Ok(if exit == Exit::Passed { own } else { exit })
+        }
+        (Err(ended), Err(failure)) => {
+            failure.tell(output);
+            Err(ended)
+        }
+        (ended, Ok(())) => ended,
+    }
+}
+
+/// Watches, and gives the curves that were read up to the end, and whether something was read.
+fn watched<'a>(
+    arguments: &'a WatchArguments,
+    csv: Option<&'a mut dyn Write>,
+    output: &mut Output,
+    on: impl FnOnce(&mut Readings<'_>, &mut Output) -> Result<Exit, Failure>,
+) -> ((Result<Exit, Failure>, Vec<Curve>), bool) {
+    let mut readings = Readings {
+        arguments,
+        csv,
+        columns: None,
+        curves: Vec::new(),
+        interrupt: interrupt_flag(),
+    };
+    let ended = on(&mut readings, output);
+    ((ended, readings.curves), readings.columns.is_some())
+}
+
+/// What is read again and again, and what is kept of it.
+pub(crate) struct Readings<'a> {
+    arguments: &'a WatchArguments,
+    /// The file of `--csv`.
+    csv: Option<&'a mut dyn Write>,
+    /// The cells of the first reading.
+    columns: Option<Vec<WatchedCell>>,
+    curves: Vec<Curve>,
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Readings<'_> {
+    /// Shows values, a line each time, up to the end of `--for` or an interruption.
+    ///
+    /// # Errors
+    /// [`Failure`] of the bench, of the output or of the file of `--csv`.
+    pub(crate) fn show<W: WatchBench>(
+        &mut self,
+        watched: &mut W,
+        output: &mut Output,
+    ) -> Result<Exit, Failure> {
+        let form = self.arguments.format;
+        let again = form == WatchForm::Text && output.full_screen;
+        let start = watched.now();
+        let end = start + self.arguments.length;
+        let mut next = start;
+        loop {
+            if self.interrupt.load(Ordering::Relaxed) {
+                let why = Trouble::Interrupted.to_string();
+                return Err(Failure::Bus(Exit::Interrupted, why));
             }
-        };
-        match again {
-            true => output.result(&format!("\r\x1b[K{line}"))?,
-            false => output.result(&format!("{line}\n"))?,
+            let at = watched.now().since(start);
+            let found = watched.look()?;
+            let columns = self.keep(at, &found)?;
+            match (form, again) {
+                (WatchForm::Csv, _) => output.result(&columns)?,
+                (_, true) => output.result(&format!("\r\x1b[K{}", text::<W>(at, &found)))?,
+                (_, false) => output.result(&format!("{}\n", text::<W>(at, &found)))?,
+            }
+            let now = watched.now();
+            // If reading takes longer than the given period, it is repeated as often as possible.
+            next = (next + self.arguments.every).max(now);
+            if next > end {
+                break;
+            }
+            watched.run(next.since(now))?;
         }
-        let now = watched.now();
-        // If reading takes longer than the given period, it is repeated as often as possible.
-        next = (next + arguments.every).max(now);
-        if next > end {
-            break;
+        if again {
+            output.result("\n")?;
         }
-        watched.run(next.since(now))?;
+        Ok(Exit::Passed)
     }
-    if again {
-        output.result("\n")?;
+
+    /// Keeps a reading for the files that are asked for, and gives its line of columns, in front of the first one the headings.
+    fn keep(&mut self, at: Span, found: &[WatchedCell]) -> Result<String, Failure> {
+        let mut line = String::new();
+        let columns = self.columns.get_or_insert_with(|| {
+            line = format!("{}\n", heading(found));
+            found.to_vec()
+        });
+        line.push_str(&row(at, columns, found));
+        line.push('\n');
+        if let (Some(csv), Some(path)) = (&mut self.csv, &self.arguments.csv) {
+            let written = csv.write_all(line.as_bytes());
+            written.map_err(|error| file::failed(path, &error))?;
+        }
+        if self.arguments.drawing.wanted() {
+            if self.curves.is_empty() {
+                self.curves = columns.iter().map(WatchedCell::curve).collect();
+            }
+            let drawn = self.curves.iter_mut().zip(columns).take(MAX_CURVES);
+            for (curve, column) in drawn {
+                let own = found.iter().find(|own| own.is_of(column));
+                let value = own.and_then(|own| number_of(&own.digits, own.unit));
+                curve.points.push((at.as_millis_f64(), value));
+            }
+        }
+        Ok(line)
     }
-    Ok(Exit::Passed)
 }
 
 /// Time, and of each drive the names and values.

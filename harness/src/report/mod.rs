@@ -1,5 +1,6 @@
 //! Reports: pure functions of a finished run.
 
+pub(crate) mod chart;
 pub mod finding;
 pub mod html;
 pub mod mismatch;

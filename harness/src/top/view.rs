@@ -22,10 +22,16 @@ const COLUMNS: [&str; 7] = [
 ];
 /// The least widths of the columns, but for the last, which takes what is left.
 const WIDTHS: [usize; 6] = [5, 5, 5, 9, 10, 6];
+/// Columns that give way in a narrow terminal, in this order, and how much of the last column they leave.
+const GIVE_WAY: [usize; 4] = [5, 4, 3, 2];
+const LAST_WIDTH: usize = 16;
 /// The column in which what is left begins with words and not with numbers.
 const WORDS: [usize; 2] = [1, 6];
-/// Lines of disturbances.
+/// Lines of disturbances at most, and how many lines a terminal has for each.
 const DISTURBANCES: usize = 4;
+const LINES_EACH: usize = 5;
+/// Rows of drives that the head makes room for.
+const LEAST_ROWS: usize = 4;
 
 /// The keys in the last line, and what stands there where they have no room.
 const KEYS: &str = "  q quit  / filter  e errors  s sort  p pause  ? help";
@@ -64,12 +70,16 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
     let height = usize::from(area.height);
     let head = head(top);
     let width = usize::from(area.width);
-    let foot_room = foot(top, width).len();
-    // What does not fit into a low terminal is left out from the head first.
-    let head_room = head.len().min(height.saturating_sub(foot_room + 1));
+    let foot_room = foot(top, width, height).len();
+    // What does not fit into a low terminal is left out from the head first: its first line and its last ones stay.
+    let rows = top.rows().len().min(LEAST_ROWS);
+    let head_room = head.len().min(height.saturating_sub(foot_room + 1 + rows));
+    let left_out = head.len() - head_room;
     let room = height.saturating_sub(head_room + foot_room + 1);
     top.resize(room);
-    let mut lines: Vec<(String, Look)> = head.into_iter().take(head_room).collect();
+    let head = head.into_iter().enumerate();
+    let stays = head.filter(|(line, _)| *line == 0 && head_room > 0 || *line > left_out);
+    let mut lines: Vec<(String, Look)> = stays.map(|(_, line)| line).collect();
     if matches!(top.entry, KeyTarget::Help) {
         lines.extend(help());
         lines.truncate(height.saturating_sub(1));
@@ -78,11 +88,11 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
         let below = height.saturating_sub(foot_room);
         lines.truncate(below);
         lines.resize(below, (String::new(), Look::Plain));
-        lines.extend(foot(top, width));
+        lines.extend(foot(top, width, height));
     }
     for (y, (text, look)) in (area.y..area.bottom()).zip(&lines) {
         let style = look.style(colour);
-        buffer.set_stringn(area.x, y, text, usize::from(area.width), style);
+        buffer.set_stringn(area.x, y, cut(text.clone(), width), width, style);
         if matches!(look, Look::Reverse) {
             buffer.set_style(Rect::new(area.x, y, area.width, 1), style);
         }
@@ -92,7 +102,8 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
 /// The page as plain text, `width` columns wide and as high as needed.
 #[must_use]
 pub fn page(top: &mut Top, width: u16) -> String {
-    let height = head(top).len() + foot(top, width.into()).len() + 1 + top.rows().len();
+    let foot = foot(top, width.into(), usize::MAX);
+    let height = head(top).len() + foot.len() + 1 + top.rows().len();
     let area = Rect::new(0, 0, width, u16::try_from(height).unwrap_or(u16::MAX));
     let mut buffer = Buffer::empty(area);
     render(top, false, area, &mut buffer);
@@ -193,10 +204,11 @@ fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
             of_rows.max().unwrap_or(0).max(*least)
         })
         .collect();
+    let shown = shown_columns(&widths, width);
     let line = |cells: [&str; 7]| {
-        let padded = cells.iter().enumerate().map(|(column, cell)| {
-            let width = widths.get(column).copied().unwrap_or(0);
-            match WORDS.contains(&column) {
+        let padded = shown.iter().map(|column| {
+            let (cell, width) = (cells[*column], widths.get(*column).copied().unwrap_or(0));
+            match WORDS.contains(column) {
                 true => format!("{cell:width$}"),
                 false => format!("{cell:>width$}"),
             }
@@ -224,6 +236,18 @@ fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
     lines
 }
 
+/// The columns that a terminal has room for: all that leave enough for the error.
+fn shown_columns(widths: &[usize], width: usize) -> Vec<usize> {
+    let mut shown: Vec<usize> = (0..COLUMNS.len()).collect();
+    for gone in GIVE_WAY {
+        let before = shown.iter().filter_map(|column| widths.get(*column));
+        if before.map(|own| own + 2).sum::<usize>() + LAST_WIDTH > width {
+            shown.retain(|column| *column != gone);
+        }
+    }
+    shown
+}
+
 /// What does not fit ends with three dots.
 fn cut(text: String, width: usize) -> String {
     if text.chars().count() <= width {
@@ -241,14 +265,15 @@ fn look(row: &TopRow) -> Look {
     }
 }
 
-fn foot(top: &Top, width: usize) -> Vec<(String, Look)> {
+fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
     let several = top.heading.rings.len() > 1;
     let mut all: Vec<_> = top.disturbances().collect();
+    let room = DISTURBANCES.min(height / LINES_EACH);
     // The latest first.
     all.sort_by_key(|one| std::cmp::Reverse(one.last));
     let mut lines: Vec<(String, Look)> = all
         .iter()
-        .take(DISTURBANCES)
+        .take(room)
         .map(|one| {
             let ring = match several {
                 true => format!("ring {}: ", one.ring + 1),
@@ -259,10 +284,15 @@ fn foot(top: &Top, width: usize) -> Vec<(String, Look)> {
                 n => format!(" {n} times, last"),
             };
             let text = format!("{ring}{}{times} at {}", one.what, clock(one.last));
+            // How often comes first where not all of it can be read.
+            let text = match text.chars().count() <= width {
+                true => text,
+                false => format!("{ring}{} times: {}", one.count, one.what),
+            };
             (text, Look::Error)
         })
         .collect();
-    let hidden = all.len().saturating_sub(DISTURBANCES) as u64 + top.reading.others;
+    let hidden = all.iter().skip(room).map(|one| one.count).sum::<u64>() + top.reading.others;
     if hidden > 0 {
         lines.push((format!("and {hidden} other disturbances"), Look::Error));
     }

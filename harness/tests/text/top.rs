@@ -174,6 +174,36 @@ fn a_page_of_a_common_terminal() {
     kept("hundred-80x24.txt", &drawn(&mut hundred(), 80, 24));
 }
 
+/// The error of a drive can be read beside its number and its state, and what is hidden is counted as often as it was.
+#[test]
+fn a_page_of_a_very_small_terminal() {
+    let page = drawn(&mut of_four(), 40, 10);
+    assert!(page.contains("0508 NBtimeout"), "{page}");
+    kept("four-40x10.txt", &page);
+    let mut reading = four();
+    for number in 0..6 {
+        for _ in 0..=number {
+            reading.disturbed(0, format!("what was disturbed in way {number}"));
+        }
+    }
+    let mut top = of_four();
+    top.take(reading);
+    let page = drawn(&mut top, 40, 10);
+    // Of 3 and 21 disturbances two kinds are shown.
+    let shown: u64 = page
+        .lines()
+        .filter_map(|line| line.split_once(" times"))
+        .filter_map(|(before, _)| before.rsplit(' ').next()?.parse::<u64>().ok())
+        .sum();
+    let hidden = page.lines().find_map(|line| {
+        let rest = line.strip_prefix("and ")?;
+        rest.split(' ').next()?.parse::<u64>().ok()
+    });
+    // The second one was there once.
+    assert_eq!(shown + 1 + hidden.expect("hidden ones"), 24, "{page}");
+    kept("many-40x10.txt", &page);
+}
+
 #[test]
 fn a_page_of_a_large_terminal() {
     kept("four-120x40.txt", &drawn(&mut of_four(), 120, 40));

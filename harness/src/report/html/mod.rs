@@ -12,18 +12,16 @@
 //! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
 //! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
 //! | `sequence.rs` | what the master and the drives of a shared line said, one after another |
-//! | `curve.rs` | values against time |
+//! | `../chart` | values against time |
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
 
-mod curve;
 mod page;
 mod scenario;
 pub(crate) mod sequence;
 mod summary;
 
 pub use crate::html::{Attribute, Html};
-pub(crate) use curve::Curve;
 pub use page::{FoldedPart, MAX_PAGE, Section, page};
 pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;

@@ -7,7 +7,10 @@ use sha2::{Digest, Sha256};
 pub const MAX_PAGE: usize = 1_990_000;
 
 /// How things look.
-const STYLE: &str = include_str!("style.css");
+const STYLE: &str = concat!(
+    include_str!("style.css"),
+    include_str!("../chart/style.css")
+);
 /// What the page does when it is pointed at.
 const SCRIPT: &str = include_str!("script.js");
 

@@ -293,27 +293,81 @@
   document.addEventListener("wheel", close, { passive: true });
   document.addEventListener("pointerdown", (event) => event.target.closest("svg") || close());
 
-  // A curve: a line at the sample next to the pointer, and its time and value.
+  // Curves: a cursor at the sample next to the pointer, moved by the arrow keys too, with its time and the value of each curve there.
   const curve = (root) => {
-    const { points } = JSON.parse(root.querySelector("script").textContent);
-    const svg = root.querySelector("svg");
-    const line = make("path", svg, { class: "cursor", visibility: "hidden" });
-    svg.addEventListener("pointermove", (event) => {
+    const data = JSON.parse(root.querySelector("script").textContent);
+    const svg = root.querySelector(".chart");
+    // Where the panels stand in the window: the values on the axis are left of them.
+    const panels_box = () => {
       const box = svg.getBoundingClientRect();
-      const x = ((event.clientX - box.left) * svg.viewBox.baseVal.width) / box.width;
-      const near = points.reduce((best, own) => (Math.abs(own[0] - x) < Math.abs(best[0] - x) ? own : best), points[0]);
-      if (!near) return;
-      line.setAttribute("d", "M" + near[0] + " 12V162M" + (near[0] - 3) + " " + near[1] + "h6");
+      const [left, right] = ["paddingLeft", "paddingRight"].map((own) => parseFloat(getComputedStyle(svg)[own]));
+      return { left: box.left + left, width: box.width - left - right };
+    };
+    const times = [...new Set(data.curves.flatMap((own) => own.at))].sort((a, b) => a - b);
+    if (times.length === 0) return;
+    const line = make("path", svg, { class: "cursor", visibility: "hidden" });
+    const said = make("p", root, { class: "said", role: "status" });
+    let place = -1;
+    const clock = (at) => (at / data.per).toFixed(data.decimals) + " " + data.unit;
+    // The first place of a sorted list whose value is not below `at`.
+    const lower = (list, at) => {
+      let low = 0;
+      for (let high = list.length; low < high; ) {
+        const middle = (low + high) >> 1;
+        if (list[middle] < at) low = middle + 1;
+        else high = middle;
+      }
+      return low;
+    };
+    const nearest = (list, at) => {
+      const next = lower(list, at);
+      return next > 0 && (next === list.length || at - list[next - 1] < list[next] - at) ? next - 1 : next;
+    };
+    const words = (own, at) => {
+      const next = lower(own.at, at);
+      const found = own.held ? (own.at[next] === at ? next : next - 1) : nearest(own.at, at);
+      if (found < 0 || found >= own.at.length || (!own.held && Math.abs(own.at[found] - at) > own.reach)) return own.name + ": no sample";
+      const time = own.held || own.at[found] === at ? "" : " at " + clock(own.at[found]);
+      return own.name + ": " + own.words[found] + (own.unit ? " " + own.unit : "") + time;
+    };
+    const go = (to, y) => {
+      place = Math.max(0, Math.min(times.length - 1, to));
+      const at = times[place];
+      const box = panels_box();
+      const x = ((at - data.from) / (data.to - data.from)) * box.width;
+      line.setAttribute("d", data.panels.map(([top, height]) => "M" + x.toFixed(1) + " " + top + "v" + height).join(""));
       line.setAttribute("visibility", "visible");
-      tip.textContent = near[2];
+      const text = clock(at) + "\n" + data.curves.map((own) => words(own, at)).join("\n");
+      said.textContent = text.replaceAll("\n", "; ");
+      // Keys leave the curves in sight: what is said stands below them.
+      if (y === undefined) return close();
+      tip.textContent = text;
       tip.removeAttribute("hidden");
-      tip.style.left = Math.min(event.clientX + 14, innerWidth - tip.offsetWidth - 8) + "px";
-      tip.style.top = event.clientY + 18 + "px";
-    });
-    svg.addEventListener("pointerleave", () => {
+      const own = tip.getBoundingClientRect();
+      tip.style.left = Math.max(4, Math.min(box.left + x + 14, innerWidth - own.width - 8)) + "px";
+      tip.style.top = Math.min(y + 18, innerHeight - own.height - 4) + "px";
+    };
+    const hide = () => {
       line.setAttribute("visibility", "hidden");
       close();
+    };
+    const point = (event) => {
+      const box = panels_box();
+      const at = data.from + ((event.clientX - box.left) / box.width) * (data.to - data.from);
+      go(nearest(times, at), event.clientY);
+    };
+    svg.addEventListener("pointermove", point);
+    svg.addEventListener("pointerdown", point);
+    svg.addEventListener("pointerleave", hide);
+    const keys = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20, Home: -Infinity, End: Infinity };
+    root.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.altKey || event.metaKey) return;
+      if (event.key === "Escape") return hide();
+      if (!(event.key in keys)) return;
+      event.preventDefault();
+      go(place + keys[event.key]);
     });
+    root.addEventListener("blur", hide);
   };
   for (const root of document.querySelectorAll(".plot")) curve(root);
 

@@ -120,20 +120,54 @@ fn an_interrupted_command_ends_in_the_safe_state() {
     let (mut served, desk) = desk(true);
     shows(&desk, "delete-error all --move", "drive 0 is in go");
     shows(&desk, "write 0 nsoll=500rpm --move --hold", "499.88 rpm");
+    let files = ["w.csv", "w.html", "w.svg"].map(|name| desk.path(name));
     let watch = || {
-        let arguments = ["watch", "0", "nist", "--for", "30s"];
-        let mut child = desk.command(&arguments).spawn().expect("the program");
+        let arguments = "watch 0 nist --for 30s --csv w.csv --html w.html --svg w.svg";
+        let arguments: Vec<_> = arguments.split(' ').collect();
+        let mut command = desk.command(&arguments);
+        command.current_dir(desk.folder.path());
+        let mut child = command.spawn().expect("the program");
         playing(&mut child);
         child
+    };
+    // What was read until then is in the files, and nothing lies beside them.
+    let kept = || {
+        let [csv, html, svg] = files.each_ref().map(|file| {
+            let text = std::fs::read_to_string(file).expect("a file");
+            std::fs::remove_file(file).expect("a file");
+            text
+        });
+        assert!(
+            csv.starts_with("time_ms,0 nist [rpm]\n0.") && csv.contains(",499."),
+            "{csv}"
+        );
+        assert!(csv.ends_with('\n'), "{csv}");
+        let samples = format!("0 nist [rpm]: {} sample", csv.lines().count() - 1);
+        assert!(
+            html.contains(&samples) && svg.contains(&samples),
+            "{samples}"
+        );
+        let folder = std::fs::read_dir(desk.folder.path()).expect("a folder");
+        let part = folder.filter_map(Result::ok).find(|own| {
+            let name = own.file_name();
+            name.to_string_lossy().ends_with(".part")
+        });
+        assert!(part.is_none(), "{part:?}");
     };
     let child = watch();
     // A second process is refused with the holder's name.
     ended(&desk.run(&["read", "0", "nist"]), 75, "held by");
     signal(&child, "-INT");
     ended(&finish(child), 130, SAFE);
+    kept();
+    // Its motor stands now.
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    shows(&desk, "write 0 nsoll=500rpm --move --hold", "499.88 rpm");
+    std::thread::sleep(std::time::Duration::from_millis(700));
     let child = watch();
     let _gone = served.child.kill();
     ended(&finish(child), 7, "the safe state is NOT confirmed");
+    kept();
 }
 
 /// `rig check` reports the rig's state and every difference from its file.

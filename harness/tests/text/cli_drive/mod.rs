@@ -1,6 +1,7 @@
 //! The commands on a bus as a user at a machine runs them: output, refusals, exit codes.
 
 mod params;
+mod plot;
 mod scope;
 mod unitek;
 

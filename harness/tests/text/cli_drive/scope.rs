@@ -8,7 +8,7 @@ fn scope_of_a_run_up() {
     let folder = folder("scope");
     let arguments: Vec<_> =
         "scope 0 nist nsollrampe --trigger nist --level 100rpm --time-base 864us \
-        --delay -5ms --then nsoll=1500rpm --move --csv s.csv"
+        --delay -5ms --then nsoll=1500rpm --move --csv s.csv --html s.html --svg s.svg"
             .split_whitespace()
             .collect();
     let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
@@ -23,6 +23,18 @@ fn scope_of_a_run_up() {
         "\nthe trigger is at 5.184 ms\n",
     ] {
         assert!(stdout.contains(part), "{part}\n{stdout}");
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
+    for drawn in [read("s.html"), read("s.svg")] {
+        assert!(
+            drawn.contains("Oscilloscope of drive 0")
+                && drawn.contains("Times count from the trigger."),
+            "{drawn}"
+        );
+        assert!(
+            drawn.contains("0 nist [rpm]: 128 samples") && drawn.contains(">1500</text>"),
+            "{drawn}"
+        );
     }
     let csv = std::fs::read_to_string(folder.join("s.csv")).expect("a file");
     let lines: Vec<_> = csv.lines().collect();

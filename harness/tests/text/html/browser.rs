@@ -19,7 +19,7 @@ fn middle(browser: &mut Browser, link: usize, row: usize) -> (f64, f64) {
 }
 
 const TIP: &str = "document.querySelector('.tip:not([hidden])')?.textContent ?? ''";
-const SAID: &str = "document.querySelector('.said').textContent";
+const SAID: &str = "document.querySelector('.ring .said').textContent";
 
 /// The browser with the page of the parity error of ND21 9.7, its diagram ready.
 fn opened(name: &str) -> Option<Browser> {

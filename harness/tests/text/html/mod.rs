@@ -1,6 +1,7 @@
 //! The page of a run: its structure, its bounds, text that would be markup, and what a browser makes of it.
 
 mod browser;
+mod curves;
 mod devtools;
 mod hostile;
 mod pages;

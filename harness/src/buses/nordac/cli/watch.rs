@@ -9,7 +9,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::watch::{WatchBench, WatchedCell, check_times, watch as show};
+use crate::cli::watch::{WatchBench, WatchedCell, watch as show};
 use harness_proto::time::{Instant, Span};
 
 /// Shows values, a line each time.
@@ -19,20 +19,21 @@ pub(super) fn watch(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells).map_err(Failure::refused)?;
-    check_times(arguments)?;
     let as_what = Use::look("watch");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
-        let mut driver = driver(session);
-        for slave in &slaves {
-            driver.join(*slave)?;
-        }
-        let mut watched = WatchedSlaves {
-            driver,
-            slaves: &slaves,
-            cells: &cells,
-        };
-        show(arguments, &mut watched, output)
+    show(arguments, output, |readings, output| {
+        on(bench, &arguments.rig, as_what, output, |session, output| {
+            let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
+            let mut driver = driver(session);
+            for slave in &slaves {
+                driver.join(*slave)?;
+            }
+            let mut watched = WatchedSlaves {
+                driver,
+                slaves: &slaves,
+                cells: &cells,
+            };
+            readings.show(&mut watched, output)
+        })
     })
 }
 

@@ -2,7 +2,8 @@
 
 use super::telegrams::said;
 use super::words::Reader;
-use crate::report::html::{Curve, Html};
+use crate::report::chart::{Chart, Curve};
+use crate::report::html::Html;
 use harness_proto::nordac::words::{State, stw};
 use harness_proto::time::Instant;
 use harness_sim::record::Trace;
@@ -30,24 +31,36 @@ pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
     let courses = courses(trace);
     let mut drawn = false;
     for (slave, course) in &courses {
-        let values = [("HSW", &course.setpoints), ("HIW", &course.actuals)];
-        let all = values.iter().flat_map(|(_, points)| points.iter());
-        let ends = all.fold((f64::INFINITY, 0.0), |(from, to): (f64, f64), (at, _)| {
-            (from.min(*at), to.max(*at))
-        });
-        for (name, points) in values.into_iter().filter(|(_, own)| own.len() >= LEAST) {
+        // The setpoint holds up to the next one; actual values are samples.
+        let values = [
+            ("HSW", true, &course.setpoints),
+            ("HIW", false, &course.actuals),
+        ];
+        let drawable = values.into_iter().filter(|own| own.2.len() >= LEAST);
+        let curves: Vec<_> = drawable
+            .map(|(name, held, points)| Curve {
+                name: format!("slave {slave} {name}"),
+                unit: "%".to_owned(),
+                held,
+                points: points
+                    .iter()
+                    .map(|(at, value)| (*at, Some(*value)))
+                    .collect(),
+                ..Curve::default()
+            })
+            .collect();
+        if !curves.is_empty() {
             drawn = true;
-            let title = format!("slave {slave} {name}");
+            let title = format!("slave {slave}: setpoint and actual value");
             html.element("figure", &[], |html| {
                 html.line("figcaption", &[], &title);
-                Curve {
-                    id: &format!("{id}-{slave}-{name}"),
-                    title: &format!("{title} against time"),
-                    along: &|at| format!("{at:.3} ms"),
-                    upwards: &|value| format!("{value:.1} %"),
-                    steps: name == "HSW",
+                Chart {
+                    id: &format!("{id}-{slave}"),
+                    title: &title,
+                    curves: &curves,
+                    ..Chart::default()
                 }
-                .draw(html, points, ends);
+                .draw(html);
             });
         }
         if course.states.len() > 1 {

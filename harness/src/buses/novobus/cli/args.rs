@@ -4,6 +4,7 @@ use super::axes::Axes;
 use super::rig::{OpenBench, RigName};
 use super::sim::{SIM_HELP, SimArguments};
 use crate::buses::CyclicCommand;
+use crate::cli::drawing::DrawingArguments;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
@@ -24,7 +25,10 @@ does not report is null.";
 
 const WATCH_FORM: &str = "\
 With --format csv the first line names the columns: time_ms, then each cell with its unit, such as `0 nist [rpm]`. A column
-marked [hex] holds hexadecimal digits. A value without a meaning in the manual is empty.";
+marked [hex] holds hexadecimal digits. A value without a meaning in the manual is empty.
+
+--csv, --html and --svg write their files when the time is over and after Ctrl-C; --csv FILE has the lines of --format csv,
+whatever is shown. The values of a line are read one after another; its time is when the first one was asked for.";
 
 const TOP_KEYS: &str = "\
 Keys: q or Esc quit, / filter by text, e only drives in error, s sort, p pause, arrows and PgUp/PgDn scroll, ? help.
@@ -257,6 +261,12 @@ pub struct WatchArguments {
     /// Output format.
     #[arg(long, value_enum, default_value_t = WatchForm::Text)]
     pub format: WatchForm,
+    /// Also write the columns of `--format csv` into this file.
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Files of curves.
+    #[command(flatten)]
+    pub drawing: DrawingArguments,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
@@ -371,6 +381,9 @@ pub struct ScopeArguments {
     /// Also write the measurements into this file.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+    /// Files of curves.
+    #[command(flatten)]
+    pub drawing: DrawingArguments,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,

@@ -12,6 +12,8 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
+use crate::cli::plot::read::SCOPE_HEADING;
+use crate::report::chart::{Chart, Curve};
 use crate::report::plot::plot;
 use crate::scenario::argument::{MemoryRange, assignments};
 use crate::scenario::run::{CellRecord, Sample};
@@ -31,6 +33,7 @@ struct Recording<'a> {
 /// Records signals.
 pub(crate) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<Exit, Failure> {
     let names = [Some(&arguments.signal1), arguments.signal2.as_ref()];
+    arguments.drawing.check()?;
     let signals = names
         .into_iter()
         .flatten()
@@ -73,6 +76,20 @@ fn record(
     if let Some(path) = &arguments.csv {
         file::write(path, &recording.csv())?;
     }
+    let curves = recording.curves();
+    let zero = match recording.first() {
+        None => "the start of the recording",
+        Some(_) => "the trigger",
+    };
+    arguments.drawing.write(&Chart {
+        id: "scope",
+        title: &format!("Oscilloscope of drive {axis}"),
+        note: &format!(
+            "Times count from {zero}. The drive records the high byte of a value only (ND21 14.10.6.1)."
+        ),
+        curves: &curves,
+        ..Chart::default()
+    })?;
     Ok(Exit::Passed)
 }
 
@@ -181,18 +198,45 @@ impl Recording<'_> {
         Some(periods * i64::from(self.period()))
     }
 
+    /// The signals as curves; time 0 is the trigger, or the start where there is none.
+    #[expect(clippy::cast_precision_loss, reason = "microseconds of a recording")]
+    fn curves(&self) -> Vec<Curve> {
+        let first = self.first().unwrap_or(0);
+        let curve = |(index, signal): (usize, &Signal)| {
+            let points = self.of(index).map(|(place, byte)| {
+                let us = first + i64::from(place) * i64::from(self.period());
+                (us as f64 / 1e3, self.found(signal, byte).number().as_f64())
+            });
+            Curve {
+                name: format!("{} {}", self.axis, signal.location.name()),
+                unit: signal
+                    .location
+                    .scale
+                    .map_or_else(String::new, |scale| scale.unit().to_owned()),
+                points: points.collect(),
+                ..Curve::default()
+            }
+        };
+        self.signals.iter().enumerate().map(curve).collect()
+    }
+
+    /// A measurement as a cell: its byte is the highest.
+    fn found<'s>(&self, signal: &'s Signal, byte: u8) -> CellFound<'s> {
+        CellFound {
+            axis: self.axis,
+            location: &signal.location,
+            bytes: signal.bytes(byte),
+            units: self.units,
+        }
+    }
+
     fn csv(&self) -> String {
-        let mut text = "time_us,signal,name,raw,value,unit\n".to_owned();
+        let mut text = format!("{SCOPE_HEADING}\n");
         let first = self.first().unwrap_or(0);
         let mut rows = Vec::new();
         for (index, signal) in self.signals.iter().enumerate() {
             for (place, byte) in self.of(index) {
-                let found = CellFound {
-                    axis: self.axis,
-                    location: &signal.location,
-                    bytes: signal.bytes(byte),
-                    units: self.units,
-                };
+                let found = self.found(signal, byte);
                 let number = found.number();
                 let value = if number.is_null() {
                     String::new()

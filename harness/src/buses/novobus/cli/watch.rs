@@ -8,7 +8,7 @@ use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::watch::{HEX, WatchBench, WatchedCell, check_times, watch as show};
+use crate::cli::watch::{HEX, WatchBench, WatchedCell, watch as show};
 use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::{Instant, Span};
@@ -16,20 +16,21 @@ use harness_proto::time::{Instant, Span};
 /// Shows values, a line each time.
 pub(crate) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells)?;
-    check_times(arguments)?;
     let look = Use::look("watch");
-    rig::on(&arguments.rig, look, output, |bench, output| {
-        let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
-        let drives = axes
-            .into_iter()
-            .map(|axis| Ok((axis, bench.units(axis)?)))
-            .collect::<Result<Vec<_>, Failure>>()?;
-        let mut watched = WatchedCells {
-            bench,
-            drives: &drives,
-            cells: &cells,
-        };
-        show(arguments, &mut watched, output)
+    show(arguments, output, |readings, output| {
+        rig::on(&arguments.rig, look, output, |bench, output| {
+            let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
+            let drives = axes
+                .into_iter()
+                .map(|axis| Ok((axis, bench.units(axis)?)))
+                .collect::<Result<Vec<_>, Failure>>()?;
+            let mut watched = WatchedCells {
+                bench,
+                drives: &drives,
+                cells: &cells,
+            };
+            readings.show(&mut watched, output)
+        })
     })
 }
 

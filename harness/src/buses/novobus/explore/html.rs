@@ -2,7 +2,7 @@
 
 use crate::counted::counted;
 use crate::explore::{FuzzSettings, Progress};
-use crate::report::html::Curve;
+use crate::report::chart::{Along, Chart, Curve, Points};
 use crate::report::html::Html;
 use crate::report::html::ShownScenario;
 use crate::report::html::{Section, page};
@@ -124,46 +124,50 @@ fn findings(html: &mut Html, all: &[ShownScenario]) {
     });
 }
 
+fn curve(name: &str, held: bool, points: Points) -> Curve {
+    Curve {
+        name: name.to_owned(),
+        held,
+        points,
+        ..Curve::default()
+    }
+}
+
+fn figure(html: &mut Html, title: &str, (id, along, end): (&str, Along, f64), curve: Curve) {
+    html.element("figure", &[], |html| {
+        html.line("figcaption", &[], title);
+        Chart {
+            id,
+            title,
+            along,
+            ends: Some((0.0, end)),
+            curves: &[curve],
+            ..Chart::default()
+        }
+        .draw(html);
+    });
+}
+
 #[expect(clippy::cast_precision_loss, reason = "points of a curve")]
 fn course(html: &mut Html, run: &Explored<'_>) {
     let last = run.history.last().copied().unwrap_or_default();
-    let executions: Vec<_> = run
+    let executions = run
         .history
         .iter()
-        .map(|progress| (seconds(progress.wire_ns), progress.cases as f64))
-        .collect();
-    let features: Vec<_> = run
+        .map(|progress| (seconds(progress.wire_ns) * 1e3, Some(progress.cases as f64)));
+    let features = run
         .features
         .iter()
-        .map(|(cases, all)| (*cases as f64, *all as f64))
-        .collect();
-    let whole = |value: f64| format!("{value:.0}");
-    html.element("figure", &[], |html| {
-        html.line("figcaption", &[], "Cases against the time on the line");
-        let along = |at: f64| format!("{at:.3} s");
-        let upwards = |value: f64| format!("{value:.0} cases");
-        let curve = Curve {
-            id: "executions",
-            title: "Cases against the time on the line",
-            along: &along,
-            upwards: &upwards,
-            steps: false,
-        };
-        curve.draw(html, &executions, (0.0, seconds(last.wire_ns)));
-    });
-    if !features.is_empty() {
-        html.element("figure", &[], |html| {
-            html.line("figcaption", &[], "Features seen against cases");
-            let title = "Features of the bus seen against cases";
-            let curve = Curve {
-                id: "features",
-                title,
-                along: &whole,
-                upwards: &whole,
-                steps: true,
-            };
-            curve.draw(html, &features, (0.0, last.cases as f64));
-        });
+        .map(|(cases, all)| (*cases as f64, Some(*all as f64)));
+    let title = "Cases against the time on the line";
+    let end = seconds(last.wire_ns) * 1e3;
+    let cases = curve("cases", false, executions.collect());
+    figure(html, title, ("executions", Along::Time, end), cases);
+    if !run.features.is_empty() {
+        let title = "Features of the bus seen against cases";
+        let end = last.cases as f64;
+        let seen = curve("features", true, features.collect());
+        figure(html, title, ("features", Along::Count("cases"), end), seen);
     }
     progress(html, run.history);
 }

@@ -1,6 +1,7 @@
 //! Recorded cells against time: a curve each, one below the other over the same times.
 
-use crate::report::html::{Curve, Html};
+use crate::report::chart::{Chart, Curve};
+use crate::report::html::Html;
 use crate::scenario::quantity::figures;
 use crate::scenario::run::{CellRecord, Sample};
 use harness_proto::nd21::bits;
@@ -27,28 +28,17 @@ pub(crate) fn lines(html: &mut Html, id: &str, records: &[CellRecord]) {
         };
         html.element("figure", &[], |html| {
             html.line("figcaption", &[], &title);
-            let known: Vec<_> = record
-                .samples
-                .iter()
-                .filter_map(|sample| Some((ms(sample), record.value(sample)?)))
-                .collect();
-            match ends {
-                Some(ends) if !known.is_empty() => {
-                    let value = |value: f64| {
-                        format!("{} {unit}", figures(value, unit))
-                            .trim_end()
-                            .to_owned()
-                    };
-                    Curve {
-                        id: &format!("{id}-r{number}"),
-                        title: &format!("{title} against time"),
-                        along: &|at| format!("{at:.3} ms"),
-                        upwards: &value,
-                        steps: record.every.is_none(),
-                    }
-                    .draw(html, &known, ends);
+            let curves = [curve(record)];
+            match curves[0].known().next().is_some() {
+                true => Chart {
+                    id: &format!("{id}-r{number}"),
+                    title: &format!("{title} against time"),
+                    ends,
+                    curves: &curves,
+                    ..Chart::default()
                 }
-                _ => html.line("p", &[], "Nothing was seen."),
+                .draw(html),
+                false => html.line("p", &[], "Nothing was seen."),
             }
             table(html, record);
         });
@@ -59,6 +49,21 @@ pub(crate) fn lines(html: &mut Html, id: &str, records: &[CellRecord]) {
             &[("class", &"note")],
             format_args!("{} more are not shown.", records.len() - MOST),
         );
+    }
+}
+
+/// A record as a curve.
+pub(crate) fn curve(record: &CellRecord) -> Curve {
+    let ring = if record.ring == 0 { "" } else { "2:" };
+    let samples = record.samples.iter();
+    Curve {
+        name: format!("{ring}{} {}", record.drive, record.name),
+        unit: record.unit().to_owned(),
+        held: record.every.is_none(),
+        points: samples
+            .map(|sample| (ms(sample), record.value(sample)))
+            .collect(),
+        ..Curve::default()
     }
 }
 

@@ -8,7 +8,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::watch::{HEX, WatchBench, WatchedCell, check_times, decimal, watch as show};
+use crate::cli::watch::{HEX, WatchBench, WatchedCell, decimal, watch as show};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Register;
 use harness_proto::unitek::units::{usual, value};
@@ -20,16 +20,17 @@ pub(super) fn watch(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let registers = registers(&arguments.cells).map_err(Failure::refused)?;
-    check_times(arguments)?;
     let as_what = Use::look("watch");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let drives = select(std::slice::from_ref(&arguments.drives), session)?;
-        let mut watched = WatchedRegisters {
-            session,
-            drives: &drives,
-            registers: &registers,
-        };
-        show(arguments, &mut watched, output)
+    show(arguments, output, |readings, output| {
+        on(bench, &arguments.rig, as_what, output, |session, output| {
+            let drives = select(std::slice::from_ref(&arguments.drives), session)?;
+            let mut watched = WatchedRegisters {
+                session,
+                drives: &drives,
+                registers: &registers,
+            };
+            readings.show(&mut watched, output)
+        })
     })
 }
 

@@ -1,8 +1,9 @@
 //! Registers that a drive has sent several times, as curves against time.
 
-use crate::report::html::{Curve, Html};
-use harness_proto::unitek::register::Unit;
-use harness_proto::unitek::units::{Scaling, shown, usual};
+use crate::buses::unitek::value::bits;
+use crate::report::chart::{Chart, Curve, HEX, Points};
+use crate::report::html::Html;
+use harness_proto::unitek::units::{Scaling, usual, value};
 use harness_proto::unitek::{Data, Register, Reply};
 use harness_sim::record::{FrameEnd, Trace};
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ const MOST: usize = 20;
 
 /// Writes a curve for each register that a drive has sent at least five times; false where there is none.
 pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
-    let mut found: BTreeMap<(u8, u8), Vec<(f64, f64)>> = BTreeMap::new();
+    let mut found: BTreeMap<(u8, u8), Points> = BTreeMap::new();
     for frame in trace.channels.iter().flat_map(|channel| channel.frames()) {
         let own = u16::try_from(frame.frame.id().number()).unwrap_or(0);
         let good = frame.ended == FrameEnd::Good;
@@ -42,14 +43,20 @@ pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
         let title = format!("drive {drive} {number:02X} {}", register.name);
         html.element("figure", &[], |html| {
             html.line("figcaption", &[], &title);
-            Curve {
+            Chart {
                 id: &format!("{id}-{drive}-{number:02X}"),
                 title: &format!("{title} against time"),
-                along: &|at| format!("{at:.3} ms"),
-                upwards: &|value| words(register, value),
-                steps: true,
+                ends: Some(ends),
+                curves: &[Curve {
+                    name: title.clone(),
+                    unit: unit(register).to_owned(),
+                    held: true,
+                    points: points.clone(),
+                    ..Curve::default()
+                }],
+                ..Chart::default()
             }
-            .draw(html, points, ends);
+            .draw(html);
         });
     }
     if found.len() > MOST {
@@ -63,29 +70,30 @@ pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
     !found.is_empty()
 }
 
-fn number(register: &Register, data: Data) -> f64 {
+/// The unit of a register's values.
+fn unit(register: &Register) -> &'static str {
+    match usual(register.unit) {
+        Some(unit) => unit.name(),
+        None if bits(register.unit).is_empty() => "",
+        None => HEX,
+    }
+}
+
+/// A register's value in [`unit`].
+fn number(register: &Register, data: Data) -> Option<f64> {
     let raw = match data {
         Data::Short(value) => register.extend(value),
         Data::Long(value) => value,
     };
-    let low = i32::try_from(raw & 0xFFFF).unwrap_or(0);
-    match register.unit {
-        Unit::Ramp => low.into(),
-        _ => register.number_of(raw & register.mask()) as f64,
-    }
-}
-
-/// A value with its unit; a plain number for words of bits.
-fn words(register: &Register, value: f64) -> String {
-    // A value of the drive is drawn: it has at most 32 bits.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a whole number of at most 32 bits"
-    )]
-    let raw = (value as i64 & 0xFFFF_FFFF) as u32 & register.mask();
-    usual(register.unit)
-        .and_then(|unit| shown(register, raw, unit, Scaling::default()))
-        .map_or_else(|| format!("{value}"), |shown| shown.to_string())
+    let raw = raw & register.mask();
+    let plain = match unit(register) {
+        HEX => f64::from(raw),
+        _ => register.number_of(raw) as f64,
+    };
+    let own = usual(register.unit);
+    own.map_or(Some(plain), |unit| {
+        value(register, raw, unit, Scaling::default())
+    })
 }
 
 #[cfg(test)]
@@ -95,9 +103,9 @@ mod tests {
     #[test]
     fn values_keep_their_sign_and_unit() {
         let speed = Register::of(0x30);
-        assert!((number(speed, Data::Short(0x8001)) + 32767.0).abs() < 0.5);
-        assert_eq!(words(speed, -32767.0), "-100.0%");
-        assert_eq!(words(Register::of(0x6D), 65536.0), "1.000 turns");
-        assert_eq!(words(Register::of(0xE2), 1.0), "1");
+        let value = number(speed, Data::Short(0x8001)).expect("a value");
+        assert!((value + 100.0).abs() < 0.01, "{value}");
+        assert_eq!(unit(speed), "%");
+        assert_eq!(unit(Register::of(0x40)), HEX);
     }
 }
