@@ -88,22 +88,12 @@ pub(super) fn again(
     };
     let size = header.way.rings.first().map(|ring| ring.drives());
     let entry = Entry::fitting(source, size).map_err(|problems| problems.to_string());
-    if header.own_rings
-        && let Ok(Entry {
-            other: Some(plan), ..
-        }) = &entry
-    {
-        return simulated_again(recorded, &**plan);
-    }
     let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
     let mut plan = match plan {
         Ok(plan) if plan.rings == header.way.rings => plan,
         Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
         Err(why) => return Again::impossible(why),
     };
-    if header.own_rings {
-        return simulated_again(recorded, &plan);
-    }
     let own = rig.plan().ok().and_then(|rig| rig.master);
     plan.master = own.or(plan.master);
     let mut replay = Replay::new(
@@ -216,6 +206,26 @@ pub(super) fn again_on_segment(
         trouble: judged.trouble,
         ended: Ended::of(&recorded.events),
     })
+}
+
+/// Plays an attempt again on a simulated bench of its own.
+pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, header: &Header) -> Again {
+    let source = Source {
+        name: recorded.name.clone(),
+        text: text.to_owned().into(),
+    };
+    let rings = &header.way.rings;
+    let size = rings.first().map(|ring| ring.drives());
+    match Entry::fitting(source, size) {
+        Err(problems) => Again::impossible(problems.to_string()),
+        Ok(entry) => match (&entry.plan, entry.settled()) {
+            (Some(plan), _) if plan.rings != *rings => {
+                Again::impossible("it is for other rings than the rig has".to_owned())
+            }
+            (_, Some(plan)) => simulated_again(recorded, plan),
+            (_, None) => Again::impossible("no scenario of this bus".to_owned()),
+        },
+    }
 }
 
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.

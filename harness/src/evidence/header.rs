@@ -163,7 +163,13 @@ pub(super) fn header(
             purposes.join(" or "),
         );
     }
-    let bare_run = rig.is_bare() && stated == Some("run");
+    // What `sim:unitek:1` names and a file that says the same look alike in the folder. What was recorded on benches of their own must come
+    // again in any case.
+    let bare = match rig.port() {
+        Some(_) => rig.is_simulated() && *own_rings,
+        None => rig.is_bare(),
+    };
+    let bare_run = bare && stated == Some("run");
     if *schema > 1 && *own_rings != bare_run {
         must("`own_rings`", own_rings.to_string(), bare_run.to_string());
     }

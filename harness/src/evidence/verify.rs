@@ -1,6 +1,8 @@
 //! Every verdict of a folder, judged again from its record, and everything that follows from the record compared.
 
-use super::attempt::{Again, Recalled, Recorded, UNUSED, again, again_on_segment};
+use super::attempt::{
+    Again, Recalled, Recorded, UNUSED, again, again_on_own_bench, again_on_segment,
+};
 use super::cases;
 use super::derive::derived;
 use super::files::{
@@ -222,6 +224,9 @@ impl Opened {
     ) -> Result<Vec<Judged>, EvidenceError> {
         match self.segment_judge() {
             Some(mut judge) => Ok(self.judged_on_segment(judge.as_mut(), scenario)),
+            None if self.header.own_rings => Ok(self.judged_each(scenario, |recorded, text| {
+                Ok(again_on_own_bench(recorded, text, &self.header))
+            })),
             None => self.judged_on_rings(scenario),
         }
     }
@@ -291,12 +296,23 @@ impl Opened {
         judge: &mut dyn SegmentJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Vec<Judged> {
+        self.judged_each(scenario, |recorded, text| {
+            again_on_segment(recorded, text, judge)
+        })
+    }
+
+    /// Judges every attempt again, each for itself.
+    fn judged_each(
+        &self,
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+        mut again: impl FnMut(&Recorded, &str) -> Result<Again, String>,
+    ) -> Vec<Judged> {
         let attempts = group(&self.lines[1..]).into_iter();
         attempts
             .map(|recorded| {
                 let text = text_of(&recorded.name, &recorded.sha256, scenario);
                 let again = text.and_then(|text| {
-                    let again = again_on_segment(&recorded, &text, judge)?;
+                    let again = again(&recorded, &text)?;
                     Ok((text, again))
                 });
                 let differs = match &again {

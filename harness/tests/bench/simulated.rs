@@ -243,6 +243,36 @@ fn changes_no_verdict(chapters: &[(&str, u8)]) {
     ended(&verify(&kept), 1, "the simulated rings give");
 }
 
+/// The same where each scenario has drives of another bus of its own; and an edited record is found.
+#[test]
+fn evidence_of_benches_of_other_buses_is_verified() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (number, (rig, name)) in [
+        ("sim:unitek:1", "unitek-ex-1-not-stored"),
+        ("sim:nordac", "nordac-open-zsw11-at-rest-0"),
+        ("sim:nordac:1", "nordac-open-zsw11-at-rest-0"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let kept = folder.path().join(number.to_string());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(["run", name, "--rig", rig, "--evidence"]);
+        ended(
+            &command.arg(&kept).output().expect("the program"),
+            0,
+            "1 passed",
+        );
+        ended(&verify(&kept), 0, "0 things wrong");
+        let record = kept.join("run.jsonl");
+        let text = std::fs::read_to_string(&record).expect("a record");
+        let changed = text.replacen("\"passed\"", "\"failed\"", 1);
+        assert_ne!(changed, text);
+        std::fs::write(&record, changed).expect("room");
+        ended(&verify(&kept), 1, "");
+    }
+}
+
 /// The same on a simulated rig with drives of its own, where all scenarios share them; and the table shows the scenario's bytes.
 #[test]
 fn a_rig_with_drives_of_its_own_fails_alike() {
