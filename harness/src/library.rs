@@ -356,6 +356,6 @@ mod tests {
             }
         }
         assert_eq!(wrong, [""; 0]);
-        assert!(ends > 100, "{ends} ends of ranges");
+        assert!(ends > 50, "{ends} ends of ranges");
     }
 }

@@ -5,6 +5,8 @@ use super::capture::CaptureArguments;
 use super::exit::Exit;
 use super::extcap::ExtcapArguments;
 use super::fuzz::FuzzCommand;
+use super::merge::MergeArguments;
+use super::plot::PlotArguments;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shell::ShellArguments;
@@ -88,7 +90,7 @@ pub enum Command {
     ///
     /// The exit code is 1 if they differ.
     Diff(DiffArguments),
-    /// Compare recorded values: draw them over the same times, and print what tells their steps apart.
+    /// Compare recorded values: draw them over the same times, and tell their steps apart.
     Plot(PlotArguments),
     /// Print the Wireshark dissector for `trace --format pcapng`.
     Dissector {
@@ -117,7 +119,7 @@ pub enum Command {
     Qualify(QualifyArguments),
     /// Repeat every verdict of an evidence folder from its recorded bytes.
     Verify(VerifyArguments),
-    /// Make one folder of evidence of the parts of a run (`run --partition`), or add the counts of the parts of campaigns.
+    /// Make one folder of evidence of the parts of a run, or add the counts of campaigns.
     ///
     /// The exit code is that of the whole run, or of the whole campaigns. It is 5 if a part is missing.
     Merge(MergeArguments),
@@ -212,7 +214,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "KEY", requires = "evidence")]
     pub sign: Option<PathBuf>,
     /// The captures in the evidence: all, failed (those of attempts that did not pass), or N (these, and every N-th that passed).
-    #[arg(long, value_name = "N", requires = "evidence")]
+    #[arg(long, value_name = "KEPT", requires = "evidence")]
     pub keep: Option<Keep>,
     /// Play one part of the selected scenarios: slice:M/N takes every N-th, hash:M/N takes them by name. `merge` joins the evidence of the parts.
     #[arg(long, value_name = "PART")]
@@ -280,20 +282,6 @@ pub struct VerifyArguments {
     /// The signer, as the file of allowed signers names them.
     #[arg(long, value_name = "ID", requires = "allowed_signers")]
     pub identity: Option<String>,
-}
-
-/// For `merge`.
-#[derive(Clone, Debug, Args)]
-pub struct MergeArguments {
-    /// The evidence folders of the parts of a run, or the files that `campaign --output` wrote.
-    #[arg(value_name = "PART", required = true)]
-    pub folders: Vec<PathBuf>,
-    /// The folder for the merged evidence, which must be new or empty, and which `verify` checks; or the file for the added counts.
-    #[arg(long, short, value_name = "PATH")]
-    pub output: PathBuf,
-    /// Let a skipped scenario make the run incomplete (exit code 5).
-    #[arg(long)]
-    pub require_all: bool,
 }
 
 /// For `report`.
@@ -381,33 +369,6 @@ pub struct ImportArguments {
     /// How it is shown and where it goes.
     #[command(flatten)]
     pub showing: TraceOutput,
-}
-
-/// What is at time 0 where recordings are compared.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PlotAlignment {
-    /// The first sample of each recording.
-    #[default]
-    First,
-    /// The trigger of each recording of `scope`.
-    Trigger,
-}
-
-/// For `plot`.
-#[derive(Clone, Debug, Args)]
-pub struct PlotArguments {
-    /// The recordings: files of `watch --csv` or `scope --csv`, or of `trace --format json` with the records of a scenario.
-    #[arg(value_name = "FILE", required = true, num_args = 1..=16)]
-    pub files: Vec<PathBuf>,
-    /// Draw them into this file: .html is a page with a cursor, .svg a picture.
-    #[arg(long, short, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// What is at time 0.
-    #[arg(long, value_enum, default_value_t = PlotAlignment::First)]
-    pub align: PlotAlignment,
-    /// Only curves with this text in their name, such as nist.
-    #[arg(long, value_name = "TEXT")]
-    pub only: Vec<String>,
 }
 
 /// For `diff`.

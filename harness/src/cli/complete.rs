@@ -144,6 +144,8 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
                     .collect()
             }
             "DRIVE" => vec!["all".to_owned()],
+            "PART" => ["slice:1/", "hash:1/"].map(str::to_owned).to_vec(),
+            "KEPT" => ["all", "failed"].map(str::to_owned).to_vec(),
             "CELL" | "SIGNAL" => cell_names(rig),
             "CELL=VALUE" => cell_names(rig)
                 .iter()

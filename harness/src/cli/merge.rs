@@ -1,6 +1,5 @@
 //! `drivebench merge`: one folder of evidence of the parts of a run. Parts that are files go to `merge_counts`.
 
-use super::args::MergeArguments;
 use super::exit::Exit;
 use super::merge_counts::merge_counts;
 use super::output::Output;
@@ -8,6 +7,22 @@ use super::tally::counts;
 use crate::counted::counted;
 use crate::evidence::{Merged, merge as join};
 use crate::scenario::verdict::Verdict;
+use clap::Args;
+use std::path::PathBuf;
+
+/// For `merge`.
+#[derive(Clone, Debug, Args)]
+pub struct MergeArguments {
+    /// The evidence folders of the parts of a run, or the files that `campaign --output` wrote.
+    #[arg(value_name = "FOLDER", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// The folder for the merged evidence, which must be new or empty, and which `verify` checks; or the file for the added counts.
+    #[arg(long, short, value_name = "PATH")]
+    pub output: PathBuf,
+    /// Let a skipped scenario make the run incomplete (exit code 5).
+    #[arg(long)]
+    pub require_all: bool,
+}
 
 /// Merges the folders of parts.
 pub(crate) fn merge(arguments: &MergeArguments, output: &mut Output) -> std::io::Result<Exit> {

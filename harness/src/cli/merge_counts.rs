@@ -1,7 +1,7 @@
 //! `drivebench merge` of files: the counts of parts of campaigns.
 
-use super::args::MergeArguments;
 use super::exit::Exit;
+use super::merge::MergeArguments;
 use super::output::Output;
 use super::page::save;
 use crate::campaign::part::{CampaignCounts, CountsError, MergedCounts, merge};

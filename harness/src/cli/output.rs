@@ -22,8 +22,11 @@ pub(crate) struct Output {
     /// Results and messages, where they are collected for an answer in place of being written.
     collected: Option<[String; 2]>,
     /// Takes results and messages in place of the streams of the process.
-    given: Option<Box<dyn Fn(Stream, &str)>>,
+    given: Option<Taker>,
 }
+
+/// Takes a text.
+type Taker = Box<dyn Fn(Stream, &str)>;
 
 /// What a text is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

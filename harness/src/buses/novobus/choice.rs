@@ -32,7 +32,7 @@ impl fmt::Display for Choice {
 }
 
 impl Choice {
-    /// It in every drive of so many rings.
+    /// It in every drive of this number of rings.
     pub(crate) fn in_all(&self, rings: usize) -> Header {
         let every = |ring| Setup::new(DriveRange::all(ring), self.setting.clone());
         (0..rings).map(every).collect()

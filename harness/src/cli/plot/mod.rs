@@ -3,16 +3,16 @@
 pub(crate) mod read;
 mod step;
 
-use super::args::{PlotAlignment, PlotArguments};
 use super::exit::Exit;
 use super::failure::Failure;
 use super::file;
 use super::output::Output;
 use crate::html::Html;
 use crate::report::chart::{Chart, Curve, MAX_CURVES, number};
+use clap::{Args, ValueEnum};
 use read::{Recording, read};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use step::{Settled, StepFigures};
 
 /// The columns of the table, and what each means.
@@ -38,6 +38,33 @@ const COLUMNS: [(&str, &str); 7] = [
          near is within 5 % of the step; not settled: it would have settled in the last tenth",
     ),
 ];
+
+/// For `plot`.
+#[derive(Clone, Debug, Args)]
+pub struct PlotArguments {
+    /// The recordings: files of `watch --csv` or `scope --csv`, or of `trace --format json` with the records of a scenario.
+    #[arg(value_name = "FILE", required = true, num_args = 1..=16)]
+    pub files: Vec<PathBuf>,
+    /// Draw them into this file: .html is a page with a cursor, .svg a picture.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// What is at time 0.
+    #[arg(long, value_enum, default_value_t = PlotAlignment::First)]
+    pub align: PlotAlignment,
+    /// Only curves with this text in their name, such as nist.
+    #[arg(long, value_name = "TEXT")]
+    pub only: Vec<String>,
+}
+
+/// What is at time 0 where recordings are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PlotAlignment {
+    /// The first sample of each recording.
+    #[default]
+    First,
+    /// The trigger of each recording of `scope`.
+    Trigger,
+}
 
 /// Draws recordings into a file, and prints what tells them apart.
 pub(crate) fn plot(arguments: &PlotArguments, output: &mut Output) -> std::io::Result<Exit> {

@@ -2,7 +2,7 @@
 
 use super::inbox::{LineWriter, RequestReader};
 use super::request::{DriveWords, SessionRequest};
-use super::{COMMANDS, SETTLED};
+use super::session::{COMMANDS, SETTLED};
 use crate::cli::args::duration;
 use crate::cli::complete::fitting;
 use crate::cli::help::command;
@@ -41,7 +41,7 @@ const OWN: [(&str, &str, &str); 6] = [
     (
         "recover",
         "recover",
-        "Bring rings out of the error mode and count their drives (ND21 9.8)",
+        "Bring rings out of the error mode and count their drives",
     ),
     ("help", "help [COMMAND]", "List the commands, or show one"),
     (
@@ -51,7 +51,7 @@ const OWN: [(&str, &str, &str); 6] = [
     ),
 ];
 
-/// Whether a request was typed, and whoever typed it waits for the prompt. Its `id` is the number of its line.
+/// Whether a request was typed, so that its person waits for the prompt. Its `id` is the number of its line.
 pub(super) fn is_typed(id: &Value) -> bool {
     id.is_number()
 }
@@ -262,11 +262,12 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
             .any(|own| own.strip_prefix("--") == Some(long))
             || own.is_global_set()
     };
-    let mut found = found.bin_name(name).mut_args(|own| {
+    let mut found = found.mut_args(|own| {
         let hide = settled(&own);
         own.hide(hide)
     });
-    Ok(found.render_help().to_string())
+    let text = found.render_help().to_string();
+    Ok(text.replace("Usage: drivebench ", "Usage: "))
 }
 
 /// What came of a request, where its command has not printed it.
@@ -384,6 +385,7 @@ impl<P: ExternalPrinter> Write for AbovePrompt<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::Bus;
 
     fn line(text: &str) -> String {
         match read_line(text) {
@@ -439,12 +441,11 @@ mod tests {
                 .map(|own| own.replacement)
                 .collect::<Vec<_>>()
         };
+        // The first bus behind the default one.
+        let other = format!("sim:{}:1", Bus::NAMES[1].0);
         assert_eq!(offered("sim:3", "pos"), ["position"]);
         assert_eq!(offered("sim:3", "read 0 nsollr"), ["nsollrampe"]);
-        assert_eq!(
-            offered("sim:unitek:1", "read 1 SPEED_ACTUAL_"),
-            ["SPEED_ACTUAL_"]
-        );
+        assert_eq!(offered(&other, "read 1 SPEED_ACTUAL_"), ["SPEED_ACTUAL_"]);
         assert!(
             offered("sim:3", "run 9.7-parity-error-").contains(&"9.7-parity-error-idle".to_owned())
         );

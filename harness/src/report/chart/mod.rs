@@ -358,8 +358,11 @@ impl Chart<'_> {
         let below: [Attribute<'_>; 2] = [("y", &bottom), ("aria-hidden", &"true")];
         html.element("svg", &below, |html| {
             let count = all.len();
+            let part = |at: f64| (at - ends.0) / (ends.1 - ends.0) * 100.0;
+            // The last one ends at the edge, over the place of the one in front of it.
+            let at_edge = all.last().is_some_and(|at| part(*at) > 97.0);
             for (number, at) in all.into_iter().enumerate() {
-                let part = (at - ends.0) / (ends.1 - ends.0) * 100.0;
+                let part = part(at);
                 let x = format!("{part:.2}%");
                 let last = number + 1 == count;
                 let mut words = label(at / per, apart, unit);
@@ -367,8 +370,9 @@ impl Chart<'_> {
                     let _infallible = write!(words, " {unit}");
                 }
                 let place = if part > 97.0 { "e" } else { "m" };
-                // Of the last two the last one stays.
-                let odd = number % 2 == 1 || number + 2 == count && count.is_multiple_of(2);
+                // Of the last two, or three, the last one stays.
+                let front = count - 1 - number;
+                let odd = number % 2 == 1 || front == 1 || front == 2 && at_edge;
                 let class = match odd && !last && number > 0 {
                     true => format!("{place} w"),
                     false => place.to_owned(),

@@ -146,6 +146,9 @@ fn campaigns_over_frames() {
     assert_eq!(both.status.code(), Some(0), "{}", stderr(&both));
     assert!(!stdout(&both).contains("unnoticed"), "{}", stdout(&both));
     let case = drivebench(&["campaign", frames, "--case", "3:lost"]);
+    assert_eq!(case.status.code(), Some(0), "{}", stderr(&case));
+    assert!(stdout(&case).contains("lost"), "{}", stdout(&case));
+    let case = drivebench(&["campaign", frames, "--case", "3:bent"]);
     assert_eq!(case.status.code(), Some(2));
     assert!(stderr(&case).contains("--format json"), "{}", stderr(&case));
     let page = file("frames", "").with_file_name("frames.html");

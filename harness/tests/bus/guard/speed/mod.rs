@@ -23,8 +23,8 @@ use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::ring::Ring;
 
 const MOST: u16 = 300;
-/// What a regulator overshoots on the ramps of the factory's EEPROM, and half a bit of a speed, in rpm.
-const OVERSHOOT: f64 = 6.0;
+/// What a regulator overshoots, by the parameters of the factory's EEPROM: up to 3.3 % of the speed, and half a bit of a speed, in rpm.
+const OVERSHOOT: f64 = 12.0;
 
 fn limits() -> Limits {
     Limits {

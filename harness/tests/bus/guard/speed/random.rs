@@ -171,6 +171,33 @@ fn piece() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
+/// A nominal speed within the limit, over which the regulator shoots by 3.2 %: the limit is one of nominal speeds.
+#[test]
+fn a_regulator_overshoots() {
+    let left = Left {
+        configuration: [0x44, 0xFF, 0x43, 0x7F],
+        ref_speeds: [0, 0],
+        vtippen: 0,
+        cells: vec![(ram::NSOLL, 0xFDD0)],
+        data_in: 8,
+        analogue: 0,
+        inputs: 0,
+    };
+    let mut line = bench(&left, limits());
+    let mut most = watch(&mut line, 20);
+    order_by_plc(&mut line, &left);
+    line.send_octets(
+        0,
+        &[byte(ram::ERRORCODE, 0xAF), and(ram::STATUS, GO)].concat(),
+    );
+    most = most.max(watch(&mut line, 360));
+    assert_eq!(line.trouble(), None);
+    assert!(
+        most > f64::from(MOST) && most <= f64::from(MOST) + OVERSHOOT,
+        "{most} rpm"
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 1_000, failure_persistence: None, ..ProptestConfig::default() })]
 

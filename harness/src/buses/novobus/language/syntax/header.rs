@@ -187,7 +187,7 @@ impl RingRange {
         }
     }
 
-    /// Whether rings of so many drives belong to it.
+    /// Whether rings of this number of drives belong to it.
     #[must_use]
     pub fn contains(&self, drives: u8) -> bool {
         (self.smallest..=self.largest).contains(&drives)
