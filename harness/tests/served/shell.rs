@@ -50,9 +50,12 @@ fn people_type_complete_and_stop() {
     says(&tty, "sim:3 (0: 99.9 rpm)> ");
     tty.keys("\x03");
     says(&tty, "drive 0 is in stop");
-    // What was typed comes back by a key.
+    // What was typed three lines ago comes back by a key.
+    tty.keys("\x1b[A\x1b[A\x1b[A\r");
+    tty.see("the mistake again", |seen| {
+        seen.first.matches("did you mean `read`?").count() == 2
+    });
     tty.keys("fault 2->1: flip 0\r");
-    tty.keys("\x1b[A\x1b[A\x1b[A\x1b[A\r");
     tty.keys("read 1 nist\r");
     says(&tty, "the link from drive 2 to drive 1 is damaged");
     tty.keys("\x04");
