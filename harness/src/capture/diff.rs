@@ -75,8 +75,8 @@ pub fn diff(left: ComparedRun<'_>, right: ComparedRun<'_>, tolerance: Span) -> S
     compare(left, right, tolerance, &|_, _, _| false, None)
 }
 
-/// The same; `ignored` says of ring, link and byte what is not compared, and bytes of the right side behind `until` that the left
-/// has not are none too many.
+/// The same; `ignored` says of ring, link and byte what is not compared, and bytes behind `until` that one side alone has are none too
+/// many.
 pub(crate) fn compare(
     left: ComparedRun<'_>,
     right: ComparedRun<'_>,
@@ -137,7 +137,9 @@ impl Pair<'_> {
         for index in 0..a.octets().len().max(b.octets().len()) {
             let (left, right) = (a.octets().get(index), b.octets().get(index));
             let late = |byte: &LineByte| self.until.is_some_and(|until| byte.at > until);
-            if left.is_none() && right.is_some_and(late) {
+            if let (Some(alone), None) | (None, Some(alone)) = (left, right)
+                && late(alone)
+            {
                 break;
             }
             summary.compared += 1;

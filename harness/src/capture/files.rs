@@ -94,12 +94,26 @@ impl Files {
         }
     }
 
+    /// What the present file holds begins at this time.
+    pub(crate) const fn begins(&mut self, at: u64) {
+        self.began = at;
+    }
+
+    /// Ends the present file.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn end(&mut self, now: u64) -> io::Result<()> {
+        self.recorder.statistics(self.began, now)?;
+        self.recorder.flush()
+    }
+
     /// Begins a new file.
     ///
     /// # Errors
     /// A file cannot be written.
     pub(crate) fn rotate(&mut self, now: u64) -> io::Result<()> {
-        self.recorder.flush()?;
+        self.end(now)?;
         self.number += 1;
         let next = numbered(&self.path, self.number);
         self.recorder = LiveRecorder::start(File::create(&next)?, &self.places)?;
@@ -119,8 +133,9 @@ impl Files {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::read;
     use crate::capture::recorder::{Carries, Piece};
+    use crate::capture::{Listened, read};
+    use harness_proto::line::Rate;
     use harness_proto::time::{Instant, Span};
     use harness_sim::record::LineByte;
 
@@ -158,11 +173,42 @@ mod tests {
         for path in &kept {
             let capture = read(&std::fs::read(path).expect("a file"), None).expect("a capture");
             assert_eq!(capture.traces[0].channels.len(), 2);
+            // The present one is not at its end.
+            assert_eq!(capture.listened.is_some(), path == &kept[0]);
         }
         let before = files.paths().count();
         files.rotate(1).expect("a new file");
         files.flush(2_000_000_000).expect("written");
         assert_eq!(files.paths().count(), before);
         assert!(files.paths().last().is_some_and(|own| own != kept[1]));
+    }
+    /// A file says for how long the line was listened to in front of its first byte and behind its last.
+    #[test]
+    fn a_file_says_when_it_began_and_ended() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("ring.pcapng");
+        let places = [RecordedPlace {
+            name: "0->master".to_owned(),
+            carries: Carries::Link,
+            bits_per_second: 38_400,
+        }];
+        let began = 1_700_000_000_000_000_000;
+        let mut files = Files::begin(&path, &places, Rotation::default(), began).expect("a file");
+        let at = Instant::START + Span::from_nanos(began + 80_000_000);
+        let byte = Piece::Octet(LineByte::seen(at, Some(1), Some(1), None));
+        files.recorder().piece(0, &byte).expect("kept");
+        files.flush(began + 100_000_000).expect("written");
+        let read = || read(&std::fs::read(&path).expect("a file"), None).expect("a capture");
+        assert_eq!(read().listened, None);
+        files.end(began + 200_000_000).expect("written");
+        let octet = Rate::Baud38400.byte_time();
+        let until = Instant::START + Span::from_nanos(octet.as_nanos() + 120_000_000);
+        assert_eq!(
+            read().listened,
+            Some(Listened {
+                before: Span::from_millis(80),
+                until
+            })
+        );
     }
 }

@@ -76,6 +76,7 @@ pub(super) fn assemble(mut frames: Vec<FrameRead>, rate: Option<BitRate>) -> Cap
             channels: vec![Channel::of_frames(line)],
             ..Trace::empty(u8::try_from(drives.len()).unwrap_or(u8::MAX))
         }],
+        listened: None,
     }
 }
 

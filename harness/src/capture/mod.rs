@@ -49,6 +49,17 @@ pub struct Capture {
     pub rate: Rate,
     /// The rings; of each the links that were captured, in ring order.
     pub traces: Vec<Trace>,
+    /// How long the line was listened to, where the file says so.
+    pub listened: Option<Listened>,
+}
+
+/// When a capture began and ended, beside what was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listened {
+    /// Silence in front of the first byte.
+    pub before: Span,
+    /// The end of the capture.
+    pub until: Instant,
 }
 
 /// Why a file is not a capture.
@@ -234,6 +245,7 @@ impl Assembly {
         let mut capture = Capture {
             rate: rate.unwrap_or_default(),
             traces,
+            listened: None,
         };
         capture.check()?;
         if rate.is_none() {

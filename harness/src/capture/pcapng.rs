@@ -5,7 +5,9 @@
 //! packet may hold several bytes: the time is that of the first, the others follow without a gap. Where the first
 //! packet is later than a day, times count from a byte time before it.
 
+mod blocks;
 mod parts;
+mod statistics;
 mod values;
 
 pub(super) use values::nanoseconds;
@@ -24,6 +26,7 @@ use harness_proto::can::BitRate;
 use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
 use parts::{Part, chosen};
+use statistics::{STATISTICS, listened_to};
 use std::borrow::Cow;
 use values::{means_loss, noted, sent};
 
@@ -168,11 +171,14 @@ pub(super) fn finish(
         link.bytes
             .push(line_byte(nanos, byte.sent, byte.received, byte.error));
     }
-    assembly.finish(
-        [None, None],
-        [Vec::new(), Vec::new()],
-        rate.or(reader.speed),
-    )
+    let listened = first.zip(reader.listened);
+    let listened = listened.map(|(first, own)| listened_to(own, first, base));
+    let rate = rate.or(reader.speed);
+    let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
+    Ok(Capture {
+        listened,
+        ..capture
+    })
 }
 
 pub(super) struct Reader<'b> {
@@ -193,6 +199,8 @@ pub(super) struct Reader<'b> {
     parts: Vec<Part>,
     /// What `capture` has noted beside bytes and frames.
     events: Vec<String>,
+    /// When the capture began and ended, in nanoseconds.
+    listened: Option<(u64, u64)>,
 }
 
 impl<'b> Reader<'b> {
@@ -210,6 +218,7 @@ impl<'b> Reader<'b> {
             frames: Vec::new(),
             parts: Vec::new(),
             events: Vec::new(),
+            listened: None,
         }
     }
 
@@ -229,44 +238,6 @@ impl<'b> Reader<'b> {
     ) -> Result<T, CaptureError> {
         let what = what.into();
         Err(CaptureError::At { offset, what })
-    }
-
-    fn take<const N: usize>(&self, offset: usize, end: usize) -> Result<[u8; N], CaptureError> {
-        let bytes = self.bytes.get(offset..offset.saturating_add(N));
-        match bytes.and_then(|bytes| <[u8; N]>::try_from(bytes).ok()) {
-            Some(bytes) if offset + N <= end => Ok(bytes),
-            _ => self.wrong(
-                offset,
-                format!("{N} bytes are expected here; the file or the block ends before"),
-            ),
-        }
-    }
-
-    fn u16(&self, offset: usize, end: usize) -> Result<u16, CaptureError> {
-        let bytes = self.take(offset, end)?;
-        Ok(if self.big {
-            u16::from_be_bytes(bytes)
-        } else {
-            u16::from_le_bytes(bytes)
-        })
-    }
-
-    pub(super) fn u32(&self, offset: usize, end: usize) -> Result<u32, CaptureError> {
-        let bytes = self.take(offset, end)?;
-        Ok(if self.big {
-            u32::from_be_bytes(bytes)
-        } else {
-            u32::from_le_bytes(bytes)
-        })
-    }
-
-    fn u64(&self, offset: usize, end: usize) -> Result<u64, CaptureError> {
-        let bytes = self.take(offset, end)?;
-        Ok(if self.big {
-            u64::from_be_bytes(bytes)
-        } else {
-            u64::from_le_bytes(bytes)
-        })
     }
 
     /// Reads the block at `offset`; says where the next one begins.
@@ -316,6 +287,7 @@ impl<'b> Reader<'b> {
             SECTION => self.section(inner)?,
             INTERFACE => self.interface(inner)?,
             PACKET => self.packet(inner)?,
+            STATISTICS => self.statistics(inner)?,
             _ => {}
         }
         Ok(end)
@@ -330,32 +302,6 @@ impl<'b> Reader<'b> {
             );
         }
         self.section = self.interfaces.len();
-        Ok(())
-    }
-
-    /// Calls `each` with every option from `start` on: its code, and where its value begins and ends.
-    fn options(
-        &self,
-        (start, end): (usize, usize),
-        mut each: impl FnMut(u16, usize, usize) -> Result<(), CaptureError>,
-    ) -> Result<(), CaptureError> {
-        let mut at = start;
-        while at < end {
-            let code = self.u16(at, end)?;
-            let length = usize::from(self.u16(at + 2, end)?);
-            if code == END {
-                return Ok(());
-            }
-            let value = at + 4;
-            if value + length > end {
-                return self.wrong(
-                    at,
-                    format!("an option of {length} bytes does not fit into its block"),
-                );
-            }
-            each(code, value, value + length)?;
-            at = value + length.next_multiple_of(4);
-        }
         Ok(())
     }
 

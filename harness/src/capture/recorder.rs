@@ -143,6 +143,18 @@ impl<W: Write> LiveRecorder<W> {
         block.end(out)
     }
 
+    /// Keeps when the capture began and ended at each place, in nanoseconds since 1970.
+    ///
+    /// # Errors
+    /// None: blocks are kept until [`flush`](Self::flush).
+    pub(crate) fn statistics(&mut self, began: u64, ended: u64) -> io::Result<()> {
+        for place in 0..u32::try_from(self.places.len()).unwrap_or(0) {
+            self.block.statistics(place, began, ended);
+            self.block.end(&mut self.waiting)?;
+        }
+        Ok(())
+    }
+
     /// Writes what waits, in one piece.
     ///
     /// # Errors

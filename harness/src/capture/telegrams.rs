@@ -40,6 +40,7 @@ pub(super) fn assemble(
             channels: channels.collect(),
             ..Trace::empty(slaves)
         }],
+        listened: None,
     }
 }
 

@@ -356,6 +356,7 @@ fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<C
     Some(Capture {
         rate: rate.unwrap_or_default(),
         traces: play_entry(&entry, AtMismatch::GoOn).traces,
+        listened: None,
     })
 }
 

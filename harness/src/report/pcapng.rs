@@ -28,6 +28,7 @@ pub(crate) const HEADER: usize = 12;
 /// The types of blocks.
 pub(crate) const SECTION: u32 = 0x0A0D_0D0A;
 pub(crate) const INTERFACE: u32 = 1;
+pub(crate) const STATISTICS: u32 = 5;
 pub(crate) const PACKET: u32 = 6;
 /// The byte-order magic of a section.
 pub(crate) const MAGIC: u32 = 0x1A2B_3C4D;
@@ -37,6 +38,8 @@ pub(crate) const COMMENT: u16 = 1;
 pub(crate) const IF_NAME: u16 = 2;
 pub(crate) const IF_SPEED: u16 = 8;
 pub(crate) const IF_TSRESOL: u16 = 9;
+pub(crate) const ISB_STARTTIME: u16 = 2;
+pub(crate) const ISB_ENDTIME: u16 = 3;
 const USER_APPLICATION: u16 = 4;
 /// Nanoseconds: 10 to the power of -9.
 pub(crate) const NANOSECONDS: u8 = 9;
@@ -145,6 +148,20 @@ impl Block {
         self.option(USER_APPLICATION, b"drivebench");
         self.option(END, &[]);
         self.end(out)
+    }
+
+    /// Begins the statistics of an interface: when the capture there began and ended, in nanoseconds.
+    pub(crate) fn statistics(&mut self, interface: u32, began: u64, ended: u64) {
+        let time = |own: u64| {
+            let [high, low] = [own >> 32, own & 0xFFFF_FFFF];
+            [high, low].map(|own| u32::try_from(own).unwrap_or(0).to_le_bytes())
+        };
+        self.begin(STATISTICS);
+        self.put(&interface.to_le_bytes());
+        self.put(time(ended).as_flattened());
+        self.option(ISB_STARTTIME, time(began).as_flattened());
+        self.option(ISB_ENDTIME, time(ended).as_flattened());
+        self.option(END, &[]);
     }
 
     /// Begins an interface: its link type, its name and, where it is known, its bit rate. Its times are in nanoseconds.

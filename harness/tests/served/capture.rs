@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 /// The far end of a port, and the port's path.
-fn port() -> (OwnedFd, PathBuf) {
+pub(crate) fn port() -> (OwnedFd, PathBuf) {
     let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
     let far = rustix::pty::openpt(flags).expect("a pseudo terminal");
     rustix::io::ioctl_fionbio(&far, true).expect("without waiting");
@@ -24,13 +24,13 @@ fn port() -> (OwnedFd, PathBuf) {
 }
 
 /// `capture` in its own process, listening.
-struct Listener {
+pub(crate) struct Listener {
     child: Child,
     lines: BufReader<ChildStdout>,
 }
 
 impl Listener {
-    fn start(mut command: Command) -> Self {
+    pub(crate) fn start(mut command: Command) -> Self {
         let mut child = command.spawn().expect("the program");
         let lines = BufReader::new(child.stdout.take().expect("a pipe"));
         // It says that it listens when all ports are open.
@@ -45,7 +45,7 @@ impl Listener {
     }
 
     /// Reads lines up to one with this text.
-    fn hears(&mut self, text: &str) {
+    pub(crate) fn hears(&mut self, text: &str) {
         let mut heard = String::new();
         while !heard.contains(text) {
             let read = self.lines.read_line(&mut heard).expect("a line");
@@ -54,20 +54,20 @@ impl Listener {
     }
 
     /// How it ended, and what it said that was not heard yet.
-    fn end(mut self) -> (Option<i32>, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         let mut text = String::new();
         self.lines.read_to_string(&mut text).expect("a pipe");
         let output = self.child.wait_with_output().expect("it ends");
         (output.status.code(), text + &said(&output))
     }
 
-    fn signal(&self, signal: Signal) {
+    pub(crate) fn signal(&self, signal: Signal) {
         let pid = Pid::from_child(&self.child);
         kill_process(pid, signal).expect("it lives");
     }
 }
 
-fn send(far: &OwnedFd, bytes: &[u8]) {
+pub(crate) fn send(far: &OwnedFd, bytes: &[u8]) {
     assert_eq!(rustix::io::write(far, bytes), Ok(bytes.len()));
 }
 
@@ -525,9 +525,9 @@ fn every_bus_is_captured_by_extcap() {
     }
 }
 
-/// tshark captures a simulated ring live, after `extcap install`.
+/// tshark captures simulated benches of every bus live, after `extcap install`.
 #[test]
-fn tshark_captures_a_simulated_ring() {
+fn tshark_captures_simulated_benches() {
     if !has("tshark", "a capture by extcap") {
         return;
     }
@@ -571,6 +571,17 @@ fn tshark_captures_a_simulated_ring() {
     let capture = file(&desk.path("live.pcapng"));
     assert!(capture.bytes() >= 12, "{}", capture.bytes());
     assert_eq!(bytes(&capture)[0][0], 0x88);
+    for (bus, scenario, judged) in [
+        ("unitek", "unitek-dump-00-1f", "12 frames"),
+        ("nordac", "nordac-3.3-start-up", "12 telegrams"),
+    ] {
+        let (interface, live) = (format!("drivebench-sim-{bus}"), format!("{bus}.pcapng"));
+        let option = format!("extcap.drivebench_sim_{bus}.scenario:{scenario}");
+        let captured = tshark(&["-i", &interface, "-o", &option, "-c", "12", "-w", &live]);
+        assert!(captured.status.success(), "{}", said(&captured));
+        let passed = format!("passed {live}: {judged}");
+        ended(&desk.run(&["import", &live]), 0, &passed);
+    }
     // Our messages reach the user of Wireshark.
     let failed = tshark(&[
         "-i",

@@ -2,6 +2,7 @@
 
 mod bench;
 mod capture;
+mod capture_located;
 #[path = "../common/debian.rs"]
 mod debian;
 mod dp;

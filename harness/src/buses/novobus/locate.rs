@@ -8,6 +8,9 @@ use harness_proto::novobus::sync::SYNCO;
 const ZEROS: usize = 7;
 /// How often an address must repeat before it counts: it comes "for ever".
 const REPEATS: usize = 4;
+/// How often an address repeats at most that is wrong because the master sends zeros itself: from the eighth of its 17 zeros on, a drive
+/// takes those before it for ones in the error mode (the figure of ND21 9.8).
+pub(crate) const FALSE: usize = 10;
 /// Maximum number of zeros in front of an address (ND21 9.7).
 pub const MAX_ZEROS: usize = 25;
 
@@ -18,6 +21,8 @@ pub struct Location {
     pub drive: u8,
     /// The zeros in front of its address; `None` for drive 0, whose address is a zero itself.
     pub zeros: Option<u64>,
+    /// The address has come more often than the zeros of a check sequence can make a wrong one come.
+    pub sure: bool,
 }
 
 /// The drive that the ring spells out, from what was received since the last check sequence.
@@ -36,6 +41,7 @@ pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
         return (repeats > MAX_ZEROS).then_some(Location {
             drive: 0,
             zeros: None,
+            sure: true,
         });
     }
     if last.byte >= drives {
@@ -58,6 +64,7 @@ pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
     (zeros >= fewest).then_some(Location {
         drive: last.byte,
         zeros: Some(zeros as u64),
+        sure: repeats > FALSE,
     })
 }
 
@@ -80,6 +87,7 @@ mod tests {
             Some(Location {
                 drive,
                 zeros: Some(16),
+                sure: false,
             })
         };
         assert_eq!(
@@ -88,5 +96,19 @@ mod tests {
         );
         assert_eq!(located(&format!("88 {zeros}02 02 02 02"), 3), drive(2));
         assert_eq!(located(&format!("88 {zeros}02 02 01 01 01 01"), 3), None);
+    }
+
+    /// The figure of 9.8: drive 97 takes the master's zeros for those of a drive in the error mode, and 62 comes in place of 61.
+    #[test]
+    fn zeros_of_a_check_sequence() {
+        let ring = |own: usize, wrong: usize| {
+            let (own, more) = ("61 ".repeat(own), "62 ".repeat(wrong));
+            let text = format!("88 {}{own}{more}", "00 ".repeat(19));
+            located(text.trim_end(), 100).map(|location| (location.drive, location.sure))
+        };
+        assert_eq!(ring(3, 0), None);
+        assert_eq!(ring(10, 0), Some((97, false)));
+        assert_eq!(ring(11, 0), Some((97, true)));
+        assert_eq!(ring(11, 10), Some((98, false)));
     }
 }

@@ -313,6 +313,10 @@ pub(super) fn read_files(
                     first.name, other.name
                 )));
             }
+            let same = |at: usize| files[..at].iter().any(|own| own.1 == files[at].1);
+            if let Some(at) = (1..files.len()).find(|at| same(*at)) {
+                return Err(wrong(format!("{} is given twice", files[at].0)));
+            }
             let mut all = std::mem::take(&mut files[0].1);
             for (_, bytes) in &files[1..] {
                 if !all.ends_with(b"\n") && first.name != JOINED[0] {

@@ -264,6 +264,7 @@ fn our_own_files_survive() {
     let capture = Capture {
         rate: Rate::Baud38400,
         traces: traces.to_vec(),
+        listened: None,
     };
     let mut file = Vec::new();
     crate::report::csv::write(&traces, &mut file).expect("a Vec");

@@ -168,6 +168,7 @@ impl<'a> Session<'a> {
             let has = |own: &Option<String>| own.as_ref().is_some_and(|own| line.contains(own));
             self.found |= has(&self.arguments.until);
             if self.waiting.is_some() && has(&self.arguments.trigger) {
+                self.files.begins(nanos);
                 for (place, piece) in self.waiting.take().into_iter().flatten() {
                     self.files.recorder().piece(place, &piece)?;
                 }
@@ -179,7 +180,7 @@ impl<'a> Session<'a> {
 
     /// Says what was heard, whether the kernel sent anything, and judges the capture.
     pub(super) fn end(mut self, output: &mut Output) -> io::Result<Exit> {
-        self.files.flush(self.now())?;
+        self.files.end(self.now())?;
         let mut spoke = false;
         for tap in &self.taps {
             let (text, sent) = tap.summary();

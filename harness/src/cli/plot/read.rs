@@ -103,10 +103,10 @@ fn recording(bytes: &[u8]) -> Result<Recording, Fault> {
         Some(("time_ms", _)) => watch(bytes)?,
         _ => return Err(Fault::whole(other(line))),
     };
-    let points = found.curves.iter().map(|own| own.points.len());
-    match points.sum::<usize>() {
-        0 => Err(Fault::whole("it has no value")),
-        _ => Ok(found),
+    let mut points = found.curves.iter().flat_map(|own| &own.points);
+    match points.any(|own| own.1.is_some()) {
+        true => Ok(found),
+        false => Err(Fault::whole("it has no value that an axis can show")),
     }
 }
 
@@ -449,7 +449,11 @@ mod tests {
         for (text, part) in [
             ("", "its first line is \"\""),
             ("\u{0}\u{1}", "its first line is"),
-            ("time_ms,a\n", "it has no value"),
+            ("time_ms,a\n", "it has no value that an axis can show"),
+            (
+                "time_ms,a\n0,abc\n",
+                "it has no value that an axis can show",
+            ),
             ("time_ms;a\n0;1\n", "not separated by commas"),
             ("ring,t_ns,link\n", "has no values"),
             (

@@ -4,6 +4,7 @@ mod forms;
 mod frames;
 mod hostile;
 mod judged;
+mod portions;
 mod program;
 mod round_trip;
 mod telegrams;
@@ -38,7 +39,11 @@ fn run(text: &str) -> Capture {
     play(&plan, &mut link, AtMismatch::GoOn);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     let rate = plan.rate;
-    Capture { rate, traces }
+    Capture {
+        rate,
+        traces,
+        listened: None,
+    }
 }
 
 /// A built-in scenario's text.

@@ -70,6 +70,7 @@ fn captures() -> impl Strategy<Value = Capture> {
     (rings, 0..3_usize).prop_map(|(rings, rate)| Capture {
         rate: Rate::ALL[rate],
         traces: rings.into_iter().map(trace).collect(),
+        listened: None,
     })
 }
 

@@ -9,6 +9,13 @@ use harness_sim::record::{Channel, LineByte, Trace};
 /// since each drive passes a byte on when it has received it (ND21 8.2).
 pub(super) fn is_midway(capture: &Capture) -> bool {
     let octet = capture.rate.byte_time();
+    // Each byte had left the ring.
+    if capture
+        .listened
+        .is_some_and(|own| own.before > flight(capture))
+    {
+        return false;
+    }
     capture.traces.iter().any(|ring| {
         let Some(sent) = ring.channels.iter().find(|link| link.from.is_none()) else {
             return false;

@@ -5,6 +5,7 @@ use super::open::explanations;
 use super::scenario::{Options, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::locate::locate;
 use crate::capture::Capture;
 use crate::capture::diff::{ComparedRun, Summary, compare};
 use crate::library::Entry;
@@ -15,7 +16,7 @@ use crate::scenario::simulate::simulated;
 use crate::scenario::source::{Source, SourceError};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 use harness_sim::record::Channel;
 use harness_sim::record::LineByte;
 
@@ -44,6 +45,10 @@ const MOST_STARTS: usize = 6;
 /// Why plain memory differs from a right drive.
 const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself or that a reset has changed (ND21 9.4, 10.5, 14.2): \
      describe the drives with --setup";
+
+/// Why bytes that are missing at the end accuse no drive.
+const UNDER_WAY: &str = "the capture ends while bytes are under way: those that it lacks at its end were due within the time by which its ports are late; \
+     end a capture when the line is silent";
 
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
@@ -149,7 +154,7 @@ fn judge_as(
     more: &Header,
 ) -> Result<Judged, JudgeError> {
     let (model, remarks) = model(capture, options, more)?;
-    let model = only_captured(&model, capture);
+    let model = as_captured(&model, capture);
     let behind = |ring: usize, own: &Channel, index: usize| {
         // Data behind the drive that cannot be predicted stand at the same place on the last link.
         let told = told.get(ring).filter(|_| own.from.is_some());
@@ -166,11 +171,12 @@ fn judge_as(
             capture: &model,
         },
     );
-    let end = Some(capture.end());
+    let heard = capture.end();
+    let end = capture.listened.map_or(heard, |own| own.until.max(heard));
     let inner =
         |ring: usize, own: &Channel, index: usize| own.to.is_some() || behind(ring, own, index);
-    let master = compare(left, right, tolerance, &inner, end);
-    let links = compare(left, right, tolerance, &behind, end);
+    let master = compare(left, right, tolerance, &inner, Some(end));
+    let links = compare(left, right, tolerance, &behind, Some(end));
     let last =
         |trace: &harness_sim::record::Trace| trace.channels.iter().any(|link| link.to.is_none());
     let is_whole = capture.traces.iter().all(last);
@@ -185,8 +191,14 @@ fn judge_as(
         let of_drive = told.get(ring).is_some_and(|told| told.own.contains(&index));
         inner(ring, own, index) || of_drive
     };
+    // Adapters give bytes late: how late, the bytes tell that are the same.
+    let late = Span::from_units(links.latest.units().saturating_mul(2));
+    let is_under_way = verdict == Verdict::Failed && {
+        let end = before(end, late);
+        compare(left, right, tolerance, &inner, Some(end)).differ == 0
+    };
     let is_plain = verdict == Verdict::Failed && options.setup.is_none();
-    let in_doubt = is_plain && compare(left, right, tolerance, &of_drives, end).differ == 0;
+    let in_doubt = is_plain && compare(left, right, tolerance, &of_drives, Some(end)).differ == 0;
     let judged = Judged {
         verdict,
         master,
@@ -199,11 +211,18 @@ fn judge_as(
         located: located(capture),
         remarks,
     };
-    Ok(match (is_whole, in_doubt) {
-        (false, _) => judged.in_doubt(&not_captured(capture)),
-        (true, true) => judged.in_doubt(OF_DRIVES),
-        (true, false) => judged,
+    Ok(match is_whole {
+        false => judged.in_doubt(&not_captured(capture)),
+        true if is_under_way => judged.in_doubt(UNDER_WAY),
+        true if in_doubt => judged.in_doubt(OF_DRIVES),
+        true => judged,
     })
+}
+
+/// A time so much earlier.
+fn before(end: Instant, late: Span) -> Instant {
+    let since = end.since_start().units();
+    Instant::START + Span::from_units(since.saturating_sub(late.units()))
 }
 
 /// The links without which there is no verdict.
@@ -240,18 +259,27 @@ fn model(
     let capture = Capture {
         rate: plan.rate,
         traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+        listened: None,
     };
     Ok((capture, outcome.remarks))
 }
 
-/// The model's links, as far as they were captured.
-fn only_captured(model: &Capture, capture: &Capture) -> Capture {
+/// The model's links, as far as they were captured. What a damaged byte was is not known, and no drive uses it (ND21 9.7).
+fn as_captured(model: &Capture, capture: &Capture) -> Capture {
     let mut model = model.clone();
     for (trace, own) in model.traces.iter_mut().zip(&capture.traces) {
         let ends = |link: &Channel| (link.from, link.to);
-        trace
-            .channels
-            .retain(|link| own.channels.iter().any(|o| ends(o) == ends(link)));
+        let captured = |link: &Channel| own.channels.iter().find(|o| ends(o) == ends(link));
+        trace.channels.retain(|link| captured(link).is_some());
+        for link in &mut trace.channels {
+            let heard = captured(link).map_or(&[][..], Channel::octets);
+            let pairs = link.octets_mut().into_iter().flatten().zip(heard);
+            for (byte, heard) in pairs.filter(|(own, heard)| own.error == heard.error) {
+                if byte.error.is_some() {
+                    (byte.sent, byte.received) = (heard.sent, heard.received);
+                }
+            }
+        }
     }
     model
 }
@@ -261,7 +289,11 @@ fn located(capture: &Capture) -> Option<(usize, u8)> {
     capture.traces.iter().enumerate().find_map(|(ring, trace)| {
         let last = trace.channels.iter().find(|link| link.to.is_none())?;
         let received: Vec<Received> = last.octets().iter().filter_map(LineByte::arrival).collect();
-        let found = crate::buses::novobus::locate::locate(&received, trace.stations)?;
-        Some((ring, found.drive))
+        let found = locate(&received, trace.stations)?;
+        // The zeros of a check sequence make the ring spell out other drives (the figure of ND21 9.8).
+        let first = trace.channels.iter().find(|link| link.from.is_none());
+        let sent = first.map_or(&[][..], Channel::octets);
+        let zeros = sent.iter().rev().take(8).filter(|own| own.sent == Some(0));
+        (found.sure || zeros.count() < 8).then_some((ring, found.drive))
     })
 }

@@ -2,7 +2,7 @@
 
 use super::meaning::{ByteRole, Meaning, Observer};
 use crate::buses::MOST_IN_A_RING;
-use crate::buses::novobus::locate::locate;
+use crate::buses::novobus::locate::{FALSE, Location, locate};
 use crate::capture::Piece;
 use crate::capture::live::{LiveLine, LiveText};
 use harness_proto::line::{Rate, Received};
@@ -12,6 +12,8 @@ use std::fmt::Write as _;
 const MOST: usize = 16;
 /// A silence that ends a telegram that is not complete, in nanoseconds.
 const PATIENCE: u64 = 50_000_000;
+/// A silence in which the master sends no check sequence any more, in nanoseconds.
+const SILENT: u64 = 100_000_000;
 /// Bytes that a location is read from at most: more than zeros and numbers of one fault.
 const HEARD: usize = 1_024;
 
@@ -47,7 +49,6 @@ struct Begun {
     text: String,
     phrases: Vec<String>,
     first: u64,
-    last: u64,
 }
 
 /// Text of the bytes of one link.
@@ -59,6 +60,8 @@ pub(crate) struct LinkText {
     /// A pause that ends a line, in nanoseconds.
     pause: u64,
     begun: Begun,
+    /// When the last byte came, in nanoseconds.
+    last: u64,
     /// What the master has received since the last check sequence.
     heard: Vec<Received>,
     /// The drive that was named since then.
@@ -74,6 +77,7 @@ impl LinkText {
             drives,
             pause: rate.byte_time().as_nanos() * 2,
             begun: Begun::default(),
+            last: 0,
             heard: Vec::new(),
             named: None,
         }
@@ -102,7 +106,7 @@ impl LinkText {
             let _infallible = write!(line.text, " ({error})");
         }
         line.bytes += 1;
-        line.last = nanos;
+        self.last = nanos;
         if let Some((phrase, goes_on)) = phrase(&meaning, own.byte) {
             if goes_on
                 && line
@@ -133,32 +137,50 @@ impl LinkText {
         (line.bytes > 0).then_some((line.first, text))
     }
 
-    /// The fault that the ring spells out, when it is first known.
+    /// The fault that the ring spells out, when it is known for sure, and at the latest when a check sequence begins.
     fn located(&mut self, role: ByteRole, own: Received) -> Option<String> {
         if self.to.is_some() {
             return None;
         }
-        let in_error = matches!(role, ByteRole::ErrorZero | ByteRole::ErrorAddress);
         if role == ByteRole::CheckSequence {
+            let before = self.heard.len().saturating_sub(FALSE);
+            let found = self.spelled(before).map(|own| own.drive);
+            let said = found.and_then(|drive| self.name(drive));
             self.heard.clear();
             self.named = None;
+            return said;
         }
         if self.heard.len() >= HEARD {
             self.heard.drain(..HEARD / 2);
         }
         self.heard.push(own);
+        let in_error = matches!(role, ByteRole::ErrorZero | ByteRole::ErrorAddress);
+        let found = in_error.then(|| self.spelled(self.heard.len())).flatten()?;
+        found.sure.then(|| self.name(found.drive)).flatten()
+    }
+
+    /// The drive that the first of the bytes since the last check sequence spell out.
+    fn spelled(&self, bytes: usize) -> Option<Location> {
         let drives = self.drives.unwrap_or(MOST_IN_A_RING as u8);
-        let found = in_error
-            .then(|| locate(&self.heard, drives))
-            .flatten()?
-            .drive;
-        if self.named.replace(found) == Some(found) {
+        locate(&self.heard[..bytes], drives)
+    }
+
+    /// Names a drive, unless it is named already.
+    fn name(&mut self, drive: u8) -> Option<String> {
+        let again = self.named.replace(drive) == Some(drive);
+        let cable = in_front(drive, self.drives);
+        (!again).then(|| format!("located: drive {drive} saw a fault first: {cable}"))
+    }
+
+    /// What a ring spelled out that is silent now, unless the zeros of a check sequence may have changed it.
+    fn located_in_silence(&mut self, now: u64) -> Option<LiveLine> {
+        let found = self.spelled(self.heard.len())?;
+        let before = self.spelled(self.heard.len().saturating_sub(FALSE));
+        let changed = before.is_some_and(|own| own.drive != found.drive);
+        if changed && !found.sure {
             return None;
         }
-        Some(format!(
-            "located: drive {found} saw a fault first: {}",
-            in_front(found, self.drives)
-        ))
+        self.name(found.drive).map(|words| (now, words))
     }
 }
 
@@ -178,8 +200,13 @@ impl LiveText for LinkText {
             true => PATIENCE,
             false => self.pause,
         };
-        let paused = now.saturating_sub(self.begun.last) > pause;
-        paused.then(|| self.end()).flatten()
+        let silence = now.saturating_sub(self.last);
+        if self.begun.bytes > 0 {
+            return (silence > pause).then(|| self.end()).flatten();
+        }
+        (silence > SILENT)
+            .then(|| self.located_in_silence(now))
+            .flatten()
     }
 }
 
