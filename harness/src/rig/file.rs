@@ -31,7 +31,7 @@ pub struct RigFile {
     /// In place of rings, a port of a bus whose stations share one segment: `[port.1]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub port: Option<Ports>,
-    /// Ports that listen on a link.
+    /// Ports that listen on a link. RxD and GND alone are wired: Linux raises RTS and DTR whenever a port is opened.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 500))]
     pub tap: Vec<Tap>,

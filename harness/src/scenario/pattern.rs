@@ -121,7 +121,7 @@ impl Pattern {
         let lines = self.items.chunks(most);
         let line = |items: &[Item]| Self {
             items: items.to_vec(),
-            ..self.clone()
+            span: self.span,
         };
         lines.map(line).collect()
     }

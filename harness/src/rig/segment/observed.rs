@@ -48,6 +48,8 @@ pub(crate) struct Slow {
     pub(crate) which: u32,
     /// How exact times are compared.
     pub(crate) tolerance: Span,
+    /// How many of these octets leave without a pause, where those behind them are late; `None` where what is sent stays together.
+    pub(crate) parts: Option<fn(&[u8]) -> usize>,
 }
 
 /// How late frames and telegrams may leave through an adapter and a busy computer, in us, beside what was measured.
@@ -76,7 +78,18 @@ impl LinkTimes {
                 by,
                 which,
                 tolerance,
+                parts: None,
             })
+    }
+
+    /// A way on which octets are late behind what stays together, where time is not virtual.
+    pub(crate) fn in_parts(self, parts: fn(&[u8]) -> usize) -> Option<Slow> {
+        (self.tolerance > Span::ZERO).then_some(Slow {
+            by: Span::from_millis(1),
+            which: 2,
+            tolerance: self.tolerance,
+            parts: Some(parts),
+        })
     }
 }
 
@@ -134,6 +147,24 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
         std::mem::take(&mut self.late)
     }
 
+    /// Sends octets in parts.
+    fn send_parts(
+        &mut self,
+        port: usize,
+        octets: &[u8],
+        parts: fn(&[u8]) -> usize,
+        slow: Slow,
+    ) -> Instant {
+        let (part, mut rest) = octets.split_at(parts(octets).min(octets.len()));
+        let mut end = self.link.send(port, Out::Octets(part));
+        while !rest.is_empty() {
+            let length = parts(rest).clamp(1, rest.len());
+            end = self.send_late(port, Out::Octets(&rest[..length]), slow);
+            rest = &rest[length..];
+        }
+        end
+    }
+
     /// Sends a frame or a telegram later than it should be.
     fn send_late(&mut self, port: usize, what: Out<'_>, slow: Slow) -> Instant {
         self.sent += 1;
@@ -159,7 +190,10 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
         let end = match (self.slow, what) {
             (None, what) => self.link.send(port, what),
-            (Some(slow), Out::Octets(_)) => self.send_late(port, what, slow),
+            (Some(slow), Out::Octets(octets)) => match slow.parts {
+                None => self.send_late(port, what, slow),
+                Some(parts) => self.send_parts(port, octets, parts, slow),
+            },
             (Some(slow), Out::Frames(frames)) => {
                 let now = self.link.now();
                 let one_by_one = frames.chunks(1).map(Out::Frames);

@@ -56,16 +56,17 @@ const MOST_DIFFERENCES: usize = 12;
 /// How many exchanges a task is given: its answer comes with the third (`pkw-latency`).
 const ANSWERED: usize = 6;
 
-/// Lets a slave forget its master, whatever was before. It is off afterwards.
+/// Lets a slave forget its master, whatever was before; it is off afterwards. Returns its last status word.
 ///
 /// # Errors
 /// The line is in trouble, or the slave does not get into the exchange.
-pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkError> {
+pub(super) fn forget(known: &Known, talk: &mut Talk<'_>) -> Result<u16, TalkError> {
     let (slave, ppo) = (known.slave.address, known.ppo());
     talk.restart(slave);
     talk.start(slave, ppo, Some(FORGET))?;
-    talk.exchange(slave, ppo, &image(stw::SAFE))?;
-    talk.pass(FORGOTTEN)
+    let shown = talk.exchange(slave, ppo, &image(stw::SAFE))?;
+    talk.pass(FORGOTTEN)?;
+    Ok(shown.words[0])
 }
 
 /// Holds the conversation with a slave that has forgotten its master. It is off afterwards.

@@ -69,6 +69,16 @@ pub enum TalkError {
         /// Why.
         why: ExchangeError,
     },
+    /// It has a fault.
+    #[error(
+        "slave {slave} has a fault (ZSW {zsw:04X}): remove its cause and `drivebench acknowledge {slave}`; with `allow_motion` in [limits] and --allow-motion the bench acknowledges it before each scenario"
+    )]
+    Fault {
+        /// Its address.
+        slave: u8,
+        /// What it shows.
+        zsw: u16,
+    },
 }
 
 /// The bench's own master, which asks one slave at a time.

@@ -9,8 +9,18 @@ use crate::rig::segment::observed::LinkTimes;
 use crate::scenario::run::Outcome;
 use crate::scenario::run::outcome::Unready;
 use crate::scenario::verdict::Verdict;
+use harness_proto::decode::Decoded;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
+use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
+
+/// How many of these octets are a telegram; all of them where they do not begin with one.
+fn telegram(octets: &[u8]) -> usize {
+    match Telegram::decode(octets) {
+        Decoded::Value { used, .. } => used,
+        _ => octets.len(),
+    }
+}
 
 impl Player {
     /// The outcome where the slaves could not be made ready.
@@ -143,6 +153,17 @@ impl Player {
                     "an adapter through which telegrams leave {} late",
                     slow.by
                 ));
+            }
+        }
+        if let Some(slow) = way.in_parts(telegram) {
+            let other = Other {
+                slow: Some(slow),
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(
+                    "an adapter or a server that makes a pause behind a telegram".to_owned(),
+                );
             }
         }
         let base: Assumed = self.known().iter().map(|own| own.properties).collect();

@@ -7,8 +7,8 @@ use crate::buses::nordac::rig::talk::{Talk, TalkError};
 use crate::buses::nordac::simulate::SlaveSetup;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use harness_proto::nordac::master::ExchangeError;
-use harness_proto::nordac::words::stw;
-use harness_proto::nordac::{Image, Parameter, Pkw, Task};
+use harness_proto::nordac::words::{stw, zsw};
+use harness_proto::nordac::{Image, Parameter, Pkw, PpoType, Task};
 use harness_proto::time::Span;
 
 /// The word that a slave holds when a scenario begins: OFF2 and OFF3 are not active, as after power-up, and ON without enabling: an ON that
@@ -17,6 +17,9 @@ const IDLE: u16 = 0x0477;
 
 /// How often it is sent: what the next reply shows may lag behind.
 const IDLE_TIMES: usize = 2;
+
+/// How often each word that acknowledges a fault is sent.
+const ACKNOWLEDGED: usize = 4;
 
 /// The watchdog by which a slave forgets its master before a scenario begins: 100 ms.
 const FORGET: [u8; 2] = [1, 10];
@@ -94,9 +97,11 @@ impl Player {
                         words: [IDLE, 0, 0, 0, 0, 0],
                         ..Image::default()
                     };
+                    let mut zsw = 0;
                     for _ in 0..IDLE_TIMES {
-                        talk.exchange(slave.address, ppo, &idle)?;
+                        zsw = talk.exchange(slave.address, ppo, &idle)?.words[0];
                     }
+                    self.without_fault((slave.address, ppo), zsw, &mut talk)?;
                     talk.start(slave.address, ppo, Some(FORGET))?;
                 }
                 talk.pass(FORGOTTEN)?;
@@ -107,6 +112,37 @@ impl Player {
             }
         }
         Ok(())
+    }
+}
+
+impl Player {
+    /// Acknowledges a fault that a slave in the exchange shows, where the bench may: the terminals may start the motor then. It is idle afterwards.
+    pub(super) fn without_fault(
+        &self,
+        (slave, ppo): (u8, PpoType),
+        zsw: u16,
+        talk: &mut Talk<'_>,
+    ) -> Result<(), TalkError> {
+        if zsw & zsw::FAULT == 0 {
+            return Ok(());
+        }
+        if !self.acknowledges() {
+            return Err(TalkError::Fault { slave, zsw });
+        }
+        let mut shown = zsw;
+        for word in [stw::READY, stw::READY | stw::ACKNOWLEDGE, stw::READY, IDLE] {
+            let image = Image {
+                words: [word, 0, 0, 0, 0, 0],
+                ..Image::default()
+            };
+            for _ in 0..ACKNOWLEDGED {
+                shown = talk.exchange(slave, ppo, &image)?.words[0];
+            }
+        }
+        match shown & zsw::FAULT {
+            0 => Ok(()),
+            _ => Err(TalkError::Fault { slave, zsw: shown }),
+        }
     }
 }
 
