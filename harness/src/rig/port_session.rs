@@ -2,6 +2,7 @@
 
 use super::lock::PortLock;
 use super::port_file::Port;
+use super::segment::Beats;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Options, Rig, SessionError, file, standing};
@@ -227,6 +228,12 @@ impl<D: PortDrives> PortSession<D> {
             ports.resume();
         }
         self.link.reset_after_denial();
+    }
+
+    /// What shows the watchdog that the program works.
+    pub(crate) fn beats(&mut self) -> Beats {
+        let ports = self.link.inner_mut().ports_mut();
+        ports.map_or_else(Beats::default, |own| Beats::of(own.beats()))
     }
 
     /// Lets a thread watch that the program lives.

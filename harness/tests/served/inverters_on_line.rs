@@ -307,3 +307,28 @@ fn switched_settings_are_set_back_after_a_signal() {
     assert!(said(&output).contains(SAFE), "{}", said(&output));
     desk.shows("read 8 1621 --rig desk.toml", "  2 ");
 }
+
+/// A right slave behind a socket is not blamed for the pauses that its server makes behind a telegram, nor for a fault that another scenario has
+/// left (3.3): without leave to acknowledge one, such a scenario is not begun; with leave, the fault is acknowledged.
+#[test]
+fn a_fault_and_a_pause_accuse_no_slave() {
+    let desk = Desk::new("tcp", "");
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a file");
+    let text = text.replace(
+        "allow_motion = true\n",
+        "allow_motion = true\nallow_eeprom = true\nallow_motor_data = true\n",
+    );
+    std::fs::write(&path, text).expect("room");
+    let pause = desk.run("run --rig desk.toml nordac-en-1-too-long");
+    ended(&pause, 5, "makes a pause behind a telegram");
+    let both = "nordac-open-timeout-exactly-expires nordac-open-zsw8-always";
+    let denied = desk.run(&format!("run --rig desk.toml {both}"));
+    ended(&denied, 2, "it leaves slave 8 with a fault");
+    let faulted = desk.run("exchange 8 STW=047E then STW=0477 --move --rig desk.toml");
+    ended(&faulted, 0, "");
+    let played = desk.run(&format!("run --rig desk.toml --allow-motion {both}"));
+    let said = said(&played);
+    assert!(said.contains("passed nordac-open-zsw8-always"), "{said}");
+    assert!(!said.contains("failed nordac"), "{said}");
+}

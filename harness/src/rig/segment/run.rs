@@ -1,6 +1,6 @@
 //! Scenarios on a rig with a port, and their attempts judged again from a record, whatever the bus.
 
-use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
+use super::{Beats, OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession, failed};
@@ -29,6 +29,9 @@ pub(crate) trait PortPlayer: Sized {
 
     /// For a run in which motors may turn, as far as the rig's file permits it, or for one in which they may not; of a qualification or not.
     fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self;
+
+    /// Judging may take long: the count that shows that the program works meanwhile.
+    fn shows_life(&mut self, beats: Beats);
 
     /// What a record says of a rig on which motors may turn or not.
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
@@ -89,9 +92,12 @@ impl<P: PortPlayer> PortRun<P> {
             let why = "scenarios send, and its file says `listen_only = true`; set it to false";
             return Err(failed(rig, why));
         }
+        let mut session = PortSession::<P::Drives>::open(rig, options)?;
+        let mut player = P::new(rig, options.allow_motion, options.ill_as_well);
+        player.shows_life(session.beats());
         Ok(Self {
-            session: PortSession::open(rig, options)?,
-            player: P::new(rig, options.allow_motion, options.ill_as_well),
+            session,
+            player,
             options: options.clone(),
             again: Again::new(!rig.is_simulated()),
             notes: Vec::new(),

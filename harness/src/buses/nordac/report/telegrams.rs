@@ -2,10 +2,11 @@
 
 use harness_proto::decode::Decoded;
 use harness_proto::line::LineError;
-use harness_proto::profibus::Telegram;
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
+use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{LineByte, Trace};
+use std::cmp::Reverse;
 
 /// What a station sent without a pause.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,8 +76,9 @@ impl TelegramRun {
     }
 }
 
-/// The time between the ends of two octets that follow each other without a gap: the shortest distance of octets of one station. `None`
-/// where no two of them follow each other.
+/// The time between the ends of two octets that follow each other without a gap: that of the rate at which most octets of one station
+/// follow each other, since a port may give octets nearer to each other than they came; else their shortest distance. `None` where no two
+/// octets follow each other.
 pub(in crate::buses::nordac) fn octet_time<'t>(
     octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>,
 ) -> Option<Span> {
@@ -85,7 +87,19 @@ pub(in crate::buses::nordac) fn octet_time<'t>(
         let before = last.replace((from, own.at));
         before.and_then(|(sender, at)| (sender == from).then(|| own.at.since(at)))
     });
-    distances.min()
+    let distances: Vec<Span> = distances.collect();
+    let at_rate = |rate: BusRate| {
+        let octet = rate.octet_time().as_nanos();
+        let near = |own: &&Span| own.as_nanos().abs_diff(octet) <= octet / 50;
+        distances
+            .iter()
+            .filter(near)
+            .min()
+            .map(|nearest| (distances.iter().filter(near).count(), Reverse(*nearest)))
+    };
+    let most = BusRate::ALL.into_iter().filter_map(at_rate).max();
+    most.map(|(_, Reverse(octet))| octet)
+        .or_else(|| distances.into_iter().min())
 }
 
 /// Idle octets behind which a telegram begins in any case: 33 bits (T_SYN).
@@ -183,5 +197,28 @@ mod tests {
             (None, vec![2]),
         ];
         assert_eq!(found, expected);
+    }
+
+    /// A port gives octets nearer to each other than they came: the telegrams stay whole.
+    #[test]
+    fn octets_that_a_port_gives_at_once() {
+        let status = [0x10, 0x08, 0x02, 0x49, 0x53, 0x16];
+        let sent: Vec<_> = status.map(|own| (1, own)).into();
+        let near = |us: u64, byte: u8| {
+            let at = Instant::START + Span::from_micros(400 + us);
+            LineByte::seen(at, Some(byte), Some(byte), None)
+        };
+        let reply = [0x10, 0x02, 0x08, 0x00, 0x0A, 0x16];
+        let given = [0, 22, 44, 44, 66, 88].into_iter().zip(reply);
+        let given = given.map(|(us, byte)| near(us, byte)).collect();
+        let trace = Trace {
+            channels: vec![
+                channel(None, 0, &sent),
+                Channel::of_octets(Some(8), None, given),
+            ],
+            ..Trace::empty(1)
+        };
+        let all: Vec<_> = said(&trace).into_iter().map(|own| own.octets).collect();
+        assert_eq!(all, [status.to_vec(), reply.to_vec()]);
     }
 }

@@ -12,7 +12,7 @@ use crate::buses::nordac::stream::TOLERANCE;
 use crate::link::{Link, LinkEvent, Replay};
 use crate::rig::Rig;
 use crate::rig::segment::run::PortPlayer;
-use crate::rig::segment::{OnSegment, Qualified};
+use crate::rig::segment::{Beats, OnSegment, Qualified};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
@@ -46,6 +46,10 @@ impl PortPlayer for Player {
             player.profile = Profiled::of(rig);
         }
         player
+    }
+
+    fn shows_life(&mut self, beats: Beats) {
+        self.beats = beats;
     }
 
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {

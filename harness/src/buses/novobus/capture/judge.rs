@@ -78,8 +78,17 @@ pub enum JudgeError {
 
 /// The message of the first problem, without its place: the generated text is not shown to the user.
 fn first(problems: &Problems) -> String {
-    let first = problems.all().first();
-    first.map_or_else(|| problems.to_string(), |first| first.message.clone())
+    let Some(first) = problems.all().first() else {
+        return problems.to_string();
+    };
+    let too_long = first.expected.starts_with("fewer bytes");
+    let remedy = match too_long {
+        true => {
+            "; judge it in parts that begin in a silence, such as the files of `capture --every` or those that Wireshark's editcap cuts"
+        }
+        false => "",
+    };
+    format!("{}{remedy}", first.message)
 }
 
 /// Judges a capture; times are compared as far as the tolerance. One that begins in mid-conversation, and differs, is judged from where

@@ -14,7 +14,7 @@ use crate::rig::Rig;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::patience;
 use crate::rig::segment::run::PortPlayer;
-use crate::rig::segment::{OnSegment, Qualified};
+use crate::rig::segment::{Beats, OnSegment, Qualified};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
@@ -60,6 +60,10 @@ impl PortPlayer for Player {
             }
             false => player.with_profile(Profiled::of(rig)),
         }
+    }
+
+    fn shows_life(&mut self, beats: Beats) {
+        self.beats = beats;
     }
 
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {

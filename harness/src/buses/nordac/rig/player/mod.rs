@@ -24,6 +24,7 @@ use crate::buses::nordac::simulate::{self, Bench};
 use crate::guard::Guarded;
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
+use crate::rig::segment::Beats;
 use crate::rig::segment::observed::{LinkTimes, Slow};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::{Plan, plan};
@@ -150,6 +151,8 @@ pub(crate) struct Player {
     unable: Option<String>,
     /// Whether the slaves are qualified.
     qualifies: bool,
+    /// What shows that the program works while it plays on models.
+    pub(super) beats: Beats,
     /// The attempts of a qualification.
     notes: Vec<AttemptNote>,
 }
@@ -178,6 +181,7 @@ impl Player {
             proven: false,
             unable: None,
             qualifies: false,
+            beats: Beats::default(),
             notes: Vec::new(),
         }
     }
@@ -444,6 +448,7 @@ impl Player {
 
     /// A bench of simulated slaves behind the gate of the rig. They were asked as when a rig is opened.
     fn model(&self, slaves: Vec<simulate::SlaveSetup>, limits: &Limits) -> Guarded<Bench> {
+        self.beats.beat();
         let gated = slaves.iter().map(|own| GuardedSlave {
             address: own.address,
             ppo: Some(own.ppo),

@@ -130,7 +130,7 @@ impl Player {
             return Err(TalkError::Fault { slave, zsw });
         }
         let mut shown = zsw;
-        for word in [stw::READY, stw::READY | stw::ACKNOWLEDGE, stw::READY, IDLE] {
+        for word in [stw::SAFE, stw::SAFE | stw::ACKNOWLEDGE, stw::SAFE, IDLE] {
             let image = Image {
                 words: [word, 0, 0, 0, 0, 0],
                 ..Image::default()

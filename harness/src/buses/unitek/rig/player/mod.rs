@@ -24,6 +24,7 @@ use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
+use crate::rig::segment::Beats;
 use crate::rig::segment::observed::{LinkTimes, Slow};
 use crate::scenario::expression::Scope;
 use crate::scenario::run::outcome::Unready;
@@ -111,6 +112,8 @@ pub(crate) struct Player {
     before: Option<String>,
     /// Whether the drives are qualified.
     qualifies: bool,
+    /// What shows that the program works while it plays on models.
+    pub(super) beats: Beats,
     /// The attempts of a qualification.
     notes: Vec<Note>,
 }
@@ -138,6 +141,7 @@ impl Player {
             stored: false,
             before: None,
             qualifies: false,
+            beats: Beats::default(),
             notes: Vec::new(),
         }
     }
@@ -443,6 +447,7 @@ impl Player {
 
     /// Plays a scenario on the model within limits.
     fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+        self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
             let other = other.properties.and_then(|all| all.get(place)).copied();

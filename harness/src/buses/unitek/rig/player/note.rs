@@ -194,6 +194,7 @@ impl Note {
     /// Plays the attempt on a model, whose clock is ahead and which has heard some requests before.
     fn shows(&self, other: Other, properties: &[Properties], (phase, heard): (Span, u8)) -> bool {
         let mut player = self.begun.clone();
+        player.beats.beat();
         let drives = self.drives.iter().zip(properties).enumerate();
         let drives = drives.map(|(place, (known, properties))| match other {
             Other::Deviates(own, deviation) if own == place => {
