@@ -3,6 +3,7 @@
 use super::exit::Exit;
 use super::help::command;
 use super::output::Output;
+use clap::Command;
 use std::path::Path;
 
 /// Prints the man page, or writes one a command into a folder.
@@ -14,11 +15,21 @@ pub(crate) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result
             clap_mangen::Man::new(command).render(&mut page)?;
             output.result(&String::from_utf8_lossy(&page))?;
         }
-        Some(folder) if folder.is_dir() => clap_mangen::generate_to(command, folder)?,
+        Some(folder) if folder.is_dir() => {
+            clap_mangen::generate_to(without_help(command), folder)?;
+        }
         Some(folder) => {
             output.complain(&format!("{} is not a folder", folder.display()));
             return Ok(Exit::Usage);
         }
     }
     Ok(Exit::Passed)
+}
+
+/// Hides the commands `help`: clap would make a page of each command once more below them.
+fn without_help(command: Command) -> Command {
+    command.mut_subcommands(|own| match own.get_name() {
+        "help" => own.hide(true),
+        _ => without_help(own),
+    })
 }

@@ -389,6 +389,11 @@ fn help_has_examples_and_exit_codes() {
         assert_eq!(code(&drivebench(&[command, "--help"])), 0, "{command}");
     }
     assert!(stdout(&drivebench(&["man"])).contains(".TH drivebench"));
+    let pages = tempfile::tempdir().expect("a folder");
+    let folder = pages.path().to_str().expect("a text");
+    assert_eq!(code(&drivebench(&["man", folder])), 0);
+    let has = |page: &str| pages.path().join(format!("drivebench-{page}.1")).exists();
+    assert!(has("rig-check") && has("run") && !has("help-run") && !has("rig-help"));
     assert!(stdout(&drivebench(&["completions", "bash"])).contains("drivebench"));
 }
 
