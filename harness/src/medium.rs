@@ -17,6 +17,15 @@ pub enum Medium {
 }
 
 impl Medium {
+    /// Bits a second.
+    #[must_use]
+    pub const fn bits_per_second(self) -> u32 {
+        match self {
+            Self::Octets(format) => format.bits_per_second,
+            Self::Frames(rate) => rate.bits_per_second(),
+        }
+    }
+
     /// How long an octet takes on the line; zero on a medium of frames.
     #[must_use]
     pub fn octet_time(self) -> Span {

@@ -1,7 +1,8 @@
 //! What a run carried, in order of time, so that it is recorded again as if it were heard.
 
 use super::recorder::{Carries, Piece, RecordedPlace};
-use crate::buses::{bits_per_second, carry_frames, share_a_line, telegrams};
+use crate::buses::{TelegramCutter, bits_per_second, carry_frames, share_a_line, telegrams};
+use crate::medium::Medium;
 use crate::report::pcapng::name;
 use crate::report::pcapng_frames::rate_of;
 use crate::report::walk::in_time;
@@ -32,6 +33,21 @@ impl Tape {
         } else {
             Self::of_links(traces, rate)
         }
+    }
+
+    /// What was recorded at ports up to `now`, in real time. The times of octets on a shared line show when a port was read, so its telegrams
+    /// end where their own octets say so; what has not ended is left out.
+    pub(crate) fn of_ports(traces: &[Trace], medium: Medium, now: Instant) -> Self {
+        let bits = medium.bits_per_second();
+        let mut tape = match share_a_line(traces) && !carry_frames(traces) {
+            true => Self::of_line(Carries::Line, bits, cut(traces, medium, now).into_iter()),
+            false => Self::of(traces, Rate::from_bits_per_second(bits).unwrap_or_default()),
+        };
+        // Where nothing was carried, nothing shows the rate.
+        for place in &mut tape.places {
+            place.bits_per_second = bits;
+        }
+        tape
     }
 
     fn of_frames(traces: &[Trace]) -> Self {
@@ -92,4 +108,26 @@ impl Tape {
             pieces: pieces.collect(),
         }
     }
+}
+
+/// The octets of a shared line, cut into telegrams.
+fn cut(traces: &[Trace], medium: Medium, now: Instant) -> Vec<(Instant, usize, Piece)> {
+    let channels = traces.iter().flat_map(|own| &own.channels);
+    let mut octets: Vec<_> = channels.flat_map(Channel::octets).collect();
+    octets.sort_by_key(|own| own.at);
+    let mut cutter = TelegramCutter::new(medium.octet_time());
+    let mut ended = Vec::new();
+    for octet in octets {
+        let at = octet.at.since_start().as_nanos();
+        ended.extend(cutter.cut(at));
+        if let Some(received) = octet.arrival() {
+            cutter.push(at, received);
+        }
+    }
+    ended.extend(cutter.cut(now.since_start().as_nanos()));
+    let pieces = ended.into_iter().filter_map(|(from, octets)| {
+        let at = octets.last()?.at;
+        Some((at, 0, Piece::Telegram(from, octets)))
+    });
+    pieces.collect()
 }

@@ -333,6 +333,9 @@ pub trait PortLink: Link {
 
     /// The inner links at which the bench has a port.
     fn inner_links(&self) -> &[InnerLink];
+
+    /// Empties the record of what was carried, which has a bound. Times and counts go on.
+    fn forget_record(&mut self);
 }
 
 /// A bus as a scenario sees it.

@@ -246,6 +246,16 @@ impl<A: Accounting> Pump<A> {
         self.inner.iter_mut().for_each(InnerLink::begin);
     }
 
+    /// As [`PortLink::forget_record`](super::PortLink::forget_record).
+    pub(crate) fn forget_record(&mut self) {
+        for port in &mut self.ports {
+            port.log = [Vec::new(), Vec::new()];
+        }
+        for inner in &mut self.inner {
+            inner.log.clear();
+        }
+    }
+
     /// As [`Link::busy`](super::Link::busy).
     pub(crate) fn busy(&self) -> bool {
         let now = self.now();

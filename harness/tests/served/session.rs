@@ -4,7 +4,7 @@ use crate::program::{Desk, ended};
 use crate::ring::Served;
 use harness::port::Endpoint;
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Lines, Read, Write};
+use std::io::{BufRead, BufReader, Lines, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 
 /// A session that is open.
@@ -74,7 +74,7 @@ impl Session {
     }
 }
 
-fn code(answer: &Value) -> u64 {
+fn code_of(answer: &Value) -> u64 {
     answer["error"]["code"].as_u64().unwrap_or_default()
 }
 
@@ -124,13 +124,13 @@ fn each_line_is_answered() {
     for (line, words) in refused {
         session.send(line.as_bytes());
         let answer = session.answer();
-        assert_eq!(code(&answer), 2, "{line}: {answer}");
+        assert_eq!(code_of(&answer), 2, "{line}: {answer}");
         let what = answer["error"]["what"].as_str().expect("a sentence");
         assert!(what.contains(words), "{line}: {what}");
     }
     // A line beyond its bound is skipped whole, and the next one is read.
     session.send(&vec![b'{'; 3 << 20]);
-    assert_eq!(code(&session.answer()), 2);
+    assert_eq!(code_of(&session.answer()), 2);
     let info = session.ask(&json!({"id": "x", "do": "info"}));
     assert_eq!(
         (&info["id"], &info["result"]["bus"]),
@@ -160,7 +160,7 @@ fn faults_are_counted_from_now_on() {
     assert!(events.contains("drive 1"), "{events}");
     // A scenario would begin without the fault and pass.
     let run = session.ask(&json!({"id": 5, "do": "run", "path": "9.7-parity-error"}));
-    assert_eq!(code(&run), 2, "{run}");
+    assert_eq!(code_of(&run), 2, "{run}");
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn scenarios_have_verdicts() {
     );
     assert_eq!(run["result"]["scenarios"][0]["finding"]["line"], 4, "{run}");
     let run = session.ask(&json!({"id": 3, "do": "run", "scenario": "title x\nrung 3\n"}));
-    assert_eq!(code(&run), 2, "{run}");
+    assert_eq!(code_of(&run), 2, "{run}");
 }
 
 /// The motor turns on between requests.
@@ -213,7 +213,7 @@ fn a_session_holds_the_bench_and_ends_in_the_safe_state() {
             .find(|own| own["id"] == id)
             .expect("an answer")
     };
-    assert_eq!(code(of(4)), 130, "{answers:?}");
+    assert_eq!(code_of(of(4)), 130, "{answers:?}");
     assert!(of(5).get("result").is_some(), "{answers:?}");
     let (last, output) = session.end();
     assert_eq!(last["code"], 0, "{last}");
@@ -267,31 +267,89 @@ fn a_rig_that_does_not_open_is_said_in_the_last_line() {
     ended(&output, 2, "");
 }
 
-/// The package's own tests, with the program of this build.
+/// What is exchanged from the request on is in the file, on every bus; `import` reads it.
 #[test]
-fn the_python_package_works() {
-    if !crate::debian::has("python3", "the_python_package_works") {
-        return;
+fn a_capture_is_read_by_import() {
+    let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
+    for (rig, drive, cell, said, code) in [
+        // A ring's master never pauses, so its capture begins in mid-conversation.
+        ("sim:3", "0", "nist", "bytes on 4 links", 5),
+        (
+            "sim:unitek:1",
+            "1",
+            "SPEED_ACTUAL",
+            "4 of drives compared",
+            0,
+        ),
+        ("sim:nordac", "8", "HIW", "of drives compared", 0),
+    ] {
+        let mut session = Session::open(&desk, &["--rig", rig]);
+        let file = format!("{}.pcapng", rig.replace(':', "-"));
+        let begun = session.ask(&json!({"id": 1, "do": "capture", "path": file}));
+        assert!(begun.get("result").is_some(), "{begun}");
+        session.ask(&json!({"id": 2, "do": "read", "drive": drive, "cells": [cell]}));
+        let ended_by = session.ask(&json!({"id": 3, "do": "capture-end"}));
+        let result = &ended_by["result"];
+        assert_eq!(result["lost"], 0, "{ended_by}");
+        assert!(
+            result["packets"].as_u64().is_some_and(|own| own >= 8),
+            "{ended_by}"
+        );
+        // What comes behind the end is not in it.
+        let length = std::fs::metadata(desk.path(&file)).expect("a file").len();
+        session.ask(&json!({"id": 4, "do": "read", "drive": drive, "cells": [cell]}));
+        for (request, words) in [
+            (json!({"id": 5, "do": "capture-end"}), "no capture"),
+            (
+                json!({"id": 6, "do": "capture", "path": file}),
+                "is there already",
+            ),
+            (
+                json!({"id": 7, "do": "capture", "path": "no/folder.pcapng"}),
+                "a folder that is there",
+            ),
+        ] {
+            let answer = session.ask(&request);
+            assert_eq!(code_of(&answer), 2, "{answer}");
+            assert!(answer.to_string().contains(words), "{answer}");
+        }
+        session.end();
+        let now = std::fs::metadata(desk.path(&file)).expect("a file").len();
+        assert_eq!(length, now);
+        ended(&desk.run(&["import", &file]), code, said);
     }
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("harness/python");
-    let mut child = Command::new("python3")
-        .args(["-m", "unittest", "discover", "-s", "tests"])
-        .current_dir(folder)
-        .env("PYTHONPATH", "src")
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .env("DRIVEBENCH", env!("CARGO_BIN_EXE_drivebench"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("python3");
-    let mut said = String::new();
-    let read = child
-        .stderr
-        .take()
-        .expect("a pipe")
-        .read_to_string(&mut said);
-    read.expect("text");
-    assert!(child.wait().is_ok_and(|own| own.success()), "{said}");
-    // `discover` without tests would pass too.
-    assert!(said.contains("Ran 8 tests"), "{said}");
+}
+
+/// On a rig with a port, times are those of the day, a scenario leaves a mark, and the end of the session writes the file.
+#[test]
+fn a_capture_of_a_port() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = at(&served);
+    let mut session = Session::open(&desk, &["--rig", "desk.toml"]);
+    session.ask(&json!({"id": 1, "do": "capture", "path": "ring.pcapng"}));
+    session.ask(&json!({"id": 2, "do": "read", "drive": 0, "cells": ["nist"]}));
+    let run = session.ask(&json!({"id": 3, "do": "run", "path": "9.4-process-data-cut"}));
+    assert!(run.get("result").is_some(), "{run}");
+    let read = session.ask(&json!({"id": 4, "do": "read", "drive": 1, "cells": ["nist"]}));
+    assert_eq!(read["result"]["values"][0]["unit"], "rpm", "{read}");
+    let (last, _) = session.end();
+    assert_eq!(last["code"], 0, "{last}");
+    let output = desk.run(&["import", "ring.pcapng"]);
+    ended(&output, 5, "scenario 9.4-process-data-cut is lost: ");
+    let bytes = std::fs::read(desk.path("ring.pcapng")).expect("a file");
+    // The first packet of the file, behind the section and three interfaces of a ring of two drives.
+    let mut rest = &bytes[..];
+    let word = |own: &[u8], at: usize| {
+        u32::from_le_bytes([own[at], own[at + 1], own[at + 2], own[at + 3]])
+    };
+    while word(rest, 0) != 6 {
+        rest = &rest[word(rest, 4) as usize..];
+    }
+    let nanos = u64::from(word(rest, 12)) << 32 | u64::from(word(rest, 16));
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let now = u64::try_from(now.expect("a time").as_nanos()).expect("a number");
+    assert!(
+        (now - 600_000_000_000..=now).contains(&nanos),
+        "{nanos} {now}"
+    );
 }

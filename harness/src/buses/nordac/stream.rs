@@ -240,6 +240,14 @@ impl PortLink for SegmentLink {
     fn inner_links(&self) -> &[InnerLink] {
         &[]
     }
+
+    fn forget_record(&mut self) {
+        self.pump.forget_record();
+        // Who is asked now sends what still comes.
+        let last = self.asked.pop();
+        self.asked.clear();
+        self.asked.extend(last);
+    }
 }
 
 impl Link for SegmentLink {

@@ -201,6 +201,10 @@ impl PortLink for StreamLink {
     fn inner_links(&self) -> &[InnerLink] {
         &self.pump.inner
     }
+
+    fn forget_record(&mut self) {
+        self.pump.forget_record();
+    }
 }
 
 impl Link for StreamLink {

@@ -1,5 +1,6 @@
 //! A bench that a session holds, whatever its bus.
 
+use super::HeldRecord;
 use crate::buses::commands::DriveCommand;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
@@ -47,6 +48,15 @@ pub(crate) trait HeldBench {
     /// # Errors
     /// [`Failure`]: the bus has no error mode.
     fn recover(&mut self) -> Result<String, Failure>;
+
+    /// What is recorded of the bus.
+    ///
+    /// # Errors
+    /// [`Failure`]: the bench has been given back.
+    fn record(&mut self) -> Result<HeldRecord, Failure>;
+
+    /// Forgets the record at ports, which has a bound. Simulated drives keep theirs.
+    fn forget(&mut self);
 
     /// What happened on the bus that no answer reports, since the last call.
     fn events(&mut self) -> Vec<String>;
@@ -144,6 +154,16 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         Err(Failure::refused(
             "this bus has no error mode: recover is for rings",
         ))
+    }
+
+    fn record(&mut self) -> Result<HeldRecord, Failure> {
+        Ok(HeldRecord::of(self.0.guarded(), 1))
+    }
+
+    fn forget(&mut self) {
+        if let Some(ports) = self.0.link().inner_mut().ports_mut() {
+            ports.forget_record();
+        }
     }
 
     fn events(&mut self) -> Vec<String> {

@@ -1,12 +1,14 @@
 //! `drivebench shell`: a session that holds a bench. People type commands with an editor, or write them into a pipe; with `--json` programs
 //! send one request a line on standard input and get one answer a line on standard output.
 
+mod capture;
 mod held;
 mod inbox;
 mod people;
 mod request;
 mod session;
 
+pub(crate) use capture::HeldRecord;
 pub(crate) use held::{HeldBench, HeldDrives, HeldPort};
 pub(crate) use request::schema;
 
@@ -195,6 +197,7 @@ fn serve(
         out: out.clone(),
         motion: arguments.leave,
         struck: false,
+        capture: None,
         ended,
         interrupt,
     };
@@ -202,6 +205,10 @@ fn serve(
     let exit = match opened {
         true => session.work(told),
         false => Exit::Interrupted,
+    };
+    let exit = match session.end_capture() {
+        Some(Err(failure)) => failure.tell(told).max(exit),
+        _ => exit,
     };
     let end = session
         .bench

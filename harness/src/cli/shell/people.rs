@@ -22,7 +22,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::spawn;
 
 /// Words of the shell alone, with what they do.
-const OWN: [(&str, &str, &str); 6] = [
+const OWN: [(&str, &str, &str); 8] = [
     (
         "wait",
         "wait TIME",
@@ -42,6 +42,16 @@ const OWN: [(&str, &str, &str); 6] = [
         "recover",
         "recover",
         "Bring rings out of the error mode and count their drives",
+    ),
+    (
+        "capture",
+        "capture FILE",
+        "Capture what is exchanged from now on; the file is in pcapng",
+    ),
+    (
+        "capture-end",
+        "capture-end",
+        "End the capture and write its file; so does the end of the shell",
     ),
     ("help", "help [COMMAND]", "List the commands, or show one"),
     (
@@ -205,6 +215,10 @@ pub(super) fn read_line(line: &str) -> Result<Option<SessionRequest>, String> {
             let line = line.trim_start_matches("fault").trim().to_owned();
             SessionRequest::Fault { line }
         }
+        "capture" => SessionRequest::Capture {
+            path: one("one file in pcapng, such as ring.pcapng,")?,
+        },
+        "capture-end" => SessionRequest::CaptureEnd {},
         own if COMMANDS.contains(&own) => SessionRequest::Command { words },
         other => return Err(unknown(other)),
     }))
@@ -274,6 +288,10 @@ pub(super) fn help(name: Option<&str>) -> Result<String, String> {
 pub(super) fn text(result: &Value) -> String {
     let word = |own: &Value, key: &str| own[key].as_str().unwrap_or_default().to_owned();
     let mut text = word(result, "found");
+    if let Some(packets) = result["packets"].as_u64() {
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(text, "{packets} packets in {}", word(result, "path"));
+    }
     let Some(scenarios) = result["scenarios"].as_array() else {
         return text;
     };
@@ -420,6 +438,11 @@ mod tests {
                 r#"{"do":"fault","line":"2->1 byte 10: flip 0"}"#,
             ),
             ("! 2->1: cut", r#"{"do":"fault","line":"! 2->1: cut"}"#),
+            (
+                "capture ring.pcapng",
+                r#"{"do":"capture","path":"ring.pcapng"}"#,
+            ),
+            ("capture-end", r#"{"do":"capture-end"}"#),
             ("exit", r#"{"do":"end"}"#),
             ("wait", "wait: a time, such as 500ms, expected"),
             (

@@ -97,6 +97,13 @@ pub(crate) enum SessionRequest {
         /// The line.
         line: String,
     },
+    /// Captures what is exchanged from now on.
+    Capture {
+        /// The file in pcapng; it must not be there yet.
+        path: String,
+    },
+    /// Ends the capture and writes its file; so does the end of the session.
+    CaptureEnd {},
     /// Ends the request under way, and takes those back that wait; with `of` only that one. Overtakes.
     Cancel {
         /// The `id` of the request; all by default.

@@ -1,5 +1,6 @@
 //! A session on an open bench: requests are done and answered one by one, and the bus is kept at work between them.
 
+use super::capture::SessionCapture;
 use super::inbox::{LineWriter, RequestReader, SessionItem};
 use super::people::{self, Turn};
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
@@ -91,6 +92,8 @@ pub(super) struct HeldSession {
     pub(super) motion: bool,
     /// A fault was injected. A scenario starts without it and would pass in spite of it.
     pub(super) struck: bool,
+    /// What is being captured.
+    pub(super) capture: Option<SessionCapture>,
     pub(super) ended: Arc<AtomicBool>,
     pub(super) interrupt: Arc<AtomicBool>,
 }
@@ -141,7 +144,7 @@ impl HeldSession {
                         self.happened(SessionEvent::Bus {
                             what: what.trim_end().to_owned(),
                         });
-                        if let Err(failure) = self.bench.resume() {
+                        if let Err(failure) = self.resume() {
                             return failure.tell(told);
                         }
                     }
@@ -167,10 +170,28 @@ impl HeldSession {
                 return Some(exit_of_trouble(&trouble));
             }
         }
-        match self.bench.resume() {
+        match self.resume() {
             Ok(()) => None,
             Err(failure) => Some(failure.tell(told)),
         }
+    }
+
+    /// Makes the link of use again. It may restart its record.
+    fn resume(&mut self) -> Result<(), Failure> {
+        let Some(capture) = &mut self.capture else {
+            return self.bench.resume();
+        };
+        capture.collect(&mut *self.bench)?;
+        self.bench.resume()?;
+        capture.goes_on(self.bench.record()?.now);
+        Ok(())
+    }
+
+    /// Ends the capture, if there is one, and writes its file.
+    pub(super) fn end_capture(&mut self) -> Option<Result<Value, Failure>> {
+        let mut capture = self.capture.take()?;
+        let collected = capture.collect(&mut *self.bench);
+        Some(collected.and_then(|()| capture.write()))
     }
 
     /// Reports what no request asked for.
@@ -367,6 +388,21 @@ impl HeldSession {
             }
             SessionRequest::Wrong { what } => return Err(Failure::refused(what.clone())),
             SessionRequest::Recover {} => json!({"found": self.bench.recover()?}),
+            SessionRequest::Capture { .. } if self.capture.is_some() => {
+                return Err(Failure::refused(
+                    "a capture is under way: `capture-end` writes it",
+                ));
+            }
+            SessionRequest::Capture { path } => {
+                let simulated = self.rig.is_simulated();
+                self.capture = Some(SessionCapture::begin(path, &mut *self.bench, simulated)?);
+                json!({})
+            }
+            SessionRequest::CaptureEnd {} => {
+                let none = "no capture is under way: `capture` begins one";
+                let kept = self.end_capture().ok_or_else(|| Failure::refused(none))?;
+                kept?
+            }
             // What they break off has been broken off.
             SessionRequest::Cancel { .. } | SessionRequest::End {} => json!({}),
             SessionRequest::Run { scenario, path } => {
@@ -498,11 +534,21 @@ impl HeldSession {
                 "a scenario does not meet the faults of this session: write them into the scenario",
             ));
         }
-        match self.rig.is_bare() {
+        if self.rig.is_bare() {
             // Drives of its own.
-            true => Ok(play_entry(entry, AtMismatch::Stop).outcome),
-            false => Ok(self.bench.play(entry)?.outcome),
+            return Ok(play_entry(entry, AtMismatch::Stop).outcome);
         }
+        let Some(capture) = &mut self.capture else {
+            return Ok(self.bench.play(entry)?.outcome);
+        };
+        capture.collect(&mut *self.bench)?;
+        let played = self.bench.play(entry);
+        // The link begins anew, perhaps several times.
+        capture.leave_out(
+            &format!("scenario {}", entry.short_name()),
+            &mut *self.bench,
+        )?;
+        Ok(played?.outcome)
     }
 }
 

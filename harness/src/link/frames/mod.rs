@@ -418,6 +418,10 @@ impl PortLink for FrameLink {
     fn inner_links(&self) -> &[InnerLink] {
         &[]
     }
+
+    fn forget_record(&mut self) {
+        self.log.clear();
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::buses::novobus::language::plan::RingAct;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::shell::HeldBench;
+use crate::cli::shell::{HeldBench, HeldRecord};
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
@@ -83,11 +83,14 @@ impl HeldRings {
         if let Some(bench) = self.bench.take() {
             bench.bus.clone().close();
         }
-        let gone = || Failure::Bus(Exit::RigError, "the rig has been given back".to_owned());
-        let done = self.rig.with(act).ok_or_else(gone)?;
+        let done = self.rig.with(act).ok_or_else(given_back)?;
         self.open()?;
         Ok(done)
     }
+}
+
+fn given_back() -> Failure {
+    Failure::Bus(Exit::RigError, "the rig has been given back".to_owned())
 }
 
 /// A scenario counts bytes from its start; a session has none and counts from now. A time of a fault cannot be counted like this.
@@ -193,6 +196,31 @@ impl HeldBench for HeldRings {
         Ok(texts
             .map(|(ring, own)| super::recover::text(ring, own))
             .collect())
+    }
+
+    fn record(&mut self) -> Result<HeldRecord, Failure> {
+        let rings = self.plan.rings.len();
+        let record = self.rig.with(|session| {
+            let link = session.link();
+            let mut record = HeldRecord::of(link, rings);
+            // Inner links without a port are not silent: nobody listens.
+            for (ring, trace) in record.traces.iter_mut().enumerate() {
+                let mut places = 0..;
+                trace
+                    .channels
+                    .retain(|_| places.next().is_some_and(|place| link.listens(ring, place)));
+            }
+            record
+        });
+        record.ok_or_else(given_back)
+    }
+
+    fn forget(&mut self) {
+        self.rig.with(|session| {
+            if let Some(ports) = session.ports() {
+                ports.forget_record();
+            }
+        });
     }
 
     fn events(&mut self) -> Vec<String> {

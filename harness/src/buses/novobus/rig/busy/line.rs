@@ -287,4 +287,8 @@ impl PortLink for BusyLine {
     fn inner_links(&self) -> &[InnerLink] {
         &[]
     }
+
+    fn forget_record(&mut self) {
+        // That of the simulated ring has no bound.
+    }
 }
