@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import unittest
 
 import drivebench
+
+
+def number(value: drivebench.Quantity | str | None) -> drivebench.Quantity:
+    assert isinstance(value, drivebench.Quantity), value
+    return value
 
 
 class OnRings(unittest.TestCase):
@@ -14,8 +21,7 @@ class OnRings(unittest.TestCase):
             drive["nsoll"] = "100rpm"
             drive.go()
             rig.wait(1)
-            speed = drive["nist"]
-            assert isinstance(speed, drivebench.Quantity)
+            speed = number(drive["nist"])
             self.assertEqual(speed.unit, "rpm")
             self.assertAlmostEqual(speed, 100, delta=5)
             self.assertEqual(drive.state()["mode"], "go")
@@ -27,7 +33,7 @@ class OnRings(unittest.TestCase):
                 rig.drive(0).go()
             self.assertEqual(caught.exception.exit_code, 2)
             # The session goes on.
-            self.assertEqual(rig.drive(0)["nist"].unit, "rpm")
+            self.assertEqual(number(rig.drive(0)["nist"]).unit, "rpm")
 
     def test_scenarios(self) -> None:
         with drivebench.Rig("sim:3") as rig:
@@ -42,7 +48,7 @@ class OnRings(unittest.TestCase):
             rig.fault("2->1: flip 0")
             rig.wait(0.1)
             rig.drive(0)["nist"]
-            self.assertTrue(any(event["event"] == "bus" for event in rig.events), list(rig.log))
+            self.assertIn("the link from drive 2 to drive 1", rig.happened[0])
 
     def test_a_byte_is_counted_from_now_on(self) -> None:
         with drivebench.Rig("sim:3") as rig:
@@ -50,7 +56,48 @@ class OnRings(unittest.TestCase):
             rig.fault("2->1 byte 10: flip 0")
             rig.wait(0.1)
             rig.drive(0)["nist"]
-            self.assertTrue(any("drive 1" in event.get("what", "") for event in rig.events), list(rig.log))
+            self.assertTrue(any("drive 1" in what for what in rig.happened), list(rig.log))
+
+    def test_a_capture(self) -> None:
+        with tempfile.TemporaryDirectory() as folder, drivebench.Rig("sim:3") as rig:
+            path = os.path.join(folder, "ring.pcapng")
+            with rig.capture(path) as capture:
+                rig.drive(0)["nist"]
+                with self.assertRaises(drivebench.Error) as caught:
+                    rig.capture(os.path.join(folder, "other.pcapng"))
+                self.assertIn("capture-end", str(caught.exception))
+                self.assertFalse(os.path.exists(path))
+            self.assertGreater(capture.packets or 0, 10)
+            self.assertEqual(capture.lost, 0)
+            self.assertGreater(os.path.getsize(path), 100)
+            with self.assertRaises(drivebench.Error) as caught:
+                rig.capture(path)
+            self.assertIn("is there already", str(caught.exception))
+
+    def test_the_end_of_the_session_writes_a_capture(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "ring.pcapng")
+            with drivebench.Rig("sim:3") as rig:
+                rig.capture(path)
+                rig.drive(0)["nist"]
+            self.assertGreater(os.path.getsize(path), 100)
+
+    def test_a_program_that_says_nothing(self) -> None:
+        with self.assertRaises(drivebench.Error) as caught:
+            drivebench.Rig(program=["sh", "-c", "exec sleep 60"], timeout=0.1)
+        self.assertIn("no event `ready` after 0.1 s", str(caught.exception))
+
+    def test_a_program_that_is_not_there(self) -> None:
+        with self.assertRaises(drivebench.Error) as caught:
+            drivebench.Rig(program="/no/such/program")
+        self.assertEqual(caught.exception.exit_code, 2)
+        self.assertIn("/no/such/program", str(caught.exception))
+
+    def test_a_program_that_is_none_of_ours(self) -> None:
+        for program in ["true", ["sh", "-c", "echo hello"]]:
+            with self.assertRaises(drivebench.Error) as caught:
+                drivebench.Rig(program=program)
+            self.assertEqual(caught.exception.exit_code, 3)
 
     def test_no_such_rig(self) -> None:
         with self.assertRaises(drivebench.Error) as caught:
@@ -68,8 +115,7 @@ class OnPorts(unittest.TestCase):
         with drivebench.Rig("sim:nordac", allow_motion=True) as rig:
             rig.command("exchange", "8", "STW=047E", "then", "STW=047F", "HSW=50%")
             rig.wait(5)
-            actual = rig.drive(8)["HIW"]
-            assert isinstance(actual, drivebench.Quantity)
+            actual = number(rig.drive(8)["HIW"])
             # It turns on between requests.
             self.assertAlmostEqual(actual, 50, delta=1)
 

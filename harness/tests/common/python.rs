@@ -1,21 +1,21 @@
-//! Python with python-can, which `.ci/tools` installs into a virtual environment in `target`.
+//! Python with packages of others, which `.ci/tools` installs into a virtual environment in `target`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A Python that has this module and pyserial: that of `DRIVEBENCH_PYTHON`, that of `.ci/tools`, or the system's. Without one, prints that
+/// A Python that has these modules and pyserial: that of `DRIVEBENCH_PYTHON`, that of `.ci/tools`, or the system's. Without one, prints that
 /// the test `who` is skipped.
-pub(crate) fn with(module: &str, who: &str) -> Option<PathBuf> {
+pub(crate) fn with(modules: &str, who: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python/bin/python");
     let given = std::env::var_os("DRIVEBENCH_PYTHON").map(PathBuf::from);
     let imports = |python: &PathBuf| {
         let mut command = Command::new(python);
-        let import = format!("import {module}, serial");
+        let import = format!("import {modules}, serial");
         let output = command.args(["-c", &import]).output();
         output.is_ok_and(|output| output.status.success())
     };
     let all = given.into_iter().chain([own, "python3".into()]);
     let found = all.into_iter().find(imports);
-    crate::debian::told(found.is_some(), &format!("Python with {module}"), who);
+    crate::debian::told(found.is_some(), &format!("Python with {modules}"), who);
     found
 }

@@ -22,6 +22,7 @@ mod port_interlocks;
 mod program;
 #[path = "../common/python.rs"]
 mod python;
+mod python_package;
 #[path = "../common/record.rs"]
 mod record;
 mod reports;

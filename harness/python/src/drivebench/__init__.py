@@ -8,10 +8,11 @@ import queue
 import subprocess
 import threading
 from collections import deque
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
-__all__ = ["Drive", "Error", "Quantity", "Rig", "Run"]
+__all__ = ["Capture", "Drive", "Error", "Quantity", "Rig", "Run"]
 
 #: How long an answer is waited for by default, in seconds.
 TIMEOUT = 30.0
@@ -60,6 +61,37 @@ class Run:
         return f"<Run {self.verdict} {self.counts} {found}>"
 
 
+class Capture:
+    """What a rig exchanges until the block, the session or `end` ends it: a file in pcapng."""
+
+    def __init__(self, rig: Rig, path: str | os.PathLike[str]) -> None:
+        self._rig = rig
+        #: The file. It is written at the end.
+        self.path = os.path.abspath(path)
+        #: How many packets were written; a packet is a byte of a ring, a telegram or a frame.
+        self.packets: int | None = None
+        #: How many bytes, telegrams or frames a full record has not kept.
+        self.lost: int | None = None
+        rig.request("capture", path=self.path)
+
+    def end(self) -> Capture:
+        """Writes the file."""
+        result = self._rig.request("capture-end")
+        self.packets, self.lost = result["packets"], result["lost"]
+        return self
+
+    def __enter__(self) -> Capture:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        try:
+            if self.packets is None:
+                self.end()
+        except Error:
+            if kind is None:
+                raise
+
+
 class Drive:
     """A drive of a rig. Its cells, registers or parameters are read and written by their names."""
 
@@ -102,21 +134,34 @@ class Rig:
     """A rig in use. It is locked for others until the block ends, which takes the drives to their safe state."""
 
     def __init__(
-        self, name: str = "sim:3", *, allow_motion: bool = False, program: str | None = None, timeout: float = TIMEOUT
+        self,
+        name: str = "sim:3",
+        *,
+        allow_motion: bool = False,
+        program: str | Sequence[str] | None = None,
+        timeout: float = TIMEOUT,
     ) -> None:
+        """Opens `sim:3`, a rig's file or its name. An answer is waited for up to `timeout` seconds. `program` is `drivebench` by default, or `$DRIVEBENCH`; words in front of it, such as
+        `["ssh", "lab", "drivebench"]`, start it elsewhere."""
         self.name = name
         self.timeout = timeout
         self.log: deque[str] = deque(maxlen=KEPT_LINES)
         self.events: deque[dict[str, Any]] = deque(maxlen=KEPT_LINES)
         self._number = 0
         self._lines: queue.Queue[dict[str, Any] | None] = queue.Queue()
-        words = [program or os.environ.get("DRIVEBENCH", "drivebench"), "shell", "--json", "--rig", name]
+        program = program or os.environ.get("DRIVEBENCH", "drivebench")
+        words = [program] if isinstance(program, str) else list(program)
+        words += ["shell", "--json", "--rig", name]
         if allow_motion:
             words.append("--move")
-        self._process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, encoding="utf-8"
-        )
-        threading.Thread(target=self._read, daemon=True).start()
+        try:
+            self._process = subprocess.Popen(
+                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, encoding="utf-8"
+            )
+        except OSError as error:
+            raise Error(f"failed to start {words[0]}: {error}; install drivebench, or name the program in DRIVEBENCH", 2) from None
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
         self.end: dict[str, Any] | None = None
         ready = self._event("ready")
         self.bus: str = ready["bus"]
@@ -125,17 +170,23 @@ class Rig:
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self.log.append("< " + line.rstrip())
-            self._lines.put(json.loads(line))
+        with self._process.stdout as lines:
+            for text in lines:
+                self.log.append("< " + text.rstrip())
+                try:
+                    line = json.loads(text)
+                except ValueError:
+                    line = {"event": "end", "code": 3, "what": f"no JSON: {text.rstrip()}"}
+                self._lines.put(line)
         self._lines.put(None)
 
-    def _next(self, awaited: str) -> dict[str, Any]:
+    def _next(self, awaited: str, more: float = 0) -> dict[str, Any]:
+        timeout = self.timeout + more
         try:
-            line = self._lines.get(timeout=self.timeout)
+            line = self._lines.get(timeout=timeout)
         except queue.Empty:
             self._process.terminate()
-            raise Error(f"{self.name}: no {awaited} after {self.timeout:g} s", 3) from None
+            raise Error(f"{self.name}: no {awaited} after {timeout:g} s", 3) from None
         if line is None:
             raise Error(f"{self.name}: the session ended without {awaited}", 3)
         if line.get("event") == "end":
@@ -152,11 +203,32 @@ class Rig:
                 if line.get("event") == name:
                     return line
         except Error:
-            self._process.wait(self.timeout)
+            self._leave()
             raise
+
+    def _close_input(self) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.close()
+        except BrokenPipeError:
+            pass  # The program has ended already.
+
+    def _leave(self) -> None:
+        """Waits for the program's end."""
+        self._close_input()
+        try:
+            self._process.wait(self.timeout)
+        except subprocess.TimeoutExpired:
+            self._process.terminate()
+            self._process.wait(self.timeout)
+        self._reader.join(self.timeout)
 
     def request(self, do: str, **arguments: Any) -> dict[str, Any]:
         """Sends a request and returns its result; see `drivebench schema session`."""
+        return self._request(0, do, arguments)
+
+    def _request(self, lasts: float, do: str, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Sends a request that takes so many seconds by itself."""
         if self._process.stdin is None or self._process.stdin.closed:
             raise Error(f"{self.name}: the session has ended", 3)
         self._number += 1
@@ -169,7 +241,7 @@ class Rig:
         except BrokenPipeError:
             pass  # The last line says why the session has ended.
         while True:
-            line = self._next(f"answer to `{do}`")
+            line = self._next(f"answer to `{do}`", lasts)
             if line.get("id") == number:
                 if "error" in line:
                     raise Error(line["error"]["what"], line["error"]["code"])
@@ -177,21 +249,30 @@ class Rig:
             if "error" in line and line.get("id") is None:
                 raise Error(line["error"]["what"], line["error"]["code"])
 
+    @property
+    def happened(self) -> list[str]:
+        """What happened on the bus that no request asked for, in words; the last 200 events at most."""
+        return [event["what"] for event in self.events if event["event"] == "bus"]
+
     def drive(self, number: int | str) -> Drive:
         """A drive by its number: `3`, or `"2:3"` in the second ring."""
         return Drive(self, number)
 
     def wait(self, seconds: float) -> None:
         """Lets time pass on the bus, at most 60 s. Simulated time passes at once."""
-        self.request("wait", ms=round(seconds * 1000))
+        self._request(seconds, "wait", {"ms": round(seconds * 1000)})
 
     def stop(self) -> None:
         """Stops all drives."""
         self.request("stop")
 
     def fault(self, line: str) -> None:
-        """Injects a fault into simulated rings, as a scenario writes it: `98->97: flip 0`."""
+        """Injects a fault into simulated rings, as a scenario writes it: `98->97 byte 10: flip 0`; the byte is counted from now on."""
         self.request("fault", line=line)
+
+    def capture(self, path: str | os.PathLike[str]) -> Capture:
+        """Captures what is exchanged from now on; the file must not be there. `with rig.capture("turn.pcapng"): ...`"""
+        return Capture(self, path)
 
     def recover(self) -> str:
         """Brings rings out of the error mode and counts their drives."""
@@ -208,11 +289,7 @@ class Rig:
 
     def close(self) -> None:
         """Ends the session; raises where the safe state is not confirmed."""
-        if self._process.stdin is not None and not self._process.stdin.closed:
-            try:
-                self._process.stdin.close()
-            except BrokenPipeError:
-                pass
+        self._close_input()
         try:
             while self.end is None:
                 self._next("end")
@@ -220,11 +297,7 @@ class Rig:
             if self.end is None or error.exit_code != 0:
                 raise
         finally:
-            try:
-                self._process.wait(self.timeout)
-            except subprocess.TimeoutExpired:
-                self._process.terminate()
-                self._process.wait(self.timeout)
+            self._leave()
 
     def __enter__(self) -> Rig:
         return self

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,33 +12,64 @@ import pytest
 from . import Drive, Rig
 
 _RIG = pytest.StashKey[Rig]()
+#: The longest name of a file of evidence, without its ending.
+_LONGEST = 120
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("drivebench")
     group.addoption("--drivebench-rig", default="sim:3", metavar="RIG", help="the rig of the tests: sim:N, a file or a name (default: sim:3)")
     group.addoption("--drivebench-program", default=None, metavar="PATH", help="the program drivebench (default: $DRIVEBENCH, or on the path)")
+    group.addoption("--drivebench-evidence", default=None, metavar="FOLDER", help="keep a capture of each test in this folder, in pcapng")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "drivebench_motion: motors may turn in this test, as far as the rig's file permits it")
+    folder = config.getoption("--drivebench-evidence")
+    if folder is not None:
+        try:
+            (config.invocation_params.dir / folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise pytest.UsageError(f"--drivebench-evidence {folder}: {error}") from None
+
+
+def _evidence(item: pytest.Item) -> Path | None:
+    """A file for the capture of a test that is not there yet."""
+    folder = item.config.getoption("--drivebench-evidence")
+    if folder is None:
+        return None
+    folder = item.config.invocation_params.dir / folder
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", item.nodeid)[-_LONGEST:].strip("-.")
+    path: Path = folder / f"{name}.pcapng"
+    number = 1
+    while path.exists():
+        number += 1
+        path = folder / f"{name}-{number}.pcapng"
+    return path
 
 
 @pytest.fixture
 def drivebench_rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     """A rig for one test. Motors may turn only in a test with the marker `drivebench_motion`."""
-    motion = request.node.get_closest_marker("drivebench_motion") is not None
+    item = request.node
+    motion = item.get_closest_marker("drivebench_motion") is not None
     name = request.config.getoption("--drivebench-rig")
     with Rig(name, allow_motion=motion, program=request.config.getoption("--drivebench-program")) as rig:
-        request.node.stash[_RIG] = rig
-        yield rig
+        item.stash[_RIG] = rig
+        item.user_properties += [("drivebench_rig", name), ("drivebench_bus", rig.bus)]
+        path = _evidence(item)
+        if path is None:
+            yield rig
+        else:
+            item.user_properties.append(("drivebench_capture", str(path)))
+            with rig.capture(path):
+                yield rig
 
 
 @pytest.fixture
 def drivebench_drive(drivebench_rig: Rig) -> Drive:
     """The first drive of the rig."""
-    number = drivebench_rig.drives[0]
-    return drivebench_rig.drive(number)
+    return drivebench_rig.drive(drivebench_rig.drives[0])
 
 
 @pytest.hookimpl(wrapper=True)
