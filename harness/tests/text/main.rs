@@ -12,6 +12,7 @@ mod html;
 mod junit_rules;
 mod nordac;
 mod nordac_drive;
+mod package;
 mod public_api;
 #[path = "../common/record.rs"]
 mod record;
