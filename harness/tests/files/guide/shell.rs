@@ -13,8 +13,13 @@ use std::time::{Duration, Instant};
 /// A page that hangs is ended; no page is judged by how long it takes.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// What a page needs whose commands call `python3` with a package: as it is called, and its module.
-const PYTHON: [(&str, &str); 2] = [("python-can", "can"), ("pyprofibus", "pyprofibus")];
+/// What a page needs whose commands call `python3` with a package: as it is called, and its modules.
+const PYTHON: [(&str, &str); 4] = [
+    ("python-can", "can"),
+    ("pyprofibus", "pyprofibus"),
+    ("pytest", "drivebench, pytest"),
+    ("labgrid", "drivebench, labgrid, pytest"),
+];
 
 /// The module of a package that a block needs; `None` for a block that needs none.
 fn module(mode: &Mode) -> Option<&'static str> {
