@@ -6,7 +6,7 @@ use super::scanner::Scanner;
 use std::fmt::{self, Display};
 
 /// The most bytes that the lines of one scenario may send, and that they may expect.
-pub const MAX_BYTES: usize = 1_000_000;
+pub const MAX_BYTES: usize = 4_000_000;
 
 /// The most cells that one line may speak of: more than a drive has.
 pub const MAX_CELLS: usize = 1024;

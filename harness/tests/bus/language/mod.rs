@@ -259,9 +259,9 @@ fn what_cannot_be_is_refused_with_its_range() {
     refused(&steps("> (300)"), "300", "300 is not a byte", None);
     refused(&steps("> (1/0)"), "1/0", "no value", None);
     refused(
-        &steps("> 80*2000000"),
-        "80*2000000",
-        "more than 1000000 bytes",
+        &steps("> 80*8000000"),
+        "80*8000000",
+        "more than 4000000 bytes",
         None,
     );
     refused(&steps("! 2->1 byte 0: drop"), "0", "no byte 0", None);
