@@ -2,7 +2,7 @@
 
 use super::lock::PortLock;
 use super::port_file::Port;
-use super::segment::Beats;
+use super::segment::observed::Beats;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Options, Rig, SessionError, file, standing};

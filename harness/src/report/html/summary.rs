@@ -122,7 +122,7 @@ fn sentences(shown: &[ShownScenario]) -> String {
     let failed = shown.iter().filter(bad).count();
     let rest = match skips {
         0 => String::new(),
-        one => format!("; {one} skipped"),
+        one => format!(" {one} skipped."),
     };
     let mut text = match shown.iter().find(bad) {
         Some(first) => {
@@ -133,7 +133,7 @@ fn sentences(shown: &[ShownScenario]) -> String {
             let name = &first.row.name;
             let first = if failed > 1 { "the first is " } else { "" };
             format!(
-                "{failed} of {} failed{rest}: {first}{name}: {why}.",
+                "{failed} of {} failed: {first}{name}: {why}.{rest}",
                 counted(played, "scenario")
             )
         }
@@ -142,7 +142,7 @@ fn sentences(shown: &[ShownScenario]) -> String {
             let passed = |own: &&ShownScenario| own.row.verdict == Verdict::Passed;
             let passed = shown.iter().filter(passed).count();
             format!(
-                "{passed} of {} passed, and none failed{rest}.",
+                "{passed} of {} passed, and none failed.{rest}",
                 counted(played, "scenario")
             )
         }

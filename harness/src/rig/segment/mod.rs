@@ -10,26 +10,6 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-/// The count by which a session's watchdog sees that the program works; none on a record and on simulated drives.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Beats(Option<Arc<AtomicU64>>);
-
-impl Beats {
-    /// Those of ports.
-    pub(crate) const fn of(count: Arc<AtomicU64>) -> Self {
-        Self(Some(count))
-    }
-
-    /// The program works.
-    pub(crate) fn beat(&self) {
-        if let Some(count) = &self.0 {
-            count.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-}
 
 /// What the link of a rig with an adapter can do, within the limits of the rig.
 pub(crate) const ON_PORT: [Capability; 3] =

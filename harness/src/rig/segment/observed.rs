@@ -6,6 +6,8 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a bus notes of its link. LinkNotes follow from what the link shows, so that a record gives the same ones.
 pub(crate) trait LinkNotes: Default + Send {
@@ -90,6 +92,24 @@ impl LinkTimes {
             tolerance: self.tolerance,
             parts: Some(parts),
         })
+    }
+}
+
+/// The count by which a session's watchdog sees that the program works; none on a record and on simulated drives.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Beats(Option<Arc<AtomicU64>>);
+
+impl Beats {
+    /// Those of ports.
+    pub(crate) const fn of(count: Arc<AtomicU64>) -> Self {
+        Self(Some(count))
+    }
+
+    /// The program works.
+    pub(crate) fn beat(&self) {
+        if let Some(count) = &self.0 {
+            count.fetch_add(1, Ordering::Relaxed);
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Scenarios on a rig with a port, and their attempts judged again from a record, whatever the bus.
 
-use super::{Beats, OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
+use super::observed::Beats;
+use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession, failed};

@@ -122,7 +122,7 @@ fn a_page_says_what_came_of_it() {
         ],
     );
     sound(&parse(&rig));
-    let sentence = "0 of 1 scenario passed, and none failed; 1 skipped. The cable between drives 98 and 97 damages bytes: 1 of 1 fault was located there.";
+    let sentence = "0 of 1 scenario passed, and none failed. 1 skipped. The cable between drives 98 and 97 damages bytes: 1 of 1 fault was located there.";
     assert!(rig.contains(sentence), "{rig}");
     assert!(rig.contains("the rig has no tap") && !rig.contains("id=\"s2\""));
     assert!(rig.contains("Damaged bytes: what was sent, and what arrived"));
