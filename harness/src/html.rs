@@ -2,6 +2,7 @@
 //! through [`Html::text`] or into an attribute, and both escape it. There is no other way into a page.
 
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use std::fmt::{self, Display, Write as _};
 
 /// A name and the value of an attribute.
@@ -164,6 +165,30 @@ impl Html {
     }
 }
 
+/// How a policy of a page names a script or a style that is part of it: `'sha256-...'`.
+pub(crate) fn hash_source(text: &str) -> String {
+    format!("'sha256-{}'", base64(&Sha256::digest(text.as_bytes())))
+}
+
+/// RFC 4648, as a policy writes a sum.
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::new();
+    for three in bytes.chunks(3) {
+        let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for place in 0..4 {
+            let digit = bits >> (18 - 6 * place) & 63;
+            if place <= three.len() {
+                out.push(char::from(DIGITS[digit as usize]));
+            } else {
+                out.push('=');
+            }
+        }
+    }
+    out
+}
+
 /// Characters that change how the text around them is read, and cannot be seen: U+202E turns `exe.txt` round.
 const fn is_invisible(c: char) -> bool {
     matches!(c, '\u{061C}' | '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2060}'..='\u{2069}' | '\u{FEFF}')
@@ -193,6 +218,21 @@ impl fmt::Write for Escaped<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// RFC 4648, section 10.
+    #[test]
+    fn sums_are_written_as_policies_want_them() {
+        let vectors = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (text, expected) in vectors {
+            assert_eq!(base64(text.as_bytes()), expected);
+        }
+    }
 
     #[test]
     fn text_is_text() {
