@@ -38,6 +38,8 @@ pub use scenario::verdict::Verdict;
 mod counted;
 mod embed;
 mod html;
+#[doc(hidden)]
+pub mod listen;
 mod regular;
 mod signals;
 mod trouble;
@@ -88,3 +90,5 @@ pub mod serve;
 pub mod top;
 #[doc(hidden)]
 pub mod traffic;
+#[doc(hidden)]
+pub mod web;
