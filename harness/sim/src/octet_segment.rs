@@ -217,6 +217,12 @@ impl<S: LineStation> OctetSegment<S> {
         self.members.iter_mut().for_each(|own| own.record.clear());
     }
 
+    /// Keeps a record again, of what happens from now on.
+    pub fn record_anew(&mut self) {
+        self.keep_no_record();
+        self.keeps_record = true;
+    }
+
     /// The octets of a station so far, in order of time. An octet without a sent value was inserted by a fault.
     #[must_use]
     pub fn record(&self, place: usize) -> &[LineByte] {

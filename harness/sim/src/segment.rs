@@ -174,6 +174,11 @@ impl<S: Station> Segment<S> {
         self.record = None;
     }
 
+    /// Keeps a record again, of what happens from now on.
+    pub fn record_anew(&mut self) {
+        self.record = Some(Vec::new());
+    }
+
     /// The frames on the wire so far, in order of time. Their senders are the places of stations, from 0 on; of several that sent the
     /// same frame the first.
     #[must_use]

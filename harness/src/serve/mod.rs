@@ -13,6 +13,7 @@ mod place;
 mod pty;
 mod served;
 mod shell;
+mod stage;
 mod tcp;
 
 pub use crate::buses::rings::serve::Server;

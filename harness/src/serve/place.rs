@@ -9,6 +9,8 @@ pub enum ServedAt {
     Tcp(String),
     /// On a pseudo terminal with a link at this path, which must not be there yet.
     Pty(PathBuf),
+    /// Nowhere: no client comes. What happens is shown on the live page.
+    Nowhere,
 }
 
 /// Where lines of control come from.

@@ -1,6 +1,7 @@
 //! What a bus behind streams of octets offers the shell: octets and the time are arguments, deadlines are return values.
 
 use super::control::Answer;
+use crate::web::LiveView;
 use harness_proto::marks::BadMark;
 use harness_proto::time::Instant;
 
@@ -39,4 +40,6 @@ pub trait ServedBus {
     fn deadline(&self) -> Instant;
     /// Does a line of control at once; `None` for an empty line or a comment.
     fn control(&mut self, line: &str) -> Option<Answer>;
+    /// What it shows on a live page.
+    fn live(&mut self) -> &mut dyn LiveView;
 }

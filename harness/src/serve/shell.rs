@@ -5,8 +5,10 @@ use super::control_stream::ControlStream;
 use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
 use super::served::ServedBus;
+use super::stage::Stage;
 use super::tcp::{Tcp, Visitor};
 use crate::counted::counted;
+use crate::listen::ListenError;
 use crate::port::wake_on_time;
 use crate::signals;
 use harness_proto::time::{Instant, Span};
@@ -29,6 +31,8 @@ pub struct Job {
     pub places: Vec<ServedAt>,
     /// Where lines of control come from, if there are any.
     pub control: Option<ControlPlace>,
+    /// Where the live page is served, if it is.
+    pub page: Option<String>,
     /// Whether sockets may listen at addresses that other machines reach.
     pub allow_remote: bool,
     /// Whether the end comes when the clients have gone.
@@ -62,23 +66,9 @@ pub enum ServeError {
     /// The bus has another medium than this way of serving.
     #[error("this bus is not served in this way; see the help of sim")]
     Medium,
-    /// Other machines could reach it.
-    #[error(
-        "{address} can be reached from other machines, and whoever connects is the master: a loopback address such as 127.0.0.1 \
-         expected, or --allow-remote"
-    )]
-    Remote {
-        /// The address.
-        address: SocketAddr,
-    },
-    /// The socket cannot listen.
-    #[error("failed to listen at {address}: {error}; HOST:PORT expected, port 0 for a free one")]
-    Listen {
-        /// As written.
-        address: String,
-        /// Why.
-        error: io::Error,
-    },
+    /// A socket does not listen.
+    #[error(transparent)]
+    Listen(#[from] ListenError),
     /// The path exists already.
     #[error("{} exists already; name another path, or remove it if no program serves there", path.display())]
     Exists {
@@ -149,13 +139,19 @@ pub(crate) fn serve_until(
         ends.push(match place {
             ServedAt::Tcp(address) => Seat::Tcp(Tcp::listen(address, job.allow_remote)?),
             ServedAt::Pty(path) => Seat::Pty(Pty::open(path)?),
+            ServedAt::Nowhere => Seat::Nowhere,
         });
     }
     let control = job.control.as_ref();
     let control = control
         .map(|place| ControlStream::open(place, job.allow_remote))
         .transpose()?;
+    let page = job.page.as_ref();
+    let stage = page
+        .map(|place| Stage::open(place, job.allow_remote, server.live()))
+        .transpose()?;
     let mut shell = Shell {
+        stage,
         garbled: vec![false; ends.len()],
         losing: vec![false; ends.len()],
         server: &mut server,
@@ -225,12 +221,14 @@ impl Drop for EndRequest {
 enum Seat {
     Tcp(Tcp),
     Pty(Pty),
+    Nowhere,
 }
 
 struct Shell<'a> {
     server: &'a mut dyn ServedBus,
     ends: Vec<Seat>,
     control: Option<ControlStream>,
+    stage: Option<Stage>,
     host: &'a mut dyn Host,
     ending: EndRequest,
     clock: Clock,
@@ -255,11 +253,13 @@ impl Shell<'_> {
                     tcp.address().to_string()
                 }
                 Seat::Pty(pty) => pty.link().display().to_string(),
+                Seat::Nowhere => continue,
             };
             lines.push(format!("{} at {place}", self.server.title(seat)));
         }
         let control = self.control.as_ref().and_then(ControlStream::address);
         lines.extend(control.map(|address| format!("control at {address}")));
+        lines.extend(self.stage.iter().map(Stage::line));
         for line in lines {
             self.host.tell(&line).map_err(ServeError::Output)?;
         }
@@ -273,7 +273,9 @@ impl Shell<'_> {
             if end.is_some_and(|end| end <= self.clock.now()) {
                 return Ok(End::TimeOver);
             }
+            let news = self.stage.as_ref().map_or(Instant::NEVER, Stage::deadline);
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
+            let until = until.min(news);
             let ready = self.wait(until).map_err(ServeError::Wait)?;
             if ready && self.ending.has_come() {
                 return Ok(End::Interrupted);
@@ -292,6 +294,12 @@ impl Shell<'_> {
                 let server = &mut *self.server;
                 let obeyed = control.obey(self.host, &mut |line| server.control(line));
                 obeyed.map_err(ServeError::Output)?;
+            }
+            let now = self.clock.now();
+            if let Some(stage) = &mut self.stage
+                && (ready || stage.deadline() <= now)
+            {
+                stage.work(self.server.live(), now);
             }
             if job.once && self.gone {
                 return Ok(End::ClientsGone);
@@ -315,9 +323,11 @@ impl Shell<'_> {
                     fds.extend(client);
                 }
                 Seat::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
+                Seat::Nowhere => {}
             }
         }
         fds.extend(self.control.iter().flat_map(ControlStream::polls));
+        fds.extend(self.stage.iter().map(Stage::poll));
         loop {
             let now = self.clock.now();
             let wake = awaited.map_or(until, |home| until.min(home - AWAKE));
@@ -339,7 +349,7 @@ impl Shell<'_> {
     fn attend(&mut self, seat: usize) {
         let visitors = match &mut self.ends[seat] {
             Seat::Tcp(tcp) => tcp.accept(),
-            Seat::Pty(_) => Vec::new(),
+            Seat::Pty(_) | Seat::Nowhere => Vec::new(),
         };
         for visitor in visitors {
             match visitor {
@@ -385,7 +395,7 @@ impl Shell<'_> {
                 let _read = self.hear(seat);
                 let another = match &mut self.ends[seat] {
                     Seat::Pty(pty) => pty.gone(),
-                    Seat::Tcp(_) => false,
+                    Seat::Tcp(_) | Seat::Nowhere => false,
                 };
                 self.go(seat, "the client has gone");
                 if another {
@@ -432,6 +442,7 @@ impl Shell<'_> {
             let read = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
                 Seat::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
+                Seat::Nowhere => return Ok(true),
             };
             let (read, ago) = match read {
                 Ok((0, _)) => return Err(io::ErrorKind::UnexpectedEof.into()),
@@ -442,7 +453,7 @@ impl Shell<'_> {
             };
             let news = match &mut self.ends[seat] {
                 Seat::Pty(pty) => pty.heard(),
-                Seat::Tcp(_) => false,
+                Seat::Tcp(_) | Seat::Nowhere => false,
             };
             if news {
                 self.come(seat, "a client came");
@@ -470,6 +481,7 @@ impl Shell<'_> {
             let written = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.write(bytes),
                 Seat::Pty(pty) => pty.write(bytes),
+                Seat::Nowhere => return Ok(()),
             };
             match written {
                 Ok(written) => {

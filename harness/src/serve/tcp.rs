@@ -1,11 +1,11 @@
 //! Sockets that listen: for several clients, or for one at a time.
 
 use super::arrival::{Client, ask};
-use super::shell::ServeError;
+use crate::listen::{ListenError, listen};
 use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
 use std::io;
-use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::net::{SocketAddr, TcpListener};
 use std::time::Instant;
 
 /// Connections taken at a time.
@@ -21,24 +21,10 @@ pub(super) struct Listener {
 
 impl Listener {
     /// Listens at an address of this machine's own, unless another one is allowed.
-    pub(super) fn open(text: &str, allow_remote: bool) -> Result<Self, ServeError> {
-        let failed = |error| ServeError::Listen {
-            address: text.to_owned(),
-            error,
-        };
-        let mut addresses = text.to_socket_addrs().map_err(failed)?;
-        let address = addresses.next().ok_or_else(|| {
-            let error = "the name has no address";
-            failed(io::Error::new(io::ErrorKind::NotFound, error))
-        })?;
-        if !address.ip().is_loopback() && !allow_remote {
-            return Err(ServeError::Remote { address });
-        }
+    pub(super) fn open(text: &str, allow_remote: bool) -> Result<Self, ListenError> {
         let since = Instant::now();
-        let socket = TcpListener::bind(address).map_err(failed)?;
+        let (socket, address) = listen(text, allow_remote)?;
         ask(&socket);
-        socket.set_nonblocking(true).map_err(failed)?;
-        let address = socket.local_addr().map_err(failed)?;
         Ok(Self {
             socket,
             address,
@@ -84,7 +70,7 @@ pub(super) enum Visitor {
 
 impl Tcp {
     /// Listens at an address of this machine's own, unless another one is allowed.
-    pub(super) fn listen(text: &str, allow_remote: bool) -> Result<Self, ServeError> {
+    pub(super) fn listen(text: &str, allow_remote: bool) -> Result<Self, ListenError> {
         Ok(Self {
             listener: Listener::open(text, allow_remote)?,
             client: None,

@@ -10,6 +10,7 @@ pub mod explore;
 pub mod gate;
 pub mod judge;
 pub mod language;
+mod live;
 pub(crate) mod manual;
 pub mod report;
 pub mod rig;

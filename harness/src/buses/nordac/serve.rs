@@ -5,6 +5,7 @@
 
 use super::language::Nordac;
 use super::language::now::{NotNow, now};
+use super::live::Recorder;
 use super::simulate::Bench;
 use crate::counted::counted;
 use crate::scenario::parse::header::{Part, parse_step, read};
@@ -13,6 +14,7 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::serve::{Answer, Marks, ServedBus, first};
+use crate::web::LiveView;
 use harness_proto::decode::Decoded;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
@@ -57,9 +59,11 @@ struct Seat {
 /// A segment of drives with places for masters.
 #[derive(Debug)]
 pub(crate) struct SegmentServer {
-    bench: Bench,
-    plan: Plan<Nordac>,
+    pub(super) bench: Bench,
+    pub(super) plan: Plan<Nordac>,
     marks: Marks,
+    /// What a live page shows, while one is open.
+    pub(super) recorder: Option<Recorder>,
     seats: Vec<Seat>,
     /// The segment's time `base.1` is the clock's time `base.0`.
     base: (Instant, Instant),
@@ -107,12 +111,18 @@ impl SegmentServer {
             bench,
             plan,
             marks,
+            recorder: None,
             seats: vec![Seat::default(); clients],
             clock: Instant::START,
         }
     }
 
-    fn rate(&self) -> BusRate {
+    /// Whether a client has the place of a master.
+    pub(super) fn has_master(&self) -> bool {
+        self.seats.iter().any(|seat| seat.taken)
+    }
+
+    pub(super) fn rate(&self) -> BusRate {
         self.plan.setup.rate
     }
 
@@ -370,6 +380,10 @@ impl ServedBus for SegmentServer {
                 Err(NotNow::Refused(why)) => Answer::Error(why.to_owned()),
             },
         })
+    }
+
+    fn live(&mut self) -> &mut dyn LiveView {
+        self
     }
 }
 

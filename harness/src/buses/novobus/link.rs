@@ -157,6 +157,16 @@ impl SimulatedLink {
         heard
     }
 
+    /// What a [tapped](Self::tap) link has carried since the last call, with times of the conversation.
+    pub(crate) fn take_record(&mut self, ring: usize, link: usize) -> Vec<LineByte> {
+        let own = self.bench.ring_mut(ring);
+        let mut record = own.map_or_else(Vec::new, |own| own.take_record(link));
+        for byte in &mut record {
+            byte.at = self.since_origin(byte.at);
+        }
+        record
+    }
+
     /// Feeds a byte to the drive behind an open link and returns when the line will have carried it.
     pub fn feed(&mut self, ring: usize, link: usize, byte: Received) -> Instant {
         let now = self.bench.now();

@@ -11,6 +11,7 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::serve::frames::{FrameJob, MOST_CLIENTS, SharedBus, serve_frames};
 use crate::serve::{Answer, End, Host, ServeError, first};
+use crate::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
 use harness_proto::unitek::Register;
@@ -58,7 +59,7 @@ pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<
 /// A simulated bench that clients share.
 #[derive(Debug)]
 pub(crate) struct SharedDrives {
-    bench: Bench,
+    pub(super) bench: Bench,
     plan: Plan<Unitek>,
 }
 
@@ -166,5 +167,9 @@ impl SharedBus for SharedDrives {
                 Err(NotNow::Refused(why)) => Answer::Error(why.to_owned()),
             },
         })
+    }
+
+    fn live(&mut self) -> &mut dyn LiveView {
+        self
     }
 }

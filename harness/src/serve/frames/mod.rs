@@ -12,6 +12,7 @@ pub use session::Protocol;
 pub use shell::{FrameJob, FramePlace, serve_frames};
 
 use super::Answer;
+use crate::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
 use harness_sim::segment::Host;
@@ -41,4 +42,7 @@ pub trait SharedBus {
 
     /// Does a line of control. `None` for an empty line or a comment.
     fn control(&mut self, line: &str) -> Option<Answer>;
+
+    /// What it shows on a live page.
+    fn live(&mut self) -> &mut dyn LiveView;
 }

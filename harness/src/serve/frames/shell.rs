@@ -8,6 +8,7 @@ use crate::serve::clock::Clock;
 use crate::serve::control_stream::ControlStream;
 use crate::serve::pty::{Change, Pty};
 use crate::serve::shell::{End, EndRequest, Host, ServeError};
+use crate::serve::stage::Stage;
 use crate::serve::tcp::Listener;
 use crate::serve::{ControlPlace, ServedAt};
 use harness_proto::time::{Instant, Span};
@@ -33,6 +34,8 @@ pub struct FrameJob {
     pub places: Vec<FramePlace>,
     /// Where lines of control come from, if there are any.
     pub control: Option<ControlPlace>,
+    /// Where the live page is served, if it is.
+    pub page: Option<String>,
     /// Whether sockets may listen at addresses that other machines reach.
     pub allow_remote: bool,
     /// Whether the end comes when the clients have gone.
@@ -46,7 +49,7 @@ pub struct FrameJob {
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve_frames<B: SharedBus>(
-    bus: B,
+    mut bus: B,
     job: &FrameJob,
     host: &mut dyn Host,
 ) -> Result<End, ServeError> {
@@ -66,11 +69,16 @@ pub fn serve_frames<B: SharedBus>(
                 wrong: false,
                 losing: false,
             }),
+            ServedAt::Nowhere => {}
         }
     }
     let control = job.control.as_ref();
     let control = control
         .map(|place| ControlStream::open(place, job.allow_remote))
+        .transpose()?;
+    let page = job.page.as_ref();
+    let stage = page
+        .map(|place| Stage::open(place, job.allow_remote, bus.live()))
         .transpose()?;
     let started = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     let mut shell = Shell {
@@ -79,6 +87,7 @@ pub fn serve_frames<B: SharedBus>(
         doors,
         seats,
         control,
+        stage,
         host,
         ending,
         here: 0,
@@ -112,6 +121,7 @@ struct Shell<'a, B> {
     doors: Vec<(Protocol, Listener)>,
     seats: Vec<Seat>,
     control: Option<ControlStream>,
+    stage: Option<Stage>,
     host: &'a mut dyn Host,
     ending: EndRequest,
     clock: Clock,
@@ -139,6 +149,7 @@ impl<B: SharedBus> Shell<'_, B> {
         }
         let control = self.control.as_ref().and_then(ControlStream::address);
         lines.extend(control.map(|address| format!("control at {address}")));
+        lines.extend(self.stage.iter().map(Stage::line));
         for line in lines {
             self.host.tell(&line).map_err(ServeError::Output)?;
         }
@@ -152,7 +163,9 @@ impl<B: SharedBus> Shell<'_, B> {
             if end.is_some_and(|end| end <= self.clock.now()) {
                 return Ok(End::TimeOver);
             }
+            let news = self.stage.as_ref().map_or(Instant::NEVER, Stage::deadline);
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
+            let until = until.min(news);
             let ready = self.wait(until).map_err(ServeError::Wait)?;
             if ready && self.ending.has_come() {
                 return Ok(End::Interrupted);
@@ -174,6 +187,12 @@ impl<B: SharedBus> Shell<'_, B> {
                 let bus = self.server.bus();
                 let obeyed = control.obey(self.host, &mut |line| bus.control(line));
                 obeyed.map_err(ServeError::Output)?;
+            }
+            let now = self.clock.now();
+            if let Some(stage) = &mut self.stage
+                && (ready || stage.deadline() <= now)
+            {
+                stage.work(self.server.bus().live(), now);
             }
             if job.once && self.gone {
                 return Ok(End::ClientsGone);
@@ -200,6 +219,7 @@ impl<B: SharedBus> Shell<'_, B> {
             }
         }
         fds.extend(self.control.iter().flat_map(ControlStream::polls));
+        fds.extend(self.stage.iter().map(Stage::poll));
         let nanos = until.since(self.clock.now()).as_nanos();
         let longest = Timespec {
             tv_sec: i64::try_from(nanos / 1_000_000_000).unwrap_or(i64::MAX),

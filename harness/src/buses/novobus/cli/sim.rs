@@ -89,6 +89,10 @@ pub struct SimArguments {
     /// Take control lines from standard input (-) or from a listening socket (HOST:PORT).
     #[arg(long, value_name = "-|ADDRESS")]
     pub control: Option<String>,
+    /// Serve a live page for a browser: HOST:PORT, port 0 for a free one. Its address with a token is printed. Without another place, no
+    /// master can connect, and the page has some conversations to play.
+    #[arg(long, value_name = "ADDRESS", group = "place")]
+    pub web: Option<String>,
     /// Allow sockets that other machines can reach.
     #[arg(long)]
     pub allow_remote: bool,
@@ -258,11 +262,13 @@ fn marks(arguments: &SimArguments) -> Marks {
     }
 }
 
-/// Where masters are served.
-fn places(arguments: &SimArguments) -> impl Iterator<Item = ServedAt> {
+/// Where `masters` are served: nowhere, if only a live page is asked for.
+fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
     let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
     let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
-    tcp.chain(pty)
+    let only_page = arguments.tcp.is_empty() && arguments.pty.is_empty();
+    let nowhere = only_page.then(|| std::iter::repeat_n(ServedAt::Nowhere, masters));
+    tcp.chain(pty).chain(nowhere.into_iter().flatten())
 }
 
 /// Serves the drives of a shared line of octets: every place is a master's.
@@ -288,8 +294,9 @@ fn octets(
         "--tcp or --pty, a place for each master, and --slaves",
     )?;
     let job = Job {
-        places: places(arguments).collect(),
+        places: places(arguments, 1).collect(),
         control: control(arguments),
+        page: arguments.web.clone(),
         allow_remote: arguments.allow_remote,
         once: arguments.once,
         length: arguments.length,
@@ -323,6 +330,7 @@ fn frames(
     let job = FrameJob {
         places: arguments.frames.places(),
         control: control(arguments),
+        page: arguments.web.clone(),
         allow_remote: arguments.allow_remote,
         once: arguments.once,
         length: arguments.length,
@@ -358,8 +366,9 @@ fn rings(
     inner.iter().for_each(|(inner, _)| server.add(*inner));
     let places = inner.into_iter().map(|(_, place)| place);
     let job = Job {
-        places: self::places(arguments).chain(places).collect(),
+        places: self::places(arguments, sizes.len()).chain(places).collect(),
         control: control(arguments),
+        page: arguments.web.clone(),
         allow_remote: arguments.allow_remote,
         once: arguments.once,
         length: arguments.length,

@@ -1,6 +1,8 @@
 //! Simulated rings behind streams of bytes.
 
 mod control;
+mod live;
+mod recorder;
 mod server;
 mod state;
 

@@ -1,14 +1,17 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
+use super::recorder::Recorder;
 use crate::buses::novobus::link::SimulatedLink;
 use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
 use crate::serve::{Answer, ClientRole, Inner, Marks, Pace, ServedBus};
+use crate::web::LiveView;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
+use harness_sim::record::LineByte;
 use std::collections::VecDeque;
 
 /// How long the rings have been at work when the clock starts: the drives' regulators (ND21 4.1) have seen their inputs.
@@ -52,6 +55,8 @@ pub struct Server {
     /// The rings' time `base.1` is the clock's time `base.0`.
     base: (Instant, Instant),
     clock: Instant,
+    /// What a live page shows, while one is open.
+    pub(super) recorder: Option<Recorder>,
 }
 
 /// Where a client sits.
@@ -121,6 +126,7 @@ impl Server {
                 .map(|ring| Seat::new(At::Master(ring)))
                 .collect(),
             clock: Instant::START,
+            recorder: None,
             plan,
             link,
             pace,
@@ -171,7 +177,81 @@ impl Server {
         }
     }
 
+    /// Whether a link is cut open.
+    pub(super) fn is_open(&self, ring: usize, link: usize) -> bool {
+        self.seats.iter().any(|seat| {
+            matches!(seat.at, At::Inner(own) if own.role != ClientRole::Tap && (own.ring, own.link) == (ring, link))
+        })
+    }
+
+    /// Whether a client has the master's place of a ring.
+    pub(super) fn has_master(&self, ring: usize) -> bool {
+        self.seats.get(ring).is_some_and(|seat| seat.taken)
+    }
+
+    /// Sends octets from the master's place of a ring where no client has it.
+    pub(super) fn send_unattended(&mut self, ring: usize, octets: &[u8]) {
+        let read: Vec<_> = octets.iter().copied().map(Received::good).collect();
+        if let Some(seat) = self.seats.get_mut(ring) {
+            send(&mut self.link, seat, ring, &read);
+        }
+    }
+
+    /// Records every link that is not cut open, or only the taps.
+    pub(super) fn record_all(&mut self, all: bool) {
+        self.fetch();
+        self.recorder = None;
+        self.link.stop_recording();
+        for seat in &self.seats {
+            if let At::Inner(Inner {
+                ring,
+                link,
+                role: ClientRole::Tap,
+            }) = seat.at
+            {
+                self.link.tap(ring, link);
+            }
+        }
+        if all {
+            let sizes: Vec<_> = (0..self.rings()).map(|ring| self.drives(ring)).collect();
+            for (ring, drives) in sizes.iter().enumerate() {
+                for link in 0..=usize::from(*drives) {
+                    if !self.is_open(ring, link) {
+                        self.link.tap(ring, link);
+                    }
+                }
+            }
+            self.recorder = Some(Recorder::new(&sizes, self.link.byte_time()));
+        }
+    }
+
+    /// Takes what all links have carried into the recorder, and gives taps their part.
+    fn record(&mut self) {
+        let Some(mut recorder) = self.recorder.take() else {
+            return;
+        };
+        for ring in 0..self.rings() {
+            for link in 0..=usize::from(self.drives(ring)) {
+                if self.is_open(ring, link) {
+                    continue;
+                }
+                let record = self.link.take_record(ring, link);
+                let taps = self.seats.iter_mut().filter(|seat| {
+                    matches!(seat.at, At::Inner(own) if (own.ring, own.link) == (ring, link))
+                });
+                for seat in taps {
+                    for read in record.iter().filter_map(LineByte::arrival) {
+                        seat.give(read, self.marks);
+                    }
+                }
+                recorder.carry(ring, link, &record);
+            }
+        }
+        self.recorder = Some(recorder);
+    }
+
     fn fetch(&mut self) {
+        self.record();
         for seat in &mut self.seats {
             match seat.at {
                 At::Master(ring) => {
@@ -179,7 +259,9 @@ impl Server {
                         seat.give(read, self.marks);
                     }
                 }
-                At::Inner(Inner { ring, link, role }) if role.hears() => {
+                At::Inner(Inner { ring, link, role })
+                    if role.hears() && (role != ClientRole::Tap || self.recorder.is_none()) =>
+                {
                     for read in self.link.fetch(ring, link) {
                         seat.give(read, self.marks);
                     }
@@ -372,6 +454,10 @@ impl ServedBus for Server {
 
     fn control(&mut self, line: &str) -> Option<Answer> {
         Self::control(self, line)
+    }
+
+    fn live(&mut self) -> &mut dyn LiveView {
+        self
     }
 }
 

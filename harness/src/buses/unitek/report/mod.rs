@@ -118,7 +118,8 @@ fn contents(register: u8, data: Data) -> String {
     text
 }
 
-fn bits(names: &'static [Bit], word: u32) -> String {
+/// The names of the bits that are set.
+pub(super) fn bits(names: &'static [Bit], word: u32) -> String {
     let names: Vec<_> = set_bits(names, word).map(|bit| bit.name).collect();
     names.join(" ")
 }

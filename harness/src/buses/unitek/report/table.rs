@@ -4,6 +4,7 @@ use super::meaning;
 use crate::buses::unitek::language::identifier;
 use crate::capture::Piece;
 use crate::capture::live::{LiveLine, LiveText};
+use harness_proto::can::Frame;
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -65,19 +66,26 @@ fn line(row: &Row<'_>) -> String {
     format!("{:>14}  {}\n", row.first.at.to_string(), text(row))
 }
 
+/// The data bytes of a frame, or the length that a remote frame asks for.
+pub(in crate::buses::unitek) fn hex(frame: &Frame) -> String {
+    if frame.is_remote() {
+        return format!("rtr {}", frame.dlc());
+    }
+    let bytes: Vec<_> = frame
+        .data()
+        .iter()
+        .map(|byte| format!("{byte:02X}"))
+        .collect();
+    bytes.join(" ")
+}
+
 /// A row without its time.
 fn text(row: &Row<'_>) -> String {
     let LineFrame {
         from, frame, ended, ..
     } = row.first;
     let sender = from.map_or("master".to_owned(), |drive| format!("drive {drive}"));
-    let mut bytes = String::new();
-    for byte in frame.data() {
-        let _infallible = write!(bytes, "{byte:02X} ");
-    }
-    if frame.is_remote() {
-        bytes = format!("rtr {}", frame.dlc());
-    }
+    let bytes = hex(frame);
     let end = match (ended, row.times) {
         (FrameEnd::Good, _) => String::new(),
         (FrameEnd::Lost, _) => "  [lost]".to_owned(),
@@ -90,7 +98,7 @@ fn text(row: &Row<'_>) -> String {
         "{:<9} {:<9} {:<24} {}{end}",
         sender,
         identifier(frame.id()),
-        bytes.trim_end(),
+        bytes,
         meaning(frame, from.is_some())
     );
     text.trim_end().to_owned()

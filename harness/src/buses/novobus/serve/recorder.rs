@@ -1,0 +1,205 @@
+//! What the links of served rings have carried, as rows of a space-time picture: a column a link, a row a byte time.
+
+use crate::buses::novobus::locate::{Location, MAX_ZEROS, locate};
+use crate::counted::counted;
+use crate::link::link_name;
+use crate::web::{LiveCell, LiveRow, MAX_ROWS};
+use harness_proto::line::Received;
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::LineByte;
+use std::collections::{BTreeMap, VecDeque};
+
+/// Byte times for which rows are kept until they are fetched, at most: more than a second of them.
+const MAX_SLOTS: usize = 4096;
+
+/// How many of the bytes that the master received are kept, to read which drive the ring spells out.
+const HEARD: usize = 4 * MAX_ZEROS;
+
+/// What a link has carried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct LinkCount {
+    pub(super) bytes: u64,
+    /// Bytes other than SYNCO.
+    pub(super) busy: u64,
+    /// Bytes that arrived otherwise than they were sent, or not at all.
+    pub(super) damaged: u64,
+}
+
+/// What all links have carried since a page was opened.
+#[derive(Clone, Debug)]
+pub(super) struct Recorder {
+    byte: Span,
+    /// The drives of each ring, and its first column.
+    rings: Vec<(u8, usize)>,
+    /// By the number of the byte time in which a byte arrived: columns and bytes.
+    slots: BTreeMap<u64, Vec<(usize, LineByte)>>,
+    counts: Vec<LinkCount>,
+    heard: Vec<VecDeque<Received>>,
+    found: Vec<Option<Location>>,
+    left_out: u64,
+}
+
+/// Rows that are complete.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    pub(super) rows: Vec<LiveRow>,
+    pub(super) left_out: u64,
+    pub(super) notes: Vec<String>,
+}
+
+/// The names of all links, in the order of the columns.
+pub(super) fn links(sizes: &[u8]) -> Vec<String> {
+    let rings = sizes.iter().enumerate();
+    rings
+        .flat_map(|(ring, drives)| {
+            (0..=usize::from(*drives)).map(move |link| link_name(ring, *drives, link))
+        })
+        .collect()
+}
+
+impl Recorder {
+    /// Records rings of these sizes, whose bytes take `byte`.
+    pub(super) fn new(sizes: &[u8], byte: Span) -> Self {
+        let mut columns = 0;
+        let ring = |drives: &u8| {
+            let first = columns;
+            columns += usize::from(*drives) + 1;
+            (*drives, first)
+        };
+        let rings: Vec<_> = sizes.iter().map(ring).collect();
+        Self {
+            byte,
+            counts: vec![LinkCount::default(); columns],
+            heard: vec![VecDeque::new(); rings.len()],
+            found: vec![None; rings.len()],
+            rings,
+            slots: BTreeMap::new(),
+            left_out: 0,
+        }
+    }
+
+    /// Takes what a link has carried.
+    pub(super) fn carry(&mut self, ring: usize, link: usize, bytes: &[LineByte]) {
+        let Some(&(drives, first)) = self.rings.get(ring) else {
+            return;
+        };
+        let column = first + link;
+        for byte in bytes {
+            if let Some(count) = self.counts.get_mut(column) {
+                count.bytes += 1;
+                count.busy += u64::from(byte.sent != Some(SYNCO));
+                count.damaged += u64::from(is_damaged(byte));
+            }
+            let slot = byte.at.since_start().units() / self.byte.units().max(1);
+            self.slots.entry(slot).or_default().push((column, *byte));
+            if self.slots.len() > MAX_SLOTS {
+                self.slots.pop_first();
+                self.left_out += 1;
+            }
+            if link == usize::from(drives)
+                && let Some(received) = byte.arrival()
+            {
+                let heard = &mut self.heard[ring];
+                heard.push_back(received);
+                if heard.len() > HEARD {
+                    heard.pop_front();
+                }
+            }
+        }
+    }
+
+    /// What each link has carried, in the order of the columns.
+    pub(super) fn counts(&self) -> &[LinkCount] {
+        &self.counts
+    }
+
+    /// The rows of byte times that are over at `now`. Those in which links carried SYNCO or nothing are folded.
+    pub(super) fn rows(&mut self, now: Instant) -> Rows {
+        let over = now.since_start().units() / self.byte.units().max(1);
+        let rest = self.slots.split_off(&over);
+        let slots = std::mem::replace(&mut self.slots, rest);
+        let mut rows: Vec<LiveRow> = Vec::new();
+        let mut left_out = std::mem::take(&mut self.left_out);
+        for (slot, cells) in slots {
+            let end = Instant::START + self.byte * (slot + 1);
+            let idle =
+                |(_, byte): &(usize, LineByte)| byte.sent == Some(SYNCO) && !is_damaged(byte);
+            if cells.iter().all(idle) {
+                match rows.last_mut() {
+                    Some(row) if row.fold > 0 => row.fold += 1,
+                    _ => rows.push(LiveRow {
+                        at: end.to_string(),
+                        words: "SYNCO only".to_owned(),
+                        fold: 1,
+                        ..LiveRow::default()
+                    }),
+                }
+                continue;
+            }
+            if rows.len() >= MAX_ROWS {
+                left_out += 1;
+                continue;
+            }
+            rows.push(LiveRow {
+                at: end.to_string(),
+                cells: cells
+                    .iter()
+                    .map(|(column, byte)| cell(*column, byte))
+                    .collect(),
+                ..LiveRow::default()
+            });
+        }
+        Rows {
+            rows,
+            left_out,
+            notes: self.notes(),
+        }
+    }
+
+    /// Which drives the rings spell out now and did not before (ND21 9.7).
+    fn notes(&mut self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let rings = self.rings.iter().zip(&mut self.heard).zip(&mut self.found);
+        for (ring, ((&(drives, _), heard), found)) in rings.enumerate() {
+            let now = locate(heard.make_contiguous(), drives);
+            if let Some(location) = now
+                && *found != now
+            {
+                let drive = location.drive;
+                let prefix = if ring == 0 { "" } else { "2:" };
+                let link = link_name(ring, drives, usize::from(drives - 1 - drive));
+                let zeros = location.zeros.map_or(String::new(), |zeros| {
+                    format!(" behind {}", counted(zeros, "zero"))
+                });
+                notes.push(format!(
+                    "Address {drive:02X} has reached the master{zeros}: drive {prefix}{drive} detected the error first, so the fault was on \
+                     link {link} (ND21 9.7)."
+                ));
+            }
+            *found = now;
+        }
+        notes
+    }
+}
+
+fn is_damaged(byte: &LineByte) -> bool {
+    byte.sent != byte.received || byte.error.is_some()
+}
+
+/// A byte as the picture shows it: what was sent, and what arrived where that differs.
+fn cell(column: usize, byte: &LineByte) -> LiveCell {
+    let digits = |byte: Option<u8>| byte.map_or("--".to_owned(), |byte| format!("{byte:02X}"));
+    let sent = digits(byte.sent);
+    if is_damaged(byte) {
+        let mark = if byte.error.is_some() { "~" } else { "" };
+        let text = format!("{sent}\u{2192}{}{mark}", digits(byte.received));
+        return LiveCell(column, text, 'x');
+    }
+    let class = match byte.sent {
+        Some(SYNCO) => 's',
+        Some(0) => 'z',
+        _ => 'd',
+    };
+    LiveCell(column, sent, class)
+}
