@@ -11,7 +11,7 @@ use ratatui_core::terminal::Frame;
 use std::fmt::Write as _;
 
 /// Headings of the columns; the units are those of the drive's cells (ND21 14.5).
-const COLUMNS: [&str; 7] = [
+pub(crate) const COLUMNS: [&str; 7] = [
     "drive",
     "state",
     "shows",

@@ -83,6 +83,12 @@ impl Feed {
         inner.readers > 0 || inner.left.is_some_and(|left| left.elapsed() < LINGER)
     }
 
+    /// How many readers there are.
+    #[cfg(test)]
+    pub(super) fn readers(&self) -> usize {
+        self.inner().readers
+    }
+
     /// How many readers there have been.
     #[must_use]
     pub fn came(&self) -> u64 {

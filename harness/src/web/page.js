@@ -105,7 +105,7 @@
         if (place < 0) head.textContent = name;
         else button(place, head, name);
       });
-      make("th", row, "").scope = "col";
+      make("th", row, "", "words").scope = "col";
     }
     if (orders) {
       const free = own.places.map((place, number) => [place, number]).filter(([place]) => place.column === null);
@@ -118,8 +118,7 @@
 
   const tell = (text) => {
     by("notes-s").hidden = false;
-    const entry = make("li", by("notes"), text);
-    entry.className = "note-entry";
+    make("li", by("notes"), text);
     while (by("notes").children.length > MOST_NOTES) by("notes").firstChild.remove();
   };
 
@@ -181,7 +180,7 @@
     by("master").textContent = scene.picture && scene.faults.length ? (own.master ? "A master is connected." : "") : "";
     if (own.stations.length) fill(by("stations"), own.stations);
     if (own.traffic.length) fill(by("traffic"), own.traffic);
-    own.notes.forEach(tell);
+    for (const text of own.notes) tell(own.at + ": " + text);
     if (!scene.picture) return;
     if (paused) {
       held += own.rows.length + own.left_out;

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 const MAX_CONNECTIONS: usize = 64;
 /// The most orders that wait for the bench.
 const MAX_ORDERS: usize = 16;
-/// How long a request may take to come, and how long a client may take nothing.
+/// The patience with clients.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How often a stream without events has a comment: a client that has left shows by it.
 const ALIVE: Duration = Duration::from_secs(3);
@@ -59,6 +59,8 @@ struct Shared {
     orders: SyncSender<AskedOrder>,
     wake: UnixStream,
     connections: AtomicUsize,
+    /// How long a request may take to come, and how long a client may take nothing.
+    patience: Duration,
 }
 
 impl Shared {
@@ -88,6 +90,16 @@ impl LivePage {
     /// # Errors
     /// [`ListenError`].
     pub fn open(place: &str, allow_remote: bool, scene: &LiveScene) -> Result<Self, ListenError> {
+        Self::open_patiently(place, allow_remote, scene, PATIENCE)
+    }
+
+    /// The same with another patience for clients.
+    fn open_patiently(
+        place: &str,
+        allow_remote: bool,
+        scene: &LiveScene,
+        patience: Duration,
+    ) -> Result<Self, ListenError> {
         let failed = |error| ListenError::Failed {
             address: place.to_owned(),
             error,
@@ -107,6 +119,7 @@ impl LivePage {
             orders,
             wake: wakes,
             connections: AtomicUsize::new(0),
+            patience,
         });
         let accepts = std::thread::Builder::new().stack_size(STACK);
         let accepts = accepts.spawn(move || accept(&listener, &stopped, &shared));
@@ -204,7 +217,7 @@ fn take(stream: TcpStream, shared: &Arc<Shared>) {
     let set = stream
         .set_nonblocking(false)
         .and_then(|()| stream.set_nodelay(true))
-        .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+        .and_then(|()| stream.set_write_timeout(Some(shared.patience)));
     if set.is_err() {
         return;
     }
@@ -243,7 +256,7 @@ impl Drop for Counted<'_> {
 
 /// Answers the one request of a connection.
 fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + shared.patience;
     match routed(stream, shared, end) {
         Ok(Reply::Page) => {
             let policy = format!("Content-Security-Policy: {}\r\n", policy());
@@ -331,10 +344,9 @@ fn more(
     end: Instant,
 ) -> Result<(), Option<Refusal>> {
     let late = || {
-        let seconds = PATIENCE.as_secs();
         Some(Refusal::new(
             408,
-            format_args!("a whole request within {seconds} s expected"),
+            "the whole request expected within some seconds",
         ))
     };
     let left = end.saturating_duration_since(Instant::now());
@@ -441,3 +453,7 @@ fn refused(refusal: &Refusal) -> String {
     let body = format!("{}\n", refusal.why);
     whole(refusal.status, "text/plain", "", &body)
 }
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

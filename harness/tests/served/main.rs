@@ -17,6 +17,7 @@ mod inner;
 mod inverters_on_line;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
+mod live;
 mod port_interlocks;
 #[path = "../common/program.rs"]
 mod program;

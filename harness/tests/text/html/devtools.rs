@@ -126,12 +126,14 @@ impl Browser {
 
     /// Opens a file and waits until it is there.
     pub(crate) fn open(&mut self, path: &Path) {
+        self.go(&format!("file://{}", path.display()));
+    }
+
+    /// Opens an address and waits until its page is there.
+    pub(crate) fn go(&mut self, url: &str) {
         let loaded = |event: &Value| event["method"] == "Page.loadEventFired";
         self.events.retain(|event| !loaded(event));
-        self.call(
-            "Page.navigate",
-            json!({"url": format!("file://{}", path.display())}),
-        );
+        self.call("Page.navigate", json!({"url": url}));
         while !self.events.iter().any(loaded) {
             let message = self.message();
             self.events.push(message);

@@ -4,6 +4,7 @@ mod browser;
 mod curves;
 mod devtools;
 mod hostile;
+mod live;
 mod pages;
 mod parser;
 mod program;

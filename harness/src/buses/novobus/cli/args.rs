@@ -281,6 +281,13 @@ pub struct TopArguments {
     /// Print one page as plain text and end. Needs no terminal.
     #[arg(long)]
     pub once: bool,
+    /// Show a page in a browser in place of the terminal: HOST:PORT, port 0 for a free one. Its address with a token is printed. The page
+    /// only looks on. Drives are read while it is open.
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "once")]
+    pub web: Option<String>,
+    /// Allow --web at an address that other machines can reach.
+    #[arg(long, requires = "web")]
+    pub allow_remote: bool,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,

@@ -22,6 +22,7 @@ pub(crate) mod shrink;
 mod signal;
 mod sim;
 mod top;
+mod top_page;
 mod watch;
 mod write;
 

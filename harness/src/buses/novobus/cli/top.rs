@@ -5,6 +5,7 @@
 
 use super::args::TopArguments;
 use super::rig::{self, OpenBench, RigName, Use};
+use super::top_page::TopPage;
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
@@ -18,13 +19,12 @@ use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::master::{Counters, Event};
 use harness_proto::time::{Instant, Span};
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{
-    Receiver, RecvTimeoutError, SyncSender, TryRecvError, channel, sync_channel,
-};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Moment};
 
@@ -61,7 +61,7 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
         return Err(Failure::refused("--every must be longer than nothing"));
     }
     let terminal = output.full_screen && std::io::stdin().is_terminal();
-    if !arguments.once && !terminal {
+    if !arguments.once && arguments.web.is_none() && !terminal {
         return Err(Failure::refused(
             "`top` needs a terminal that can move its cursor (TERM is not `dumb`); for a pipe or a file use `top --once`, `watch` or `info --format json`",
         ));
@@ -77,9 +77,13 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
     rig::on(&arguments.rig, Use::look("top"), output, |bench, output| {
         let heading = heading(&name, bench);
         let mut reader = Reader::new(bench);
-        match arguments.once {
-            true => once(&mut reader, heading, output),
-            false => live(&mut reader, heading, arguments.every, output),
+        match (&arguments.web, arguments.once) {
+            (Some(place), _) => {
+                let page = TopPage::open(place, arguments.allow_remote, heading)?;
+                on_page(&mut reader, page, arguments.every, output)
+            }
+            (None, true) => once(&mut reader, heading, output),
+            (None, false) => live(&mut reader, heading, arguments.every, output),
         }
     })
 }
@@ -157,7 +161,19 @@ fn live(
         // The receiver is gone if the bus has ended by itself.
         let _ended = why.send(end);
     });
-    let end = pump(reader, every, &flag, &news, &asked);
+    let mut show = |reading| {
+        // A view that still draws the last page gets a later reading.
+        let _not_now = news.try_send(reading);
+    };
+    let mut wait = |time| match asked.recv_timeout(time) {
+        Ok(Leave::Quit) => Some(Ok(Exit::Passed)),
+        Ok(Leave::Interrupt) => Some(Err(interrupted())),
+        Ok(Leave::Broken(error)) => Some(Err(Failure::Output(error))),
+        Err(RecvTimeoutError::Timeout) => None,
+        // The view panicked; `wait_for` passes the panic on.
+        Err(RecvTimeoutError::Disconnected) => Some(Ok(Exit::RigError)),
+    };
+    let end = pump(reader, every, &flag, (&|| true, &mut show, &mut wait));
     stop.store(true, Ordering::Relaxed);
     drop(news);
     wait_for(desk);
@@ -223,37 +239,63 @@ fn desk(
     }
 }
 
+/// Shows the page of a browser until a signal ends it. Drives are read while a page is open.
+fn on_page(
+    reader: &mut Reader<'_>,
+    page: TopPage,
+    every: Span,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let flag = interrupt_flag();
+    output.result(&format!("page at {}\n", page.url()))?;
+    let page = RefCell::new(page);
+    let wanted = || page.borrow_mut().is_wanted();
+    let mut show = |reading| page.borrow_mut().show(reading);
+    let mut wait = |time| {
+        std::thread::sleep(time);
+        None
+    };
+    pump(reader, every, &flag, (&wanted, &mut show, &mut wait))
+}
+
+fn interrupted() -> Failure {
+    Failure::from(Error::Link(Trouble::Interrupted))
+}
+
+/// A view: whether it wants readings, what takes them, and what waits and may end it.
+type View<'v> = (
+    &'v dyn Fn() -> bool,
+    &'v mut dyn FnMut(Snapshot),
+    &'v mut dyn FnMut(Duration) -> Option<Result<Exit, Failure>>,
+);
+
 /// Reads the drives repeatedly and runs the bus until the view is closed.
 fn pump(
     reader: &mut Reader<'_>,
     every: Span,
-    interrupted: &AtomicBool,
-    news: &SyncSender<Snapshot>,
-    asked: &Receiver<Leave>,
+    interrupt: &AtomicBool,
+    (wanted, show, wait): View<'_>,
 ) -> Result<Exit, Failure> {
-    let interrupt = || Failure::from(Error::Link(Trouble::Interrupted));
     let begun = Moment::now();
     let mut next = reader.start;
     loop {
-        if reader.bench.bus.now() >= next && reader.read_some()? {
+        let wanted = wanted();
+        if wanted && reader.bench.bus.now() >= next && reader.read_some()? {
             // A ring that is slower than the given period is read as often as possible.
             next = (next + every).max(reader.bench.bus.now());
         }
         if let Some(halt) = reader.bench.bus.halted() {
             return Err(halt.into());
         }
-        // A view that still draws the last page gets a later reading. A view that has closed gives its reason through `asked`.
-        let _not_now = news.try_send(reader.reading());
-        if interrupted.load(Ordering::Relaxed) {
-            return Err(interrupt());
+        if wanted {
+            show(reader.reading());
         }
-        match asked.recv_timeout(reader.idle(begun, next)) {
-            Ok(Leave::Quit) => return Ok(Exit::Passed),
-            Ok(Leave::Interrupt) => return Err(interrupt()),
-            Ok(Leave::Broken(error)) => return Err(Failure::Output(error)),
-            Err(RecvTimeoutError::Timeout) => {}
-            // The view panicked; `wait_for` passes the panic on.
-            Err(RecvTimeoutError::Disconnected) => return Ok(Exit::RigError),
+        if interrupt.load(Ordering::Relaxed) {
+            return Err(interrupted());
+        }
+        let next = if wanted { next } else { Instant::NEVER };
+        if let Some(end) = wait(reader.idle(begun, next)) {
+            return end;
         }
     }
 }

@@ -27,8 +27,6 @@ const FAULTS: [(&str, &str); 6] = [
 
 /// SYNCO bytes behind a fault, where no master is connected: the ring spells the drive out within 25 zeros (ND21 9.7).
 const BEHIND_A_FAULT: usize = 40;
-/// Zeros in front of the check sequence (9.8).
-const ZEROS: usize = 17;
 /// How many bytes of the bench's own may wait for the line.
 const ROOM: usize = 256;
 
@@ -64,7 +62,7 @@ fn scripts(drives: u8) -> Vec<Script> {
         ),
         script(
             "send the check sequence (9.8)".to_owned(),
-            [&[0; ZEROS][..], &CHECK_SEQUENCE].concat(),
+            CHECK_SEQUENCE.to_vec(),
         ),
     ]
 }
