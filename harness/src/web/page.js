@@ -63,6 +63,8 @@
     }
     heads(by("stations"), own.stations);
     heads(by("traffic"), own.traffic);
+    by("traffic-s").hidden = own.traffic.length === 0;
+    if (!own.picture) document.querySelector("main").className = "tables";
     const orders = !own.read_only && own.faults.length > 0;
     by("control").hidden = !orders;
     if (orders) {

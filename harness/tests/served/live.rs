@@ -219,26 +219,30 @@ fn a_page_for_other_machines_needs_permission() {
 /// `top --web` shows the table of `top`, and takes no order; a signal ends it.
 #[test]
 fn the_page_of_a_bench_in_use_only_looks_on() {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(["top", "--rig", "sim:2", "--web", "127.0.0.1:0"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program");
-    let mut line = String::new();
-    let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
-    out.read_line(&mut line).expect("a line");
-    let page = Page::of(line.trim_end());
-    let mut events = page.events();
-    events.until("\"stations\":[[\"0\",");
-    events.until("\"ring 1\"");
-    let (status, said) = page.post("/fault", r#"{"place":0,"fault":0}"#);
-    assert_eq!(status, "403");
-    assert!(said.starts_with("This page only looks on"), "{said}");
-    let id = child.id().to_string();
-    let ended = Command::new("kill").args(["-TERM", &id]).status();
-    assert!(ended.expect("kill").success());
-    let status = child.wait().expect("an end");
-    assert_eq!(status.code(), Some(130));
+    for (rig, shown) in [
+        ("sim:2", "\"ring 1\""),
+        ("sim:unitek:2", "\"stations\":[[\"1\","),
+        ("sim:nordac", "\"stations\":[[\"8\","),
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+            .args(["top", "--rig", rig, "--web", "127.0.0.1:0"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        let mut line = String::new();
+        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
+        out.read_line(&mut line).expect("a line");
+        let page = Page::of(line.trim_end());
+        page.events().until(shown);
+        let (status, said) = page.post("/fault", r#"{"place":0,"fault":0}"#);
+        assert_eq!(status, "403", "{rig}");
+        assert!(said.starts_with("This page only looks on"), "{said}");
+        let id = child.id().to_string();
+        let ended = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(ended.expect("kill").success());
+        let status = child.wait().expect("an end");
+        assert_eq!(status.code(), Some(130), "{rig}");
+    }
 }

@@ -119,6 +119,7 @@ fn every_bus_has_a_page_that_fits() {
         &["sim", "--bus", "unitek", "--drives", "2"],
         &["sim", "--bus", "nordac", "--slaves", "8,9"],
         &["top", "--rig", "sim:2"],
+        &["top", "--rig", "sim:unitek:2"],
     ] {
         let served = Served::start(arguments);
         browser.go("about:blank");

@@ -10,6 +10,8 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
+use crate::cli::top_page::TopPage;
+use crate::web::LiveNews;
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
 
@@ -136,7 +138,7 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    if !arguments.once && !output.full_screen {
+    if !arguments.once && arguments.web.is_none() && !output.full_screen {
         return Err(Failure::refused(
             "top needs a terminal; --once prints one page without one",
         ));
@@ -144,53 +146,67 @@ pub(super) fn top(
     let as_what = Use::look("top");
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
+        let title = format!("{}: inverters on PROFIBUS", session.rig().id());
+        let mut page = TopPage::open(arguments, title, &HEADING, &[])?;
+        if let Some(page) = &page {
+            output.result(&page.line())?;
+        }
         let mut driver = driver(session);
         let mut known = Vec::new();
         for slave in slaves {
             known.push((slave, driver.join(slave)?));
         }
         loop {
-            let mut seen = Vec::new();
-            for (slave, ppo) in &known {
-                seen.push(look(&mut driver, *slave, *ppo)?);
+            if page.as_mut().is_none_or(TopPage::is_wanted) {
+                let mut rows = Vec::new();
+                for (slave, ppo) in &known {
+                    rows.push(row(&look(&mut driver, *slave, *ppo)?));
+                }
+                match &mut page {
+                    Some(page) => page.show(LiveNews {
+                        stations: rows.iter().map(|row| row.to_vec()).collect(),
+                        ..LiveNews::default()
+                    }),
+                    None => {
+                        let page = output.fitted(&columns(&HEADING, &rows));
+                        if arguments.once {
+                            output.result(&page)?;
+                            return Ok(Exit::Passed);
+                        }
+                        // Clears the screen, and begins in its upper left corner.
+                        output.result(&format!("\x1b[2J\x1b[H{page}"))?;
+                    }
+                }
             }
-            let page = output.fitted(&page(&seen));
-            if arguments.once {
-                output.result(&page)?;
-                return Ok(Exit::Passed);
-            }
-            // Clears the screen, and begins in its upper left corner.
-            output.result(&format!("\x1b[2J\x1b[H{page}"))?;
             driver.run(arguments.every)?;
         }
     })
 }
 
+/// The heads of the columns of `top`.
+const HEADING: [&str; 7] = [
+    "slave",
+    "PPO",
+    "fault",
+    "frequency",
+    "HIW",
+    "heat sink",
+    "status",
+];
+
 /// A row a slave.
-fn page(all: &[Seen]) -> String {
-    let row = |seen: &Seen| {
-        let mut words = seen.words.iter().map(Found::words);
-        let (status, actual) = (words.next(), words.next());
-        [
-            seen.slave.to_string(),
-            seen.ppo.to_string(),
-            seen.of("fault"),
-            seen.of("frequency"),
-            actual.unwrap_or_default(),
-            seen.of("heat sink"),
-            status.unwrap_or_default(),
-        ]
-    };
-    let heading = [
-        "slave",
-        "PPO",
-        "fault",
-        "frequency",
-        "HIW",
-        "heat sink",
-        "status",
-    ];
-    columns(&heading, &all.iter().map(row).collect::<Vec<_>>())
+fn row(seen: &Seen) -> [String; HEADING.len()] {
+    let mut words = seen.words.iter().map(Found::words);
+    let (status, actual) = (words.next(), words.next());
+    [
+        seen.slave.to_string(),
+        seen.ppo.to_string(),
+        seen.of("fault"),
+        seen.of("frequency"),
+        actual.unwrap_or_default(),
+        seen.of("heat sink"),
+        status.unwrap_or_default(),
+    ]
 }
 
 fn text(all: &[Seen]) -> String {

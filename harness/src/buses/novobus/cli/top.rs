@@ -5,11 +5,12 @@
 
 use super::args::TopArguments;
 use super::rig::{self, OpenBench, RigName, Use};
-use super::top_page::TopPage;
+use super::top_page::{RingPage, TRAFFIC};
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::top_page::TopPage;
 use crate::counted::counted;
 use crate::link::Trouble;
 use crate::signals::interrupt_flag;
@@ -77,13 +78,14 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
     rig::on(&arguments.rig, Use::look("top"), output, |bench, output| {
         let heading = heading(&name, bench);
         let mut reader = Reader::new(bench);
-        match (&arguments.web, arguments.once) {
-            (Some(place), _) => {
-                let page = TopPage::open(place, arguments.allow_remote, heading)?;
+        let title = format!("{}: {}", heading.rig, heading.rings.join("; "));
+        match TopPage::open(arguments, title, &view::COLUMNS, &TRAFFIC)? {
+            Some(page) => {
+                let page = RingPage::new(page, heading);
                 on_page(&mut reader, page, arguments.every, output)
             }
-            (None, true) => once(&mut reader, heading, output),
-            (None, false) => live(&mut reader, heading, arguments.every, output),
+            None if arguments.once => once(&mut reader, heading, output),
+            None => live(&mut reader, heading, arguments.every, output),
         }
     })
 }
@@ -242,14 +244,14 @@ fn desk(
 /// Shows the page of a browser until a signal ends it. Drives are read while a page is open.
 fn on_page(
     reader: &mut Reader<'_>,
-    page: TopPage,
+    page: RingPage,
     every: Span,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let flag = interrupt_flag();
-    output.result(&format!("page at {}\n", page.url()))?;
+    output.result(&page.page.line())?;
     let page = RefCell::new(page);
-    let wanted = || page.borrow_mut().is_wanted();
+    let wanted = || page.borrow_mut().page.is_wanted();
     let mut show = |reading| page.borrow_mut().show(reading);
     let mut wait = |time| {
         std::thread::sleep(time);

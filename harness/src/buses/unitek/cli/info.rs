@@ -8,6 +8,8 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
+use crate::cli::top_page::TopPage;
+use crate::web::LiveNews;
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
 
@@ -24,6 +26,11 @@ const SHOWN: [(&str, u8); 11] = [
     ("position", 0x6D),
     ("current", 0x20),
     ("bus voltage", 0xEB),
+];
+
+/// The heads of the columns of `top`.
+const HEADING: [&str; 8] = [
+    "drive", "ready", "enable", "mode", "speed", "position", "status", "errors",
 ];
 
 /// Lists drives.
@@ -61,7 +68,7 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    if !arguments.once && !output.full_screen {
+    if !arguments.once && arguments.web.is_none() && !output.full_screen {
         return Err(Failure::refused(
             "top needs a terminal; --once prints one page without one",
         ));
@@ -69,23 +76,38 @@ pub(super) fn top(
     let look = Use::look("top");
     on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
+        let title = format!("{}: drives on CAN", session.rig().id());
+        let mut page = TopPage::open(arguments, title, &HEADING, &[])?;
+        if let Some(page) = &page {
+            output.result(&page.line())?;
+        }
         loop {
-            let drives = session.axes().to_vec();
-            let found = find(session, &drives, &registers)?;
-            let page = output.fitted(&rows(&found));
-            if arguments.once {
-                output.result(&page)?;
-                return Ok(Exit::Passed);
+            if page.as_mut().is_none_or(TopPage::is_wanted) {
+                let drives = session.axes().to_vec();
+                let rows = rows(&find(session, &drives, &registers)?);
+                match &mut page {
+                    Some(page) => page.show(LiveNews {
+                        stations: rows.iter().map(|row| row.to_vec()).collect(),
+                        ..LiveNews::default()
+                    }),
+                    None => {
+                        let page = output.fitted(&columns(&HEADING, &rows));
+                        if arguments.once {
+                            output.result(&page)?;
+                            return Ok(Exit::Passed);
+                        }
+                        // Clears the screen, and begins in its upper left corner.
+                        output.result(&format!("\x1b[2J\x1b[H{page}"))?;
+                    }
+                }
             }
-            // Clears the screen, and begins in its upper left corner.
-            output.result(&format!("\x1b[2J\x1b[H{page}"))?;
             session.driver().run(arguments.every)?;
         }
     })
 }
 
 /// A row a drive.
-fn rows(found: &[Found]) -> String {
+fn rows(found: &[Found]) -> Vec<[String; HEADING.len()]> {
     let row = |drive: &[Found]| {
         let of = |register: u8| {
             let found = drive.iter().find(|found| found.reply.register == register);
@@ -103,11 +125,7 @@ fn rows(found: &[Found]) -> String {
             of(0x8F),
         ]
     };
-    let heading = [
-        "drive", "ready", "enable", "mode", "speed", "position", "status", "errors",
-    ];
-    let all: Vec<_> = found.chunks_exact(SHOWN.len()).map(row).collect();
-    columns(&heading, &all)
+    found.chunks_exact(SHOWN.len()).map(row).collect()
 }
 
 /// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.
