@@ -24,5 +24,6 @@ pub use feed::{Feed, FeedPiece, FeedReader};
 pub use server::{AskedOrder, LivePage};
 pub(crate) use view::ARROWS;
 pub use view::{
-    FaultPlace, LiveCell, LiveNews, LiveOrder, LivePicture, LiveRow, LiveScene, LiveView, MAX_ROWS,
+    FaultPlace, LiveCell, LiveNews, LiveOrder, LivePicture, LiveRow, LiveScene, LiveView,
+    MAX_CELLS, MAX_ROWS,
 };

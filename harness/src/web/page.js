@@ -112,8 +112,9 @@
     if (orders) {
       const free = own.places.map((place, number) => [place, number]).filter(([place]) => place.column === null);
       for (const [place, number] of free) button(number, by("places"), "Inject: " + place.name);
+      if (free.length) document.querySelector("main").className = "shared";
       by("places-note").textContent = free.length
-        ? "The fault meets a piece that has not begun yet."
+        ? "The fault meets one that has not begun yet. It waits for it."
         : "Press a link in the head of the picture: the fault meets the next byte on it.";
     }
   };
@@ -191,9 +192,9 @@
     }
     const scroll = by("scroll");
     const below = scroll.scrollHeight - scroll.scrollTop - scroll.clientHeight < 40;
-    own.rows.slice(-MOST_ROWS).forEach(draw);
     const left = own.left_out + Math.max(0, own.rows.length - MOST_ROWS);
     if (left) line("... " + left + " rows left out: more than a page can show");
+    own.rows.slice(-MOST_ROWS).forEach(draw);
     trim();
     if (below && (own.rows.length || left)) scroll.scrollTop = scroll.scrollHeight;
   };

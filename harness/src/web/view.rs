@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
 /// Rows of the picture in one [`LiveNews`] at most.
-pub const MAX_ROWS: usize = 300;
+pub const MAX_ROWS: usize = 400;
+/// Cells of these rows at most.
+pub const MAX_CELLS: usize = 12_000;
 
 /// What does not change while a page is open.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -67,9 +69,9 @@ pub struct LiveNews {
     pub stations: Vec<Vec<String>>,
     /// The rows of the table of traffic.
     pub traffic: Vec<Vec<String>>,
-    /// New rows of the picture, at most [`MAX_ROWS`].
+    /// The newest rows of the picture, at most [`MAX_ROWS`].
     pub rows: Vec<LiveRow>,
-    /// Rows beyond that.
+    /// Rows before them that are left out.
     pub left_out: u64,
     /// What a reader of the bus concludes, in sentences.
     pub notes: Vec<String>,

@@ -103,7 +103,7 @@ fn a_fault_of_the_page_reaches_the_master_of_a_socket() {
     master.read_exact(&mut came).expect("as many bytes");
     assert_eq!((came[0], came[39]), (0, 1), "{came:02X?}");
     let line = events.until("Address 01 has reached the master");
-    assert!(line.contains("the fault was on link 2->1"), "{line}");
+    assert!(line.contains("came over link 2->1"), "{line}");
     let (status, said) = page.post("/fault", r#"{"place":4,"fault":0}"#);
     assert_eq!(
         (status.as_str(), said.as_str()),
@@ -137,7 +137,7 @@ fn a_page_alone_plays_conversations_of_every_bus() {
 fn faults_of_frames_and_telegrams() {
     for (bus, fault, script, shown) in [
         ("unitek", "! frame 1: lost", 0, "[lost]"),
-        ("nordac", "! telegram 1: lost", 1, "lost  ["),
+        ("nordac", "! telegram 1: lost", 1, "1 telegram lost"),
     ] {
         let mut sim = Sim::start(&["--bus", bus, "--web", "127.0.0.1:0"]);
         let page = Page::of(&sim.line());

@@ -78,6 +78,10 @@ pub(super) struct Recorder {
     reader: Reader,
     /// Octets of which no telegram is known to be complete, by the place of their station.
     begun: Trace,
+    /// Telegrams of the line and runs of octets, as they were when the line was last quiet.
+    counted: (u64, u64),
+    /// Runs of octets so far.
+    runs: u64,
 }
 
 impl SegmentServer {
@@ -115,6 +119,7 @@ impl SegmentServer {
         let last = runs.last().and_then(|run| run.octets.last());
         let begun = last.is_some_and(|octet| now < octet.at + idle);
         let begun = begun.then(|| runs.pop()).flatten();
+        recorder.runs += runs.len() as u64;
         for channel in &mut recorder.begun.channels {
             let from = channel.from;
             if let Some(own) = channel.octets_mut() {
@@ -128,6 +133,23 @@ impl SegmentServer {
             }
         }
         runs
+    }
+
+    /// Telegrams that were lost since the line was last quiet: they have left no octet. `None` while a telegram is under way.
+    fn lost(&mut self, recorder: &mut Recorder) -> Option<u64> {
+        let line = self.bench.line();
+        let begun = recorder
+            .begun
+            .channels
+            .iter()
+            .any(|own| !own.octets().is_empty());
+        if line.is_busy() || begun {
+            return None;
+        }
+        let now = (line.telegrams(), recorder.runs);
+        let before = std::mem::replace(&mut recorder.counted, now);
+        let (sent, arrived) = (now.0 - before.0, now.1 - before.1);
+        Some(sent.saturating_sub(arrived)).filter(|lost| *lost > 0)
     }
 
     fn row(&self, recorder: &mut Recorder, run: &TelegramRun) -> LiveRow {
@@ -240,7 +262,11 @@ impl LiveView for SegmentServer {
     }
 
     fn watch(&mut self, on: bool) {
-        self.recorder = on.then(Recorder::default);
+        let telegrams = self.bench.line().telegrams();
+        self.recorder = on.then(|| Recorder {
+            counted: (telegrams, 0),
+            ..Recorder::default()
+        });
         match on {
             true => self.bench.line().record_anew(),
             false => self.bench.line().keep_no_record(),
@@ -267,12 +293,18 @@ impl LiveView for SegmentServer {
         ];
         if let Some(mut recorder) = self.recorder.take() {
             let runs = self.runs(&mut recorder);
-            let rows = runs
-                .iter()
-                .take(MAX_ROWS)
-                .map(|run| self.row(&mut recorder, run));
+            // The meaning of a telegram depends on those before it, also on those that are not shown.
+            let rows = runs.iter().map(|run| self.row(&mut recorder, run));
             news.rows = rows.collect();
-            news.left_out = (runs.len() - news.rows.len()) as u64;
+            let hidden = news.rows.len().saturating_sub(MAX_ROWS);
+            news.rows.drain(..hidden);
+            news.left_out = hidden as u64;
+            let lost = self.lost(&mut recorder);
+            let note = |lost| {
+                let lost = counted(lost, "telegram");
+                format!("{lost} lost: no octet was on the line.")
+            };
+            news.notes.extend(lost.map(note));
             self.recorder = Some(recorder);
         }
         news

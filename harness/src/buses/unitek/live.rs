@@ -214,8 +214,9 @@ impl LiveView for SharedDrives {
 
     fn news(&mut self) -> LiveNews {
         let frames = self.bench.segment.take_record();
-        let rows = frames.iter().take(MAX_ROWS).map(|frame| self.row(frame));
-        let rows: Vec<_> = rows.collect();
+        let hidden = frames.len().saturating_sub(MAX_ROWS);
+        let rows = frames.iter().skip(hidden).map(|frame| self.row(frame));
+        let rows = rows.collect();
         LiveNews {
             at: self.bench.clock.now.to_string(),
             stations: self
@@ -225,7 +226,7 @@ impl LiveView for SharedDrives {
                 .map(|node| self.station(*node))
                 .collect(),
             traffic: vec![vec!["CAN".to_owned(), self.bench.frames().to_string()]],
-            left_out: (frames.len() - rows.len()) as u64,
+            left_out: hidden as u64,
             rows,
             ..LiveNews::default()
         }

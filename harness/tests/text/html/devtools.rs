@@ -186,6 +186,10 @@ impl Browser {
         if key == "Tab" {
             down["windowsVirtualKeyCode"] = json!(9);
         }
+        if key == "Enter" {
+            down["text"] = json!("\r");
+            down["windowsVirtualKeyCode"] = json!(13);
+        }
         self.call("Input.dispatchKeyEvent", down);
         self.call(
             "Input.dispatchKeyEvent",

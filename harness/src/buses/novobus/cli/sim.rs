@@ -23,7 +23,8 @@ use std::str::FromStr;
 pub(crate) const SIM_HELP: &str = "\
 Once all places are ready, standard output has one line per ring, such as `ring 1: 3 drives at 127.0.0.1:40123`, or per
 place of a CAN bus, such as `slcan: 1 drive, 500 kbit/s at 127.0.0.1:40123`, and with --control ADDRESS a line
-`control at 127.0.0.1:40124`; with --control - the answers follow. Standard error reports what clients do.
+`control at 127.0.0.1:40124`; with --control - the answers follow. With --web a line `page at http://127.0.0.1:8090/#TOKEN`
+is the address to open in a browser, token included. Standard error reports what clients do.
 
 Drives on CAN: `sim --bus unitek --drives 2 --slcan 127.0.0.1:4100 --socketcand 127.0.0.1:29536`. All clients share the
 bus: each frame goes through the arbitration and reaches the other clients. With SLCAN a client opens its channel with
@@ -213,6 +214,14 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
 
 /// Serves simulated drives.
 pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let only_page = arguments.tcp.is_empty()
+        && arguments.pty.is_empty()
+        && arguments.frames.places().is_empty();
+    if arguments.once && only_page {
+        return Err(Failure::refused(
+            "--once ends when the last client has gone, and a page alone has no clients: --tcp, --pty or another place expected, or --for",
+        ));
+    }
     let end = match arguments.frames.bus {
         Bus::Novobus => rings(arguments, output)?,
         bus if buses::shares_octets(bus) => octets(bus, arguments, output)?,

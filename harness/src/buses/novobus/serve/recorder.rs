@@ -3,7 +3,7 @@
 use crate::buses::novobus::locate::{Location, MAX_ZEROS, locate};
 use crate::counted::counted;
 use crate::link::link_name;
-use crate::web::{LiveCell, LiveRow, MAX_ROWS};
+use crate::web::{LiveCell, LiveRow, MAX_CELLS, MAX_ROWS};
 use harness_proto::line::Received;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -22,7 +22,7 @@ pub(super) struct LinkCount {
     pub(super) bytes: u64,
     /// Bytes other than SYNCO.
     pub(super) busy: u64,
-    /// Bytes that arrived otherwise than they were sent, or not at all.
+    /// Bytes that arrived damaged or not at all.
     pub(super) damaged: u64,
 }
 
@@ -114,45 +114,45 @@ impl Recorder {
         &self.counts
     }
 
-    /// The rows of byte times that are over at `now`. Those in which links carried SYNCO or nothing are folded.
+    /// The rows of byte times that are over at `now`, the newest of them within the bounds of a picture. Those in which links carried SYNCO
+    /// or nothing are folded.
     pub(super) fn rows(&mut self, now: Instant) -> Rows {
         let over = now.since_start().units() / self.byte.units().max(1);
         let rest = self.slots.split_off(&over);
         let slots = std::mem::replace(&mut self.slots, rest);
+        let (mut busy, mut cells) = (0, 0);
+        let shown = slots.values().rev().take_while(|own| {
+            if !is_idle(own) {
+                busy += 1;
+                cells += own.len();
+            }
+            busy <= MAX_ROWS && cells <= MAX_CELLS
+        });
+        let hidden = slots.len() - shown.count();
         let mut rows: Vec<LiveRow> = Vec::new();
-        let mut left_out = std::mem::take(&mut self.left_out);
-        for (slot, cells) in slots {
-            let end = Instant::START + self.byte * (slot + 1);
-            let idle =
-                |(_, byte): &(usize, LineByte)| byte.sent == Some(SYNCO) && !is_damaged(byte);
-            if cells.iter().all(idle) {
-                match rows.last_mut() {
-                    Some(row) if row.fold > 0 => row.fold += 1,
-                    _ => rows.push(LiveRow {
-                        at: end.to_string(),
-                        words: "SYNCO only".to_owned(),
-                        fold: 1,
-                        ..LiveRow::default()
-                    }),
-                }
-                continue;
+        for (slot, own) in slots.iter().skip(hidden) {
+            let at = (Instant::START + self.byte * (slot + 1)).to_string();
+            match rows.last_mut() {
+                Some(row) if is_idle(own) && row.fold > 0 => row.fold += 1,
+                _ if is_idle(own) => rows.push(LiveRow {
+                    at,
+                    words: "SYNCO only".to_owned(),
+                    fold: 1,
+                    ..LiveRow::default()
+                }),
+                _ => rows.push(LiveRow {
+                    at,
+                    cells: own
+                        .iter()
+                        .map(|(column, byte)| cell(*column, byte))
+                        .collect(),
+                    ..LiveRow::default()
+                }),
             }
-            if rows.len() >= MAX_ROWS {
-                left_out += 1;
-                continue;
-            }
-            rows.push(LiveRow {
-                at: end.to_string(),
-                cells: cells
-                    .iter()
-                    .map(|(column, byte)| cell(*column, byte))
-                    .collect(),
-                ..LiveRow::default()
-            });
         }
         Rows {
             rows,
-            left_out,
+            left_out: std::mem::take(&mut self.left_out) + hidden as u64,
             notes: self.notes(),
         }
     }
@@ -173,14 +173,20 @@ impl Recorder {
                     format!(" behind {}", counted(zeros, "zero"))
                 });
                 notes.push(format!(
-                    "Address {drive:02X} has reached the master{zeros}: drive {prefix}{drive} detected the error first, so the fault was on \
-                     link {link} (ND21 9.7)."
+                    "Address {drive:02X} has reached the master{zeros}: drive {prefix}{drive} was the first to detect an error, in what \
+                     came over link {link} (ND21 9.7)."
                 ));
             }
             *found = now;
         }
         notes
     }
+}
+
+/// Whether links carried nothing but whole SYNCO.
+fn is_idle(cells: &[(usize, LineByte)]) -> bool {
+    let mut cells = cells.iter();
+    cells.all(|(_, byte)| byte.sent == Some(SYNCO) && !is_damaged(byte))
 }
 
 fn is_damaged(byte: &LineByte) -> bool {
