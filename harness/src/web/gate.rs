@@ -78,11 +78,11 @@ pub(super) fn admit(head: &Head, hosts: &[String], token: &str) -> Result<Route,
         }
     };
     if head.method != method {
-        let target = &head.target;
-        return Err(Refusal::new(
-            405,
-            format_args!("{target} takes {method} only"),
-        ));
+        let why = format!("{} takes {method} only", head.target);
+        return Err(Refusal {
+            allow: Some(method),
+            ..Refusal::new(405, why)
+        });
     }
     if head.target == "/" {
         return Ok(Route::Page);

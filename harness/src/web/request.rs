@@ -24,12 +24,17 @@ const DECIDE: [&str; 6] = [
 pub(super) struct Refusal {
     pub(super) status: u16,
     pub(super) why: String,
+    /// The method that is allowed, where another one was used.
+    pub(super) allow: Option<&'static str>,
 }
 
 impl Refusal {
     pub(super) fn new(status: u16, why: impl fmt::Display) -> Self {
-        let why = why.to_string();
-        Self { status, why }
+        Self {
+            status,
+            why: why.to_string(),
+            allow: None,
+        }
     }
 }
 

@@ -451,7 +451,9 @@ fn whole(status: u16, kind: &str, more: &str, body: &str) -> String {
 
 fn refused(refusal: &Refusal) -> String {
     let body = format!("{}\n", refusal.why);
-    whole(refusal.status, "text/plain", "", &body)
+    let allow = refusal.allow;
+    let allow = allow.map_or(String::new(), |allow| format!("Allow: {allow}\r\n"));
+    whole(refusal.status, "text/plain", &allow, &body)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::plan;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
+use crate::web::{LiveCell, LiveNews, LiveOrder, MAX_ROWS};
 use proptest::prelude::*;
 
 /// A read of the byte FE13 of drive 0 in a ring of three, and its answer (ND21 10.1): 00 with its negated sum.
@@ -363,6 +364,80 @@ fn a_fault_at_a_time() {
     assert_eq!(taken(&mut server, 0), [0_u8; 0]);
 }
 
+/// The cells of a picture, byte times that are folded included.
+fn shown(news: &LiveNews) -> (u64, usize) {
+    let folded = news.rows.iter().map(|row| row.fold).sum();
+    (folded, news.rows.iter().map(|row| row.cells.len()).sum())
+}
+
+/// ND21 10.1: a read in a ring of three. Each of the four links carries its six bytes, and the last row is the checking byte of the answer at
+/// the master.
+#[test]
+fn a_page_shows_each_byte_on_each_link() {
+    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    server.watch(true);
+    server.receive(0, &READ).expect("no marks");
+    run(&mut server, at(20));
+    let news = server.news();
+    assert_eq!(shown(&news), (0, 24));
+    // The first byte reaches the master three byte times behind the first drive.
+    let last = news.rows.last().expect("rows");
+    assert_eq!((news.rows.len(), last.cells.len()), (9, 1));
+    assert_eq!(last.cells[0], LiveCell(3, "2D".to_owned(), 'd'));
+    assert_eq!(news.traffic[3], ["0->master", "6", "6", "0"]);
+    assert_eq!(shown(&server.news()), (0, 0));
+    server.receive(0, &[0x80; 10]).expect("no marks");
+    run(&mut server, at(40));
+    assert_eq!(shown(&server.news()), (13, 0));
+}
+
+/// ND21 9.7: the zeros, and the address of the drive behind the damaged link; the check sequence ends it (9.8).
+#[test]
+fn a_page_tells_which_drive_saw_the_fault() {
+    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    server.go(0);
+    server.watch(true);
+    for place in 0..3 {
+        let order = LiveOrder::Fault { place, fault: 0 };
+        let said = server.order(order).expect("a fault");
+        assert!(said.contains("No master is connected"), "{said}");
+        let until = server.clock + Span::from_millis(40);
+        run(&mut server, until);
+        let notes = server.news().notes;
+        let expected = format!("Address {:02X} has reached the master", 2 - place);
+        assert!(
+            notes.len() == 1 && notes[0].starts_with(&expected),
+            "{notes:?}"
+        );
+        server
+            .order(LiveOrder::Play { script: 3 })
+            .expect("the check sequence");
+        let until = server.clock + Span::from_millis(40);
+        run(&mut server, until);
+        let stations = server.news().stations;
+        assert!(
+            stations.iter().all(|row| row[1] == "normal"),
+            "{stations:?}"
+        );
+    }
+}
+
+/// A page that is opened beside a line at full speed gets the newest rows, and the number of the others.
+#[test]
+fn a_picture_has_bounds() {
+    let mut server = server(HEADER, &[3], Pace::Free, Marks::None);
+    server.watch(true);
+    for turn in 0..5 {
+        server.receive(0, &[0x81; 1000]).expect("no marks");
+        run(&mut server, at(10 * (turn + 1)));
+    }
+    let news = server.news();
+    assert_eq!(news.rows.len(), MAX_ROWS);
+    assert!(news.left_out > 1000, "{}", news.left_out);
+    server.watch(false);
+    assert_eq!(server.news().rows, []);
+}
+
 proptest! {
     /// However the bytes are cut up and whenever the server is asked, the same bytes come back.
     #[test]
@@ -389,6 +464,38 @@ proptest! {
         run(&mut cut, at(clock + 200));
         heard.extend(taken(&mut cut, 0));
         prop_assert_eq!(taken(&mut whole, 0), heard);
+    }
+
+    /// A page that is opened, read and closed at any time changes no byte for the master or for a tap.
+    #[test]
+    fn a_page_changes_nothing(
+        bytes in proptest::collection::vec(any::<u8>(), 1..60),
+        looks in proptest::collection::vec((0_u8..3, 0_u64..4), 1..40),
+    ) {
+        let tap = Inner { ring: 0, link: 1, role: ClientRole::Tap };
+        let [mut alone, mut beside] = [(); 2].map(|()| {
+            let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+            server.add(tap);
+            server.come(1);
+            server.receive(0, &bytes).expect("no marks");
+            server
+        });
+        let mut clock = 0;
+        for (what, millis) in looks {
+            clock += millis;
+            run(&mut beside, at(clock));
+            match what {
+                0 => beside.watch(true),
+                1 => beside.watch(false),
+                _ => drop(beside.news()),
+            }
+        }
+        for server in [&mut alone, &mut beside] {
+            run(server, at(clock + 100));
+        }
+        for seat in 0..2 {
+            prop_assert_eq!(taken(&mut alone, seat), taken(&mut beside, seat));
+        }
     }
 
     /// No line of control is too odd for an answer of one line.
