@@ -114,7 +114,7 @@
       for (const [place, number] of free) button(number, by("places"), "Inject: " + place.name);
       if (free.length) document.querySelector("main").className = "shared";
       by("places-note").textContent = free.length
-        ? "The fault meets one that has not begun yet. It waits for it."
+        ? "The fault waits until that one begins."
         : "Press a link in the head of the picture: the fault meets the next byte on it.";
     }
   };
@@ -129,7 +129,7 @@
     const row = make("tr", by("rows").tBodies[0]);
     row.className = "fold";
     const cell = make("td", row, text);
-    cell.colSpan = (scene.picture ? scene.picture.columns.length : 0) + 2;
+    cell.colSpan = (scene.picture ? scene.picture.columns.length : 0) + 1;
     return row;
   };
 
@@ -140,7 +140,8 @@
       const folded = before && before.dataset.fold ? Number(before.dataset.fold) : 0;
       const row = folded ? before : line("");
       row.dataset.fold = folded + own.fold;
-      row.firstChild.textContent = "... " + row.dataset.fold + " byte times: " + own.words;
+      const noun = row.dataset.fold === "1" ? " byte time: " : " byte times: ";
+      row.firstChild.textContent = "... " + row.dataset.fold + noun + own.words;
       return;
     }
     const row = make("tr", body);
