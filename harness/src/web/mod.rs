@@ -8,10 +8,10 @@
 //! | `POST /play` | a short conversation of the bench's own: `{"script":0}` |
 //!
 //! A page that injects faults can be driven by any web site that its user visits, although it listens at 127.0.0.1: such a site may
-//! point a name of its own at this machine, or send a form here. So [`gate`] wants an exact `Host`, an exact `Origin`, the type
+//! point a name of its own at this machine, or send a form here. So `gate` wants an exact `Host`, an exact `Origin`, the type
 //! `application/json`, and a token that only the address printed at the start holds, behind its `#`. The events need the token too.
 //!
-//! A bench shows itself by a [`LiveView`]. Nothing is recorded while no page is open. [`feed`] bounds what waits for slow readers.
+//! A bench shows itself by a [`LiveView`]. Nothing is recorded while no page is open. `feed` bounds what waits for slow readers.
 
 mod feed;
 mod gate;
