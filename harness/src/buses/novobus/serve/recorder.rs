@@ -5,15 +5,16 @@ use crate::counted::counted;
 use crate::link::link_name;
 use crate::web::{LiveCell, LiveRow, MAX_CELLS, MAX_ROWS};
 use harness_proto::line::Received;
+use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 /// Byte times for which rows are kept until they are fetched, at most: more than a second of them.
 const MAX_SLOTS: usize = 4096;
 
-/// How many of the bytes that the master received are kept, to read which drive the ring spells out.
+/// How many of the bytes that the master received are kept at least, to read which drive the ring spells out.
 const HEARD: usize = 4 * MAX_ZEROS;
 
 /// What a link has carried.
@@ -35,8 +36,8 @@ pub(super) struct Recorder {
     /// By the number of the byte time in which a byte arrived: columns and bytes.
     slots: BTreeMap<u64, Vec<(usize, LineByte)>>,
     counts: Vec<LinkCount>,
-    heard: Vec<VecDeque<Received>>,
-    found: Vec<Option<Location>>,
+    masters: Vec<MasterEar>,
+    notes: Vec<String>,
     left_out: u64,
 }
 
@@ -71,8 +72,8 @@ impl Recorder {
         Self {
             byte,
             counts: vec![LinkCount::default(); columns],
-            heard: vec![VecDeque::new(); rings.len()],
-            found: vec![None; rings.len()],
+            masters: vec![MasterEar::default(); rings.len()],
+            notes: Vec::new(),
             rings,
             slots: BTreeMap::new(),
             left_out: 0,
@@ -99,12 +100,9 @@ impl Recorder {
             }
             if link == usize::from(drives)
                 && let Some(received) = byte.arrival()
+                && let Some(location) = self.masters[ring].hear(received, drives)
             {
-                let heard = &mut self.heard[ring];
-                heard.push_back(received);
-                if heard.len() > HEARD {
-                    heard.pop_front();
-                }
+                self.notes.push(note(ring, drives, location));
             }
         }
     }
@@ -153,34 +151,54 @@ impl Recorder {
         Rows {
             rows,
             left_out: std::mem::take(&mut self.left_out) + hidden as u64,
-            notes: self.notes(),
+            notes: std::mem::take(&mut self.notes),
         }
     }
+}
 
-    /// Which drives the rings spell out now and did not before (ND21 9.7).
-    fn notes(&mut self) -> Vec<String> {
-        let mut notes = Vec::new();
-        let rings = self.rings.iter().zip(&mut self.heard).zip(&mut self.found);
-        for (ring, ((&(drives, _), heard), found)) in rings.enumerate() {
-            let now = locate(heard.make_contiguous(), drives);
-            if let Some(location) = now
-                && *found != now
-            {
-                let drive = location.drive;
-                let prefix = if ring == 0 { "" } else { "2:" };
-                let link = link_name(ring, drives, usize::from(drives - 1 - drive));
-                let zeros = location.zeros.map_or(String::new(), |zeros| {
-                    format!(" behind {}", counted(zeros, "zero"))
-                });
-                notes.push(format!(
-                    "Address {drive:02X} has reached the master{zeros}: drive {prefix}{drive} was the first to detect an error, in what \
-                     came over link {link} (ND21 9.7)."
-                ));
-            }
-            *found = now;
+/// What the master of a ring has received since the last check sequence, and the drive that it was found to spell out.
+#[derive(Clone, Debug, Default)]
+struct MasterEar {
+    heard: Vec<Received>,
+    watch: SequenceWatch,
+    named: Option<u8>,
+}
+
+impl MasterEar {
+    /// Takes a byte. Returns the drive that the ring spells out, once it is sure (ND21 9.7).
+    fn hear(&mut self, byte: Received, drives: u8) -> Option<Location> {
+        if self.watch.see(byte.byte, byte.error.is_none()) == SequenceProgress::Complete {
+            self.heard.clear();
+            self.named = None;
+            return None;
         }
-        notes
+        if self.heard.len() >= 2 * HEARD {
+            self.heard.drain(..HEARD);
+        }
+        self.heard.push(byte);
+        let Some(location) = locate(&self.heard, drives) else {
+            self.named = None;
+            return None;
+        };
+        let news = location.sure && self.named != Some(location.drive);
+        if location.sure {
+            self.named = Some(location.drive);
+        }
+        news.then_some(location)
     }
+}
+
+fn note(ring: usize, drives: u8, location: Location) -> String {
+    let drive = location.drive;
+    let prefix = if ring == 0 { "" } else { "2:" };
+    let link = link_name(ring, drives, usize::from(drives - 1 - drive));
+    let zeros = location.zeros.map_or(String::new(), |zeros| {
+        format!(" behind {}", counted(zeros, "zero"))
+    });
+    format!(
+        "Address {drive:02X} has reached the master{zeros}: drive {prefix}{drive} was the first to detect an error, in what came over link \
+         {link} (ND21 9.7)."
+    )
 }
 
 /// Whether links carried nothing but whole SYNCO.
