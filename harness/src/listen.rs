@@ -1,4 +1,4 @@
-//! Sockets that listen on this machine, and on others' behalf only where that is allowed.
+//! Sockets that listen: at addresses of this machine alone, unless others are allowed.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
@@ -8,8 +8,7 @@ use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
 pub enum ListenError {
     /// Other machines could reach it.
     #[error(
-        "{address} can be reached from other machines, and whoever connects is the master: a loopback address such as 127.0.0.1 \
-         expected, or --allow-remote"
+        "{address} can be reached from other machines: a loopback address such as 127.0.0.1 expected, or --allow-remote"
     )]
     Remote {
         /// The address.
