@@ -4,7 +4,7 @@
 
 use super::class::{CaseEvidence, Wrong};
 use super::conversation::Answers;
-use super::sound::{Sound, all_back};
+use super::sound::{Drives, Sound, all_back};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::campaign::fault::{CaseFaults, link_index};
@@ -39,10 +39,24 @@ pub struct ByManual {
     spelling: usize,
 }
 
+/// What a master by the manual talks to.
+pub(super) trait Wire: Drives {
+    /// Sends bytes without a gap; returns what came back until the last one had been sent.
+    fn exchange(&mut self, bytes: &[u8]) -> Vec<Received>;
+}
+
+impl Wire for SimulatedLink {
+    fn exchange(&mut self, bytes: &[u8]) -> Vec<Received> {
+        let end = self.send_octets(0, bytes);
+        self.run_until(end);
+        std::iter::from_fn(|| self.receive_octet(0).map(|(_, byte)| byte)).collect()
+    }
+}
+
 /// A ring under a master that goes by the manual.
-struct Play<'a> {
+struct Play<'a, W> {
     of: &'a ByManual,
-    link: SimulatedLink,
+    wire: W,
     said: Vec<Said>,
     evidence: CaseEvidence,
     /// For how many byte times the faults last.
@@ -50,12 +64,6 @@ struct Play<'a> {
     /// What came back at first, as far as it was not repeated: without a fault the first time. What is repeated comes when
     /// all faults are over, and brings what the cell holds then.
     kept: Vec<Received>,
-}
-
-fn send(link: &mut SimulatedLink, bytes: &[u8]) -> Vec<Received> {
-    let end = link.send_octets(0, bytes);
-    link.run_until(end);
-    std::iter::from_fn(|| link.receive_octet(0).map(|(_, byte)| byte)).collect()
 }
 
 /// What came back for `sent`, without the SYNCO that were under way before it.
@@ -70,7 +78,7 @@ impl ByManual {
     /// master that repeats telegrams would do so too.
     #[must_use]
     pub fn new(start: SimulatedLink, bytes: Vec<u8>) -> Option<Self> {
-        let drives = start.drives(0);
+        let drives = start.count();
         let spelling = if Sound::any_monitors(&start) {
             SPELLING_AFTER_SILENCE
         } else {
@@ -82,7 +90,7 @@ impl ByManual {
             let mut heard = Vec::new();
             let fill = std::iter::repeat_n(SYNCO, usize::from(drives) + 2);
             for byte in bytes.iter().copied().chain(fill) {
-                heard.extend(send(link, &[byte]));
+                heard.extend(link.exchange(&[byte]));
                 sound.note(link);
             }
             heard
@@ -113,49 +121,85 @@ impl ByManual {
     #[must_use]
     pub fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<Said>) {
         let mut link = self.start.clone();
-        let byte_time = link.byte_time();
-        let mut lasts = 0;
         for fault in case.faults() {
             for (distance, what) in fault.what.on_link() {
                 let placed = PlacedFault::Link(fault.link, what);
                 link.inject(0, placed, Moment::Byte(fault.byte + distance));
             }
-            lasts += fault.what.lasts(byte_time);
         }
+        let heard = link.exchange(&self.opening(self.lasts(case)));
+        self.play_on(link, heard, self.lasts(case))
+    }
+
+    /// For how many byte times the faults of a case last.
+    pub(super) fn lasts(&self, case: &CaseFaults) -> usize {
+        let byte_time = self.start.byte_time();
+        let lasts = case.faults().map(|fault| fault.what.lasts(byte_time));
+        usize::try_from(lasts.sum::<u64>()).unwrap_or(usize::MAX)
+    }
+
+    /// SYNCO until what was sent before has come back, if faults last for `lasts` byte times.
+    fn fill(&self, lasts: usize) -> usize {
+        usize::from(self.answers.shape.drives) + 2 + lasts
+    }
+
+    /// What the master sends before it looks at what came back.
+    pub(super) fn opening(&self, lasts: usize) -> Vec<u8> {
+        let mut bytes = self.answers.sent.clone();
+        bytes.resize(bytes.len() + self.fill(lasts) + self.spelling, SYNCO);
+        bytes
+    }
+
+    /// Reads what came back for the [opening](Self::opening), and repairs the ring.
+    pub(super) fn play_on(
+        &self,
+        wire: impl Wire,
+        heard: Vec<Received>,
+        lasts: usize,
+    ) -> (CaseEvidence, Vec<Said>) {
+        let fill = vec![SYNCO; self.fill(lasts) + self.spelling];
         let mut play = Play {
             of: self,
-            link,
-            said: Vec::new(),
+            wire,
+            said: vec![
+                Said::new("the conversation", self.answers.sent.clone()),
+                Said::new("SYNCO, while the ring spells out an address (9.7)", fill),
+            ],
             evidence: CaseEvidence::default(),
-            lasts: usize::try_from(lasts).unwrap_or(usize::MAX),
+            lasts,
             kept: Vec::new(),
         };
-        play.all();
+        play.all(heard);
         (play.evidence, play.said)
     }
 }
 
-impl Play<'_> {
-    fn say(&mut self, why: &'static str, bytes: Vec<u8>) -> Vec<Received> {
-        let heard = send(&mut self.link, &bytes);
-        self.said.push(Said { why, bytes });
-        heard
+impl Said {
+    fn new(why: &'static str, bytes: Vec<u8>) -> Self {
+        Self { why, bytes }
     }
+}
 
-    fn drives(&self) -> usize {
-        usize::from(self.of.answers.shape.drives)
+impl<W: Wire> Play<'_, W> {
+    /// Sends all of it without a gap.
+    fn say(&mut self, said: impl IntoIterator<Item = Said>) -> Vec<Received> {
+        let from = self.said.len();
+        self.said.extend(said);
+        let bytes: Vec<_> = self.said[from..]
+            .iter()
+            .flat_map(|said| said.bytes.iter().copied())
+            .collect();
+        self.wire.exchange(&bytes)
     }
 
     /// SYNCO until what was sent before has come back, however late, and some more.
-    fn synco(&self, more: usize) -> Vec<u8> {
-        vec![SYNCO; self.drives() + 2 + self.lasts + more]
+    fn synco(&self, more: usize) -> Said {
+        Said::new("SYNCO", vec![SYNCO; self.of.fill(self.lasts) + more])
     }
 
-    fn all(&mut self) {
+    /// Goes on behind the opening, for which this came back.
+    fn all(&mut self, mut heard: Vec<Received>) {
         let answers = &self.of.answers;
-        let mut heard = self.say("the conversation", answers.sent.clone());
-        let fill = self.synco(self.of.spelling);
-        heard.extend(self.say("SYNCO, while the ring spells out an address (9.7)", fill));
         let wrong = answers.wrong(&heard, 0);
         self.evidence.confirmed = wrong.is_none();
         let restart = wrong.map(|wrong| answers.restart(wrong));
@@ -166,14 +210,14 @@ impl Play<'_> {
         heard.truncate(restart.unwrap_or(answers.sent.len()));
         self.kept = heard;
         self.evidence.wrong = self.wrong_values();
-        if !self.evidence.confirmed || self.of.sound.waits_as(&self.link) {
-            self.evidence.all_back = all_back(&self.link);
+        if !self.evidence.confirmed || self.of.sound.waits_as(&self.wire) {
+            self.evidence.all_back = all_back(&self.wire);
             return;
         }
         // Something is left that only the next telegrams can show.
         let why = "the conversation once more, without a fault";
-        let mut heard = self.say(why, answers.sent.clone());
-        heard.extend(self.say("SYNCO", self.synco(self.of.spelling)));
+        let fill = self.synco(self.of.spelling);
+        let heard = self.say([Said::new(why, answers.sent.clone()), fill]);
         let heard = behind_synco(&heard, &answers.sent);
         if let Some(wrong) = answers.wrong(heard, 0) {
             self.evidence.confirmed = false;
@@ -182,7 +226,7 @@ impl Play<'_> {
             }
             self.repair(answers.restart(wrong));
         }
-        self.evidence.all_back = all_back(&self.link);
+        self.evidence.all_back = all_back(&self.wire);
     }
 
     /// Notes the link that the master blames for a wrong byte.
@@ -201,13 +245,15 @@ impl Play<'_> {
     /// Check sequences, each with the telegrams from `restart` on behind it, until all have been answered. Half as many as
     /// there are drives and one more suffice; one more still, for faults that last.
     fn repair(&mut self, restart: usize) {
-        let most = self.drives() / 2 + 2;
+        let most = usize::from(self.of.answers.shape.drives) / 2 + 2;
         for _ in 0..most {
             self.evidence.sequences += 1;
-            let mut heard = self.say("the check sequence (9.8)", CHECK_SEQUENCE.to_vec());
             let repeated = self.of.answers.sent[restart..].to_vec();
-            heard.extend(self.say("the telegrams that were not completed, repeated", repeated));
-            heard.extend(self.say("SYNCO", self.synco(1)));
+            let heard = self.say([
+                Said::new("the check sequence (9.8)", CHECK_SEQUENCE.to_vec()),
+                Said::new("the telegrams that were not completed, repeated", repeated),
+                self.synco(1),
+            ]);
             let is_sequence = |bytes: &[Received]| {
                 let mut pairs = bytes.iter().zip(SEQUENCE);
                 pairs.all(|(received, byte)| received.is(byte))
@@ -225,7 +271,7 @@ impl Play<'_> {
 
     /// Cells with wrong contents, and data that differed.
     fn wrong_values(&self) -> Vec<Wrong> {
-        let mut wrong = self.of.sound.wrong(&self.link, self.evidence.confirmed);
+        let mut wrong = self.of.sound.wrong(&self.wire, self.evidence.confirmed);
         if !self.evidence.confirmed {
             return wrong;
         }

@@ -4,8 +4,8 @@ use super::class::Wrong;
 use crate::buses::SimulatedLink;
 use crate::link::Link;
 use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
+use harness_proto::novobus::bus_end::BusEnd;
 use harness_sim::novobus::cells::Cells;
-use harness_sim::novobus::device::Device;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What drives hold, and held, without a fault.
@@ -19,12 +19,30 @@ pub struct Sound {
 /// The first cell of RAM and the last of the registers (ND21 10.1).
 const CELLS: std::ops::RangeInclusive<u16> = 0xFD80..=0xFFFF;
 
-fn drives(link: &SimulatedLink) -> std::ops::Range<u8> {
-    0..link.drives(0)
+/// The drives of a ring, past their bus.
+pub trait Drives {
+    /// How many there are.
+    fn count(&self) -> u8;
+
+    /// The cells of a drive, if the ring has it.
+    fn cells(&self, drive: u8) -> Option<&Cells>;
+
+    /// Its end of the bus.
+    fn bus_end(&self, drive: u8) -> Option<&BusEnd>;
 }
 
-fn cells(link: &SimulatedLink, drive: u8) -> Option<&Cells> {
-    Some(link.drive(0, drive)?.cells())
+impl Drives for SimulatedLink {
+    fn count(&self) -> u8 {
+        self.drives(0)
+    }
+
+    fn cells(&self, drive: u8) -> Option<&Cells> {
+        Some(self.drive(0, drive)?.cells())
+    }
+
+    fn bus_end(&self, drive: u8) -> Option<&BusEnd> {
+        Some(self.drive(0, drive)?.bus_end())
+    }
 }
 
 /// The addresses at which two drives differ. The record of a bus error (14.10.1) and of the addressee of the last telegram (9.2) does
@@ -52,8 +70,8 @@ impl Sound {
 
     /// Notes what drives hold now.
     pub fn note(&mut self, now: &SimulatedLink) {
-        for drive in drives(now) {
-            let (Some(before), Some(cells)) = (cells(&self.end, drive), cells(now, drive)) else {
+        for drive in 0..now.count() {
+            let (Some(before), Some(cells)) = (self.end.cells(drive), now.cells(drive)) else {
                 continue;
             };
             for address in differences(before, cells) {
@@ -66,10 +84,10 @@ impl Sound {
 
     /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
     #[must_use]
-    pub fn wrong(&self, now: &SimulatedLink, confirmed: bool) -> Vec<Wrong> {
+    pub fn wrong(&self, now: &impl Drives, confirmed: bool) -> Vec<Wrong> {
         let mut wrong = Vec::new();
-        for drive in drives(now) {
-            let (Some(sound), Some(cells)) = (cells(&self.end, drive), cells(now, drive)) else {
+        for drive in 0..now.count() {
+            let (Some(sound), Some(cells)) = (self.end.cells(drive), now.cells(drive)) else {
                 continue;
             };
             for address in differences(sound, cells) {
@@ -90,27 +108,26 @@ impl Sound {
 
     /// Whether every drive waits for the same as without a fault: then all that follows is the same.
     #[must_use]
-    pub fn waits_as(&self, now: &SimulatedLink) -> bool {
-        drives(now).all(|drive| {
-            let (Some(sound), Some(drive)) = (self.end.drive(0, drive), now.drive(0, drive)) else {
-                return false;
-            };
-            drive.bus_end().waits_as(sound.bus_end())
-                && drive.peek(BUS_ADDR) == sound.peek(BUS_ADDR)
-        })
+    pub fn waits_as(&self, now: &impl Drives) -> bool {
+        let same = |drive| {
+            let waits = now.bus_end(drive)?.waits_as(self.end.bus_end(drive)?);
+            let meant = now.cells(drive)?.peek(BUS_ADDR) == self.end.cells(drive)?.peek(BUS_ADDR);
+            Some(waits && meant)
+        };
+        (0..now.count()).all(|drive| same(drive).unwrap_or(false))
     }
 
     /// Whether any drive watches for silence (9.9).
     #[must_use]
-    pub fn any_monitors(link: &SimulatedLink) -> bool {
+    pub fn any_monitors(ring: &impl Drives) -> bool {
         use harness_proto::nd21::{bits::flags2::MONITORING, ram::FLAGS2};
         let monitors = |cells: &Cells| cells.peek(FLAGS2) & MONITORING != 0;
-        drives(link).any(|drive| cells(link, drive).is_some_and(monitors))
+        (0..ring.count()).any(|drive| ring.cells(drive).is_some_and(monitors))
     }
 }
 
 /// Whether no drive is in the error mode.
 #[must_use]
-pub fn all_back(link: &SimulatedLink) -> bool {
-    drives(link).all(|drive| link.drive(0, drive).is_some_and(|drive| !drive.in_error()))
+pub fn all_back(ring: &impl Drives) -> bool {
+    (0..ring.count()).all(|drive| ring.bus_end(drive).is_some_and(|end| !end.in_error()))
 }
