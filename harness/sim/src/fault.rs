@@ -136,7 +136,7 @@ impl fmt::Display for DriveFault {
 }
 
 /// Faults waiting for their byte: a list in order of bytes that is used up from the front.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FaultPlan<F> {
     /// In order of byte numbers, the last one first, so that taking one costs nothing.
     waiting: Vec<(u64, F)>,

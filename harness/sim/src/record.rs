@@ -73,7 +73,7 @@ pub enum FrameEnd {
 }
 
 /// Something that a station remarked at a piece that it received.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Remark {
     /// Which station.
     pub station: u8,

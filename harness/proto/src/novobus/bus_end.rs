@@ -58,7 +58,7 @@ pub enum Deadline {
 }
 
 /// A drive's end of the bus.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BusEnd {
     state: State,
     /// When the last byte was received; `None` until the first one arms the monitoring (9.9).
@@ -72,7 +72,7 @@ pub struct BusEnd {
 }
 
 /// What the next byte is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum State {
     /// A sync byte.
     Sync,
@@ -87,7 +87,7 @@ enum State {
 }
 
 /// How long the line has been silent, for a drive in the error mode (9.9).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Silence {
     /// Not too long.
     None,
@@ -98,7 +98,7 @@ enum Silence {
 }
 
 /// Which net byte of a telegram for this drive comes next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Net {
     /// The high byte of the process data.
     ProcessHigh,

@@ -19,7 +19,7 @@ pub const CHECK_SEQUENCE: [u8; ZEROS as usize + SEQUENCE.len()] = {
 };
 
 /// Watches a stream of bytes for [`SEQUENCE`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SequenceWatch {
     matched: u8,
 }

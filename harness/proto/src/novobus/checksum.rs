@@ -3,7 +3,7 @@
 //! Only bytes of the parameter channel count: sync byte, address byte and process data do not.
 
 /// A running sum over the bytes of one command or of one answer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Checksum(u8);
 
 impl Checksum {

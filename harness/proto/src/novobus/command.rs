@@ -57,7 +57,7 @@ impl Kind {
 }
 
 /// A byte of a command, after the command byte.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Field {
     /// The low byte of the address.
     AddrL,
@@ -76,7 +76,7 @@ pub enum Field {
 }
 
 /// A byte of an answer, after the command byte, which is always echoed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reply {
     /// The byte just received.
     Echo,
@@ -87,7 +87,7 @@ pub enum Reply {
 }
 
 /// One row of the manual's chapter 10.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq, Hash)]
 pub struct Layout {
     /// Which command.
     pub kind: Kind,

@@ -23,7 +23,7 @@ pub const UPSTREAM_ZEROS: u8 = 8;
 
 /// The numbers of the error mode. A right drive has those of the [manual](Self::MANUAL); other numbers make a wrong
 /// drive, for tests that must find one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rules {
     /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7); 1 or more.
     pub upstream_zeros: u8,
@@ -36,7 +36,7 @@ pub struct Rules {
 }
 
 /// Whether the byte in error counts as the first of the zeros in a row (ND21 9.7).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OffendingZero {
     /// Where it is a good 00: the manual's rule.
     GoodZero,
@@ -120,7 +120,7 @@ impl Marks {
 }
 
 /// A drive in the error mode.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct ErrorMode {
     rules: Rules,
     zeros_received: u8,

@@ -10,12 +10,12 @@ use super::output::OutputChange;
 use super::properties::ReadLongAnswer;
 
 /// What the channel holds between two bytes: nothing, or a command received in part.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct ParameterChannel {
     partial: Option<Partial>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Partial {
     layout: &'static Layout,
     /// Bytes of the command received, the command byte not counted.

@@ -6,7 +6,7 @@ use crate::time::Span;
 use core::fmt;
 
 /// How a drive behaves where the manual does not say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Properties {
     /// `empty-short-telegram`: A0 and E0, a short address without net bytes (ND21 9.2).
     pub empty_short_telegram: EmptyShortTelegram,
@@ -41,7 +41,7 @@ impl Default for Properties {
 }
 
 /// What a drive makes of a short telegram without net bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum EmptyShortTelegram {
     /// `accepted`: forwarded; E0 still moves on to the next drive.
     #[default]
@@ -51,7 +51,7 @@ pub enum EmptyShortTelegram {
 }
 
 /// What a drive makes of a short address when it has not yet passed an address byte.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ShortAddress {
     /// `not-addressed`: no drive is meant until an address byte has been seen.
     #[default]
@@ -62,7 +62,7 @@ pub enum ShortAddress {
 
 /// The answer to `ReadLong`. The print has six bytes, which cannot hold an echo, four data bytes and a
 /// checking byte.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ReadLongAnswer {
     /// `four-data`: `C7 AddrL Data0 Data1 Data2 Data3`, no checking byte.
     #[default]
@@ -72,7 +72,7 @@ pub enum ReadLongAnswer {
 }
 
 /// How the byte that breaks a check sequence off is answered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BrokenSequence {
     /// `answered`: like any other byte in the error mode.
     #[default]
@@ -83,7 +83,7 @@ pub enum BrokenSequence {
 
 /// What a drive does about a byte that it receives between a time-out and its own zeros. By 9.7 a drive
 /// in the error mode answers every byte; by 9.9 it waits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TimeOutAnswer {
     /// `answered`: by the rules of the error mode, as at any other time.
     #[default]

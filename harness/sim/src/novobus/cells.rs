@@ -12,7 +12,7 @@ const ROM_START: u16 = *ROM_WORDS.start();
 const ROM_SIZE: usize = (*ROM_WORDS.end() - ROM_START) as usize + 1;
 
 /// The memory of a drive: RAM and registers, a ROM window and the EEPROM, without any rule of access.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Cells {
     ram: [u8; RAM_AND_REGISTERS],
     rom: [u8; ROM_SIZE],

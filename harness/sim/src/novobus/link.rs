@@ -8,7 +8,7 @@ use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 
 /// A link that is cut open: an outside party takes what the transmitter sends and supplies what the receiver hears.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 struct Opening {
     /// Bytes that have been sent and not been fetched.
     sent: Bytes,
@@ -17,7 +17,7 @@ struct Opening {
 }
 
 /// A wire from one transmitter to one receiver.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Link {
     byte_time: Span,
     /// When the transmitter can start its next byte.
@@ -430,6 +430,43 @@ impl Link {
             && self.last_arrival <= now
             && self.held_until <= now
             && self.bytes.under_way().is_empty()
+    }
+
+    /// A sound wire without a record, which is free from `line_free` on.
+    pub(crate) fn free_from(byte_time: Span, line_free: Instant) -> Self {
+        let mut link = Self::new(byte_time);
+        link.stop_recording();
+        link.line_free = line_free;
+        link.last_arrival = line_free;
+        link
+    }
+
+    /// The bytes under way, in order of their arrival.
+    pub(crate) fn under_way(&self) -> &[UnderWay] {
+        self.bytes.under_way()
+    }
+
+    /// Takes what arrives up to and including `until`.
+    pub(crate) fn take_until(&mut self, until: Instant) -> Vec<UnderWay> {
+        let mut taken = Vec::new();
+        while let Some(byte) = self.peek().filter(|byte| byte.at <= until) {
+            self.take_and_keep();
+            taken.push(byte);
+        }
+        self.forget_arrived();
+        taken
+    }
+
+    /// Forgets bytes that have arrived, where none is recorded.
+    pub(crate) fn forget_arrived(&mut self) {
+        if !self.is_recording() {
+            self.bytes.forget_arrived();
+        }
+    }
+
+    /// Whether it is cut open.
+    pub(crate) const fn is_open(&self) -> bool {
+        self.opening.is_some()
     }
 
     /// Makes up for bytes that it has carried meanwhile: those of `bytes` that have arrived are recorded, the others are under way.

@@ -21,6 +21,7 @@ pub mod node;
 pub mod plain;
 pub mod reference;
 pub mod ring;
+pub mod shared;
 pub mod transitions;
 mod uart;
 mod under_way;

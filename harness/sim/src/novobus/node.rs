@@ -9,7 +9,7 @@ use harness_proto::novobus::bus_end::{Deadline, Reaction, Relay};
 use harness_proto::time::{Instant, Span};
 
 /// A device in its place in the ring.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Node<D> {
     device: D,
     powered: bool,
@@ -34,6 +34,24 @@ impl<D: Device> Node<D> {
             recording: true,
             drive,
         }
+    }
+
+    /// The same place around another device.
+    pub(crate) fn around<E: Device>(&self, device: E) -> Node<E> {
+        Node {
+            device,
+            powered: self.powered,
+            stuck: self.stuck,
+            plan: self.plan.clone(),
+            remarks: self.remarks.clone(),
+            recording: self.recording,
+            drive: self.drive,
+            head_start: self.head_start,
+        }
+    }
+
+    pub(crate) const fn is_recording(&self) -> bool {
+        self.recording
     }
 
     pub(crate) fn device(&self) -> &D {

@@ -11,7 +11,7 @@ use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Instant;
 
 /// A plain drive.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct PlainDrive {
     bus_end: BusEnd,
     memory: Cells,

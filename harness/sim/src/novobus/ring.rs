@@ -257,6 +257,13 @@ impl<D: Device> Ring<D> {
         self.inbox.clear();
     }
 
+    /// Its links and nodes, where nothing is left to be done for any of them: no drive is in a group, the master has nothing to send, and
+    /// every byte has been fetched.
+    pub(crate) fn at_rest(&self) -> Option<(&[Link], &[Node<D>])> {
+        let rests = self.groups.is_empty() && self.outbox.is_empty() && self.inbox.is_empty();
+        rests.then_some((&self.links, &self.nodes))
+    }
+
     /// How many drives there are.
     #[must_use]
     pub fn size(&self) -> RingSize {

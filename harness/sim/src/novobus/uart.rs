@@ -10,7 +10,7 @@ use harness_proto::line::{LineError, Received};
 pub(crate) const BITS: u64 = 11;
 
 /// A receiver, fed with the bits on its line.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Uart {
     /// The bit before: a start bit is a 0 behind a 1.
     last: bool,

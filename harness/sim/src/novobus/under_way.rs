@@ -6,7 +6,7 @@ use harness_proto::time::Instant;
 
 /// A [`LineByte`] in two words: composed of single bytes, a line byte is stored in pieces and loaded
 /// whole, which costs more than all the rest of passing a byte on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct UnderWay {
     /// When it arrives.
     pub(crate) at: Instant,
@@ -75,6 +75,12 @@ impl UnderWay {
         (self.word == Self::whole(self.at, received, true).word).then_some(received)
     }
 
+    /// The byte as it was sent; 0 where it was not.
+    #[inline]
+    pub(crate) fn sent(self) -> u8 {
+        self.word.to_le_bytes()[0]
+    }
+
     #[inline]
     pub(crate) fn solicited(self) -> bool {
         self.word & Self::SOLICITED != 0
@@ -88,7 +94,7 @@ impl UnderWay {
 
 /// The bytes of a wire in the order in which they arrive: those under way, and in front of them, where a record is kept, those that have
 /// arrived. So a byte is written once and stays where it is.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Bytes {
     bytes: Vec<UnderWay>,
     /// How many of them have arrived.

@@ -4,4 +4,5 @@ mod against_reference;
 mod common;
 mod grouped;
 mod recovery;
+mod shared;
 mod single_faults;
