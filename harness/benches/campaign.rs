@@ -1,7 +1,7 @@
-//! How long a case of a campaign takes: a ring is copied, disturbed, read, repaired and compared.
+//! How long a case of a campaign takes: a ring is disturbed, read, repaired and compared.
 //!
-//! `ring` is the baseline: the same ring is copied and carries the same bytes, without a check. The difference is
-//! the cost of the campaign itself.
+//! `cases` plays each case on a copy of the ring, from the start. `ring` is the baseline: the same ring is copied and carries the same
+//! bytes, without a check. `shared` plays the same cases as a campaign does: they share what they have in common.
 
 use divan::counter::ItemsCount;
 use harness::campaign::find::find;
@@ -37,6 +37,18 @@ fn cases(bencher: divan::Bencher<'_, '_>, name: &str) {
         .counter(ItemsCount::new(cases.len()))
         .bench_local(|| {
             let classes = cases.iter().map(|case| campaign.play(case));
+            classes.filter(Result::is_ok).count()
+        });
+}
+
+#[divan::bench(args = CAMPAIGNS)]
+fn shared(bencher: divan::Bencher<'_, '_>, name: &str) {
+    let (campaign, cases) = load(name);
+    bencher
+        .counter(ItemsCount::new(cases.len()))
+        .bench_local(|| {
+            let mut player = campaign.player();
+            let classes = cases.iter().map(|case| player.play(case));
             classes.filter(Result::is_ok).count()
         });
 }

@@ -18,7 +18,8 @@ pub(crate) mod run;
 pub use crate::buses::rings::campaign::class::{CaseClass, CaseEvidence, Wrong};
 pub use fault::CaseFaults;
 pub use html::campaigns;
-pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign};
+pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign, Player};
 
+pub(crate) use crate::buses::rings::campaign::sharing;
 /// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
 pub use crate::buses::rings::campaign::{by_driver, by_manual, class, conversation, report, sound};

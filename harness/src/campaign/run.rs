@@ -8,6 +8,7 @@ use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, Said};
 use crate::campaign::class::{CaseClass, CaseEvidence};
 use crate::campaign::conversation::{MasterTalk, talk, telegrams};
+use crate::campaign::sharing::Sharing;
 use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::simulate::bench;
@@ -218,7 +219,7 @@ impl Campaign {
         matches!(self.played, Played::ByDriver(_))
     }
 
-    /// Plays one case.
+    /// Plays one case on a ring of its own, from the start.
     ///
     /// # Errors
     /// It fits no class.
@@ -227,17 +228,37 @@ impl Campaign {
             Played::ByManual(by_manual) => by_manual.play(case),
             Played::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
         };
+        Ok((self.outcome(case, evidence)?, said))
+    }
+
+    fn outcome(
+        &self,
+        case: &CaseFaults,
+        evidence: CaseEvidence,
+    ) -> Result<CaseOutcome, Contradiction> {
         let class = evidence.class(&case.links()).map_err(|why| Contradiction {
             campaign: self.name.clone(),
             case: case.name(self.shape.drives),
             why,
         })?;
-        let outcome = CaseOutcome {
+        Ok(CaseOutcome {
             case: *case,
             class,
             evidence,
+        })
+    }
+
+    /// Plays cases one after another, which share what they have in common. The outcomes are those of [`Self::play`].
+    #[must_use]
+    pub fn player(&self) -> Player<'_> {
+        let sharing = match &self.played {
+            Played::ByManual(by_manual) => Sharing::new(by_manual),
+            Played::ByDriver(_) => None,
         };
-        Ok((outcome, said))
+        Player {
+            campaign: self,
+            sharing,
+        }
     }
 
     /// Plays every case on `threads` threads; `progress` is called with the number of cases done since its last call. The outcome
@@ -254,16 +275,14 @@ impl Campaign {
         let failed = AtomicBool::new(false);
         let done = Mutex::new(Vec::with_capacity(self.cases.len() / BATCH + 1));
         let work = || {
+            let mut player = self.player();
             while !failed.load(Ordering::Relaxed) {
                 let first = next.fetch_add(BATCH, Ordering::Relaxed);
                 let Some(rest) = self.cases.get(first..).filter(|rest| !rest.is_empty()) else {
                     return;
                 };
                 let batch = &rest[..BATCH.min(rest.len())];
-                let outcomes: Vec<_> = batch
-                    .iter()
-                    .map(|case| self.play(case).map(|(outcome, _)| outcome))
-                    .collect();
+                let outcomes: Vec<_> = batch.iter().map(|case| player.play(case)).collect();
                 if outcomes.iter().any(Result::is_err) {
                     failed.store(true, Ordering::Relaxed);
                 }
@@ -290,6 +309,27 @@ impl Campaign {
             outcomes: outcomes.collect::<Result<_, _>>()?,
             expect: self.file.expect,
         })
+    }
+}
+
+/// Plays cases of a campaign one after another; see [`Campaign::player`].
+#[derive(Debug)]
+pub struct Player<'a> {
+    campaign: &'a Campaign,
+    /// `None` where cases have to be played from the start.
+    sharing: Option<Sharing<'a>>,
+}
+
+impl Player<'_> {
+    /// Plays one case.
+    ///
+    /// # Errors
+    /// It fits no class.
+    pub fn play(&mut self, case: &CaseFaults) -> Result<CaseOutcome, Contradiction> {
+        match self.sharing.as_mut().and_then(|own| own.play(case)) {
+            Some(evidence) => self.campaign.outcome(case, evidence.as_ref().clone()),
+            None => self.campaign.play(case).map(|(outcome, _)| outcome),
+        }
     }
 }
 

@@ -242,7 +242,7 @@ impl SimulatedLink {
         }
     }
 
-    fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
+    pub(crate) fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
         self.bench.rings().get(ring)
     }
 

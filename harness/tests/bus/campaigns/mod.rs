@@ -87,6 +87,37 @@ fn every_campaign_pins_every_figure_and_the_page_shows_them() {
     }
 }
 
+/// Cases that share what they have in common against the same cases, each from the start: a random sample of every campaign, and of
+/// pairs of its faults anywhere.
+#[test]
+fn shared_cases_have_the_evidence_of_cases_from_the_start() {
+    let seed = std::env::var("DRIVEBENCH_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok())
+        .unwrap_or(9_700);
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut two_links = 0;
+    for name in names() {
+        let campaign = built_in(name);
+        let mut player = campaign.player();
+        for _ in 0..25 {
+            let any = |random: &mut fastrand::Rng| *random.choice(&campaign.cases).expect("cases");
+            let mut case = any(&mut random);
+            if case.second.is_none() && random.bool() {
+                case.second = Some(any(&mut random).first);
+                two_links += usize::from(case.second.map(|own| own.link) != Some(case.first.link));
+            }
+            let again = format!(
+                "{name}: {}; repeat with: DRIVEBENCH_SEED={seed} cargo test --test bus shared_cases",
+                case.name(campaign.shape.drives)
+            );
+            let (expected, _) = campaign.play(&case).unwrap_or_else(|_| panic!("{again}"));
+            assert_eq!(player.play(&case), Ok(expected), "{again}");
+        }
+    }
+    assert!(two_links > 20, "{two_links} cases with faults on two links");
+}
+
 #[test]
 fn two_runs_give_the_same_bytes_on_any_number_of_threads() {
     let campaign = built_in("9.9-silence");

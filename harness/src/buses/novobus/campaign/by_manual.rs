@@ -12,6 +12,8 @@ use crate::link::{Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::sync::SYNCO;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::ring::Ring;
 
 /// Byte times in which a ring spells out an address: a telegram is ended first, 25 zeros come at most, and the address
 /// often enough to be believed (9.7).
@@ -117,7 +119,7 @@ impl ByManual {
         &self.answers
     }
 
-    /// Plays a case.
+    /// Plays a case on a ring of its own, from the start.
     #[must_use]
     pub fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<Said>) {
         let mut link = self.start.clone();
@@ -129,6 +131,11 @@ impl ByManual {
         }
         let heard = link.exchange(&self.opening(self.lasts(case)));
         self.play_on(link, heard, self.lasts(case))
+    }
+
+    /// The ring before anything is sent.
+    pub(super) fn ring(&self) -> Option<&Ring<Drive>> {
+        self.start.ring(0)
     }
 
     /// For how many byte times the faults of a case last.

@@ -5,4 +5,5 @@ pub mod by_manual;
 pub mod class;
 pub mod conversation;
 pub mod report;
+pub(crate) mod sharing;
 pub mod sound;
