@@ -10,6 +10,7 @@ pub mod file;
 pub mod find;
 mod html;
 pub mod line;
+pub mod pairs;
 pub mod part;
 pub mod plan;
 pub mod replay;
@@ -18,7 +19,7 @@ pub(crate) mod run;
 pub use crate::buses::rings::campaign::class::{CaseClass, CaseEvidence, Wrong};
 pub use fault::CaseFaults;
 pub use html::campaigns;
-pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign, Player};
+pub use run::{Campaign, CaseOutcome, CasePlayer, Contradiction, PlayedCampaign};
 
 pub(crate) use crate::buses::rings::campaign::sharing;
 /// The classes of the one bus whose conversations are disturbed today, and how a case is played there.

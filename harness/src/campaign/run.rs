@@ -219,7 +219,7 @@ impl Campaign {
         matches!(self.played, Played::ByDriver(_))
     }
 
-    /// Plays one case on a ring of its own, from the start.
+    /// Plays one case on a ring of its own.
     ///
     /// # Errors
     /// It fits no class.
@@ -231,7 +231,8 @@ impl Campaign {
         Ok((self.outcome(case, evidence)?, said))
     }
 
-    fn outcome(
+    /// The outcome of a case of which this was seen.
+    pub(super) fn outcome(
         &self,
         case: &CaseFaults,
         evidence: CaseEvidence,
@@ -250,14 +251,18 @@ impl Campaign {
 
     /// Plays cases one after another, which share what they have in common. The outcomes are those of [`Self::play`].
     #[must_use]
-    pub fn player(&self) -> Player<'_> {
-        let sharing = match &self.played {
+    pub fn player(&self) -> CasePlayer<'_> {
+        CasePlayer {
+            campaign: self,
+            sharing: self.sharing(),
+        }
+    }
+
+    /// What its cases share; `None` where they have to be played from the start.
+    pub(super) fn sharing(&self) -> Option<Sharing<'_>> {
+        match &self.played {
             Played::ByManual(by_manual) => Sharing::new(by_manual),
             Played::ByDriver(_) => None,
-        };
-        Player {
-            campaign: self,
-            sharing,
         }
     }
 
@@ -314,13 +319,19 @@ impl Campaign {
 
 /// Plays cases of a campaign one after another; see [`Campaign::player`].
 #[derive(Debug)]
-pub struct Player<'a> {
+pub struct CasePlayer<'a> {
     campaign: &'a Campaign,
     /// `None` where cases have to be played from the start.
     sharing: Option<Sharing<'a>>,
 }
 
-impl Player<'_> {
+impl CasePlayer<'_> {
+    /// Whether cases share what they have in common.
+    #[must_use]
+    pub const fn shares(&self) -> bool {
+        self.sharing.is_some()
+    }
+
     /// Plays one case.
     ///
     /// # Errors

@@ -25,6 +25,9 @@ pub(crate) fn campaign(
         Ok(found) => found,
         Err(exit) => return Ok(exit),
     };
+    if arguments.pairs {
+        return pairs(&found, arguments, output);
+    }
     if let Some(name) = &arguments.case {
         return replay(name, &found.on_rings, &found.on_lines, output);
     }
@@ -177,6 +180,59 @@ fn play_rings(
         all.push(finished);
     }
     Ok(Ok(all))
+}
+
+/// Counts the pairs of cases of campaigns of single faults, and shows them.
+fn pairs(
+    found: &FoundCampaigns,
+    arguments: &CampaignArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    if let Some(other) = found.on_lines.first() {
+        let name = other.name();
+        output.complain(&format!(
+            "--pairs counts faults of rings; {name} has no ring"
+        ));
+        return Ok(Exit::Usage);
+    }
+    let threads = arguments.threads.unwrap_or_else(cores);
+    let mut counted = Vec::new();
+    for campaign in &found.on_rings {
+        match campaign.pairs(arguments.sample.is_some()) {
+            Ok(all) => counted.push(arguments.sample.map_or(all, |sample| sample.min(all))),
+            Err(error) => {
+                output.complain(&error.to_string());
+                return Ok(Exit::Usage);
+            }
+        }
+    }
+    let mut listed = Vec::new();
+    for (campaign, cases) in found.on_rings.iter().zip(counted) {
+        let bar = progress_bar(
+            usize::try_from(cases).unwrap_or(usize::MAX),
+            output.progress,
+        );
+        bar.set_message(campaign.name.clone());
+        let progress = |done| bar.inc(done);
+        let played = match arguments.sample {
+            None => campaign.count_pairs(threads, &progress),
+            Some(sample) => campaign.sample_pairs(sample, arguments.seed, threads, &progress),
+        };
+        bar.finish_and_clear();
+        match played {
+            Ok(played) if arguments.format == TableFormat::Json => listed.push(played.json()),
+            Ok(played) => output.result(&(played.table() + "\n"))?,
+            Err(error) => {
+                output.complain(&error.to_string());
+                return Ok(Exit::RigError);
+            }
+        }
+    }
+    if arguments.format == TableFormat::Json {
+        let all = serde_json::json!({ "schema": 1, "pairs": listed });
+        output.result(&format!("{all}\n"))?;
+    }
+    Ok(Exit::Passed)
 }
 
 fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {

@@ -4,6 +4,7 @@ use harness_proto::nd21;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::{Memory, RAM, ROM_WORDS};
 use harness_proto::novobus::output::{Output, OutputChange};
+use std::hash::{Hash, Hasher};
 
 /// Where RAM starts; the register field follows it up to FFFF (ND21 10.1).
 const RAM_START: u16 = *RAM.start();
@@ -12,11 +13,18 @@ const ROM_START: u16 = *ROM_WORDS.start();
 const ROM_SIZE: usize = (*ROM_WORDS.end() - ROM_START) as usize + 1;
 
 /// The memory of a drive: RAM and registers, a ROM window and the EEPROM, without any rule of access.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cells {
     ram: [u8; RAM_AND_REGISTERS],
     rom: [u8; ROM_SIZE],
     eeprom: [u8; 256],
+}
+
+impl Hash for Cells {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // ROM and EEPROM are those of other memories most often.
+        self.ram.hash(state);
+    }
 }
 
 impl Cells {
@@ -55,6 +63,19 @@ impl Cells {
             .checked_sub(ROM_START)
             .and_then(|offset| self.rom.get(usize::from(offset)).copied())
             .unwrap_or(0)
+    }
+
+    /// The addresses of RAM and the register field (FD80 to FFFF, ND21 10.1) at which two memories differ, in order.
+    pub fn differences<'c>(&'c self, other: &'c Self) -> impl Iterator<Item = u16> + 'c {
+        const RUN: usize = 32;
+        let runs = self.ram.chunks(RUN).zip(other.ram.chunks(RUN));
+        let runs = (RAM_START..=u16::MAX).step_by(RUN).zip(runs);
+        // Most of a memory is the same, which a comparison of whole runs shows at once.
+        let runs = runs.filter(|(_, (own, other))| own != other);
+        runs.flat_map(|(start, (own, other))| {
+            let bytes = (start..=u16::MAX).zip(own.iter().zip(other));
+            bytes.filter_map(|(address, (own, other))| (own != other).then_some(address))
+        })
     }
 
     /// Sets the byte at `address`, ROM too; false where there is no memory.

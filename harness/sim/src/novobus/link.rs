@@ -441,6 +441,16 @@ impl Link {
         link
     }
 
+    /// Takes the bytes under way off a link without a record, until they are [put back](Self::put_under_way).
+    pub(crate) fn take_under_way(&mut self) -> Vec<UnderWay> {
+        self.bytes.take_under_way()
+    }
+
+    /// Puts bytes that were taken off back on the link, which has none.
+    pub(crate) fn put_under_way(&mut self, bytes: &[UnderWay]) {
+        bytes.iter().for_each(|byte| self.bytes.push(*byte));
+    }
+
     /// The bytes under way, in order of their arrival.
     pub(crate) fn under_way(&self) -> &[UnderWay] {
         self.bytes.under_way()

@@ -15,11 +15,10 @@ use crate::novobus::node::Node;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::ring::Ring;
 use crate::novobus::under_way::UnderWay;
-use harness_proto::line::Received;
+use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hash, Hasher};
-use std::sync::Arc;
+use std::hash::{BuildHasher, BuildHasherDefault, Hash, Hasher};
 
 /// A place of the ring: the link to it and the drive there, or the master's receiver.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -33,30 +32,103 @@ struct Place {
 impl Place {
     /// What becomes of the place, and what it sends on, up to and including `until`. `sent` is what the place before it sends; the
     /// master's receiver sends on what it hears.
-    fn take(&mut self, sent: &[UnderWay], until: Instant) -> Vec<UnderWay> {
+    fn take(&mut self, sent: &Carried, until: Instant) -> Carried {
         let byte_time = self.inbound.byte_time();
-        for byte in sent {
-            let start = byte.at - byte_time;
-            self.inbound.transmit(start, byte.sent(), byte.solicited());
+        self.inbound.reserve(sent.bytes.len());
+        let mut bytes = sent.bytes.iter();
+        for run in &sent.runs {
+            let mut start = run.start;
+            for byte in bytes.by_ref().take(run.count) {
+                self.inbound.transmit(start, *byte, run.solicited);
+                start += byte_time;
+            }
         }
         let Some(node) = &mut self.node else {
-            return self.inbound.take_until(until);
+            return Carried::heard(self.inbound.take_until(until));
         };
         let mut outbound = Link::free_from(byte_time, self.line_free);
+        outbound.reserve(sent.bytes.len() + 1);
         node.run(&mut self.inbound, &mut outbound, until);
         self.inbound.forget_arrived();
         self.line_free = outbound.line_free();
-        outbound.under_way().to_vec()
+        Carried::sent(outbound.under_way(), byte_time)
     }
 }
 
-/// The number of a state of a place, among those that a [`SharedRing`] has met. Equal states have equal numbers.
+/// Bytes that were sent without a gap.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Run {
+    start: Instant,
+    count: usize,
+    /// Whether they go back to bytes of the master's.
+    solicited: bool,
+}
+
+/// What a place sends, or what the master hears.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+struct Carried {
+    bytes: Vec<u8>,
+    /// When they are sent; no part of what the master hears.
+    runs: Vec<Run>,
+    /// Bytes that the master hears damaged, by their place.
+    errors: Vec<(usize, LineError)>,
+}
+
+impl Carried {
+    fn sent(all: &[UnderWay], byte_time: Span) -> Self {
+        let mut own = Self {
+            bytes: Vec::with_capacity(all.len()),
+            ..Self::default()
+        };
+        let mut free = None;
+        for byte in all {
+            let last = own.runs.last_mut();
+            let start = byte.at - byte_time;
+            match last.filter(|run| free == Some(start) && run.solicited == byte.solicited()) {
+                Some(run) => run.count += 1,
+                None => own.runs.push(Run {
+                    start,
+                    count: 1,
+                    solicited: byte.solicited(),
+                }),
+            }
+            free = Some(byte.at);
+            own.bytes.push(byte.sent());
+        }
+        own
+    }
+
+    fn heard(all: Vec<UnderWay>) -> Self {
+        let mut own = Self::default();
+        for received in all.into_iter().filter_map(|byte| byte.unpack().arrival()) {
+            if let Some(error) = received.error {
+                own.errors.push((own.bytes.len(), error));
+            }
+            own.bytes.push(received.byte);
+        }
+        own
+    }
+
+    fn received(&self) -> Vec<Received> {
+        let mut all: Vec<_> = self.bytes.iter().copied().map(Received::good).collect();
+        for (place, error) in &self.errors {
+            all[*place].error = Some(*error);
+        }
+        all
+    }
+}
+
+/// The numbers of a state of a place, among those that a [`SharedRing`] has met. Equal states have equal numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct PlaceState(u32);
+struct PlaceState {
+    place: u32,
+    /// The bytes on its link, which are many where the place itself is the same.
+    under_way: u32,
+}
 
 /// The number of a stream of bytes, among those that a [`SharedRing`] has met. Equal streams have equal numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Stream(u32);
+pub struct SentStream(u32);
 
 /// What a place became, and what it sent meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -64,36 +136,50 @@ pub struct Became {
     /// The state of the place.
     place: PlaceState,
     /// What it sent.
-    sent: Stream,
+    sent: SentStream,
 }
 
 /// The state of a whole ring.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct RingState {
+pub struct SharedState {
     /// Drives in the order of the ring, and the master's receiver.
     places: Vec<PlaceState>,
     now: Instant,
+}
+
+impl SharedState {
+    fn of_drive(&self, k: u8) -> Option<PlaceState> {
+        let drives = self.places.len().checked_sub(1)?;
+        let place = drives.checked_sub(usize::from(k) + 1)?;
+        self.places.get(place).copied()
+    }
 }
 
 /// What became of a ring while the master sent something.
 #[derive(Clone, Debug)]
 pub struct Passage {
     /// The ring when the last byte has been sent.
-    after: RingState,
+    after: SharedState,
     /// What was sent on each link, and what the master heard.
-    streams: Vec<Stream>,
+    streams: Vec<SentStream>,
 }
 
 impl Passage {
     /// The ring when the last byte has been sent.
     #[must_use]
-    pub const fn after(&self) -> &RingState {
+    pub const fn after(&self) -> &SharedState {
         &self.after
+    }
+
+    /// What was sent on a link, if the ring has it.
+    #[must_use]
+    pub fn sent_on(&self, link: usize) -> Option<SentStream> {
+        self.streams.get(link).copied()
     }
 
     /// What the master heard.
     #[must_use]
-    pub fn heard(&self) -> Stream {
+    pub fn heard(&self) -> SentStream {
         // There is one for the master at least.
         self.streams[self.streams.len() - 1]
     }
@@ -102,14 +188,16 @@ impl Passage {
 /// What was met, each with the number by which it is called.
 #[derive(Clone, Debug)]
 struct Met<T> {
-    numbers: HashMap<Arc<T>, u32, Mixing>,
-    all: Vec<Arc<T>>,
+    /// The last one with a hash.
+    last: HashMap<u64, u32, Mixing>,
+    /// Each with its hash and the one before it that has the same hash.
+    all: Vec<(Box<T>, u64, Option<u32>)>,
 }
 
 impl<T> Default for Met<T> {
     fn default() -> Self {
         Self {
-            numbers: HashMap::default(),
+            last: HashMap::default(),
             all: Vec::new(),
         }
     }
@@ -117,42 +205,100 @@ impl<T> Default for Met<T> {
 
 impl<T: Hash + Eq> Met<T> {
     fn number(&mut self, own: T) -> u32 {
-        if let Some(number) = self.numbers.get(&own) {
-            return *number;
+        let hash = Mixing::default().hash_one(&own);
+        let last = self.last.get(&hash).copied();
+        let mut same = last;
+        while let Some(number) = same {
+            let (other, _, before) = &self.all[number as usize];
+            if **other == own {
+                return number;
+            }
+            same = *before;
         }
         // Memory ends before the numbers do.
         let number = u32::try_from(self.all.len()).unwrap_or(u32::MAX);
-        let own = Arc::new(own);
-        self.all.push(own.clone());
-        self.numbers.insert(own, number);
+        self.all.push((Box::new(own), hash, last));
+        self.last.insert(hash, number);
         number
     }
 
-    fn get(&self, number: u32) -> Arc<T> {
-        self.all[number as usize].clone()
+    fn get(&self, number: u32) -> &T {
+        &self.all[number as usize].0
     }
+
+    /// Forgets all but the first `count`.
+    fn forget_after(&mut self, count: usize) {
+        for (_, hash, before) in self.all.drain(count..).rev() {
+            match before {
+                Some(before) => self.last.insert(hash, before),
+                None => self.last.remove(&hash),
+            };
+        }
+    }
+}
+
+/// What is made of each key, in the order in which the keys were met.
+#[derive(Clone, Debug)]
+struct Made<K, V> {
+    of: HashMap<K, V, Mixing>,
+    keys: Vec<K>,
+}
+
+impl<K, V> Default for Made<K, V> {
+    fn default() -> Self {
+        Self {
+            of: HashMap::default(),
+            keys: Vec::new(),
+        }
+    }
+}
+
+impl<K: Hash + Eq + Copy, V: Copy> Made<K, V> {
+    fn insert(&mut self, key: K, value: V) {
+        self.of.insert(key, value);
+        self.keys.push(key);
+    }
+
+    fn forget_after(&mut self, count: usize) {
+        for key in self.keys.drain(count..) {
+            self.of.remove(&key);
+        }
+    }
+}
+
+/// How much a [`SharedRing`] had met at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct MetSoFar {
+    places: usize,
+    under_way: usize,
+    streams: usize,
+    steps: usize,
 }
 
 /// A ring of plain drives on which cases share what they have in common.
 #[derive(Clone, Debug)]
 pub struct SharedRing {
     byte_time: Span,
+    /// Places without the bytes on their links.
     places: Met<Place>,
-    streams: Met<Vec<UnderWay>>,
-    steps: HashMap<(PlaceState, Stream, Instant), Became, Mixing>,
+    under_way: Met<Vec<UnderWay>>,
+    streams: Met<Carried>,
+    /// What a place makes of a stream up to a time.
+    steps: Made<(PlaceState, SentStream, Instant), Became>,
 }
 
 impl SharedRing {
     /// The ring, and its state. `None` where it has a drive that is not plain, where something is under way or recorded, or
     /// where a link is open.
     #[must_use]
-    pub fn new(ring: &Ring<Drive>) -> Option<(Self, RingState)> {
+    pub fn new(ring: &Ring<Drive>) -> Option<(Self, SharedState)> {
         let (links, nodes) = ring.at_rest()?;
         let mut own = Self {
             byte_time: ring.byte_time(),
             places: Met::default(),
+            under_way: Met::default(),
             streams: Met::default(),
-            steps: HashMap::default(),
+            steps: Made::default(),
         };
         let mut places = Vec::with_capacity(links.len());
         for (place, inbound) in links.iter().enumerate() {
@@ -177,51 +323,66 @@ impl SharedRing {
             places.push(own.met(place));
         }
         let now = ring.now();
-        Some((own, RingState { places, now }))
+        Some((own, SharedState { places, now }))
     }
 
-    fn met(&mut self, place: Place) -> PlaceState {
-        PlaceState(self.places.number(place))
+    fn met(&mut self, mut place: Place) -> PlaceState {
+        let under_way = place.inbound.take_under_way();
+        PlaceState {
+            under_way: self.under_way.number(under_way),
+            place: self.places.number(place),
+        }
     }
 
-    fn step(&mut self, place: PlaceState, stream: Stream, until: Instant) -> Became {
-        if let Some(became) = self.steps.get(&(place, stream, until)) {
+    fn place(&self, state: PlaceState) -> Place {
+        let mut place = self.places.get(state.place).clone();
+        let under_way = self.under_way.get(state.under_way);
+        place.inbound.put_under_way(under_way);
+        place
+    }
+
+    /// What a place in this state becomes when the place before it sends this stream.
+    fn step(&mut self, place: PlaceState, stream: SentStream, until: Instant) -> Became {
+        if let Some(became) = self.steps.of.get(&(place, stream, until)) {
             return *became;
         }
-        let own = self.places.get(place.0).as_ref().clone();
+        let own = self.place(place);
         let became = self.work(own, stream, until);
         self.steps.insert((place, stream, until), became);
         became
     }
 
-    fn work(&mut self, mut place: Place, stream: Stream, until: Instant) -> Became {
-        let sent = self.streams.get(stream.0);
-        let sent = place.take(&sent, until);
+    fn work(&mut self, mut place: Place, stream: SentStream, until: Instant) -> Became {
+        let sent = place.take(self.streams.get(stream.0), until);
         Became {
             place: self.met(place),
-            sent: Stream(self.streams.number(sent)),
+            sent: SentStream(self.streams.number(sent)),
         }
     }
 
     /// Lets the master send these bytes without a gap and without a fault, up to the time at which the last one has been sent.
-    pub fn send(&mut self, before: &RingState, bytes: &[u8]) -> Passage {
-        let mut at = before.now;
-        let whole = bytes.iter().map(|byte| {
-            at = at + self.byte_time;
-            UnderWay::whole(at, *byte, true)
-        });
-        let whole = whole.collect();
-        let mut stream = Stream(self.streams.number(whole));
+    pub fn send(&mut self, before: &SharedState, bytes: &[u8]) -> Passage {
+        let sent = Carried {
+            bytes: bytes.to_vec(),
+            runs: vec![Run {
+                start: before.now,
+                count: bytes.len(),
+                solicited: true,
+            }],
+            errors: Vec::new(),
+        };
+        let now = before.now + self.byte_time * bytes.len() as u64;
+        let mut stream = SentStream(self.streams.number(sent));
         let mut passage = Passage {
-            after: RingState {
+            after: SharedState {
                 places: Vec::with_capacity(before.places.len()),
-                now: at,
+                now,
             },
             streams: Vec::with_capacity(before.places.len() + 1),
         };
         passage.streams.push(stream);
         for place in &before.places {
-            let became = self.step(*place, stream, at);
+            let became = self.step(*place, stream, now);
             stream = became.sent;
             passage.after.places.push(became.place);
             passage.streams.push(stream);
@@ -233,26 +394,24 @@ impl SharedRing {
     /// that the link has carried. `before` is the ring before the passage. `None` where the ring has no such link.
     pub fn disturb(
         &mut self,
-        before: &RingState,
+        before: &SharedState,
         passage: &Passage,
         link: usize,
         faults: impl IntoIterator<Item = (u64, LinkFault)>,
     ) -> Option<Became> {
-        let place = *before.places.get(link)?;
-        let stream = *passage.streams.get(link)?;
-        let mut own = self.places.get(place.0).as_ref().clone();
+        let mut place = self.place(*before.places.get(link)?);
         for (byte, fault) in faults {
-            own.inbound.arm(byte, fault);
+            place.inbound.arm(byte, fault);
         }
-        // It is met once: what became of it is all that can be shared.
-        Some(self.work(own, stream, passage.after.now))
+        // With a fault that waits, the place is met once: there is nothing to be kept for it.
+        Some(self.work(place, *passage.streams.get(link)?, passage.after.now))
     }
 
     /// The passage in which the place behind link `link` became this, with what follows for the places behind it.
     #[must_use]
     pub fn follow(
         &mut self,
-        before: &RingState,
+        before: &SharedState,
         passage: &Passage,
         link: usize,
         became: Became,
@@ -279,26 +438,49 @@ impl SharedRing {
         passage
     }
 
-    /// The bytes of a stream that arrive.
+    /// The bytes of a stream.
     #[must_use]
-    pub fn bytes(&self, stream: Stream) -> Vec<Received> {
-        let all = self.streams.all[stream.0 as usize].iter();
-        all.filter_map(|byte| byte.unpack().arrival()).collect()
+    pub fn bytes(&self, stream: SentStream) -> Vec<Received> {
+        self.streams.get(stream.0).received()
     }
 
     /// Drive `k` of a ring in this state, if the ring has it.
     #[must_use]
-    pub fn drive(&self, state: &RingState, k: u8) -> Option<&PlainDrive> {
-        let drives = state.places.len().checked_sub(1)?;
-        let place = drives.checked_sub(usize::from(k) + 1)?;
-        let place = self.places.all.get(state.places[place].0 as usize)?;
+    pub fn drive(&self, state: &SharedState, k: u8) -> Option<&PlainDrive> {
+        let place = self.places.get(state.of_drive(k)?.place);
         place.node.as_ref().map(Node::device)
     }
 
-    /// How many states of places it keeps: about 2 kB each.
+    /// The number of the state of drive `k`, if the ring has it: a drive that has the same number later is the same, with the same memory.
+    /// Numbers are small. [`Self::forget_after`] frees them for other states.
+    #[must_use]
+    pub fn drive_number(&self, state: &SharedState, k: u8) -> Option<usize> {
+        Some(state.of_drive(k)?.place as usize)
+    }
+
+    /// How much it has met so far.
+    #[must_use]
+    pub fn mark(&self) -> MetSoFar {
+        MetSoFar {
+            places: self.places.all.len(),
+            under_way: self.under_way.all.len(),
+            streams: self.streams.all.len(),
+            steps: self.steps.keys.len(),
+        }
+    }
+
+    /// Forgets what it has met since `mark`. No passage, state or stream of later may be used any more.
+    pub fn forget_after(&mut self, mark: MetSoFar) {
+        self.places.forget_after(mark.places);
+        self.under_way.forget_after(mark.under_way);
+        self.streams.forget_after(mark.streams);
+        self.steps.forget_after(mark.steps);
+    }
+
+    /// Number of steps that it keeps: about 1 kB each.
     #[must_use]
     pub fn kept(&self) -> usize {
-        self.places.all.len()
+        self.steps.keys.len() + self.places.all.len()
     }
 }
 

@@ -153,6 +153,12 @@ impl Bytes {
         &self.bytes[self.arrived..]
     }
 
+    /// Takes those under way, where no record is kept.
+    pub(crate) fn take_under_way(&mut self) -> Vec<UnderWay> {
+        self.forget_arrived();
+        std::mem::take(&mut self.bytes)
+    }
+
     /// Those under way.
     pub(crate) fn under_way_mut(&mut self) -> &mut [UnderWay] {
         &mut self.bytes[self.arrived..]

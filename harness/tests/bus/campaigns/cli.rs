@@ -182,3 +182,65 @@ fn campaigns_over_telegrams() {
     );
     assert_eq!(own["cases"].as_array().map(Vec::len), Some(8124));
 }
+
+/// The pairs of a campaign for tools, and every campaign that has none is refused with what to do.
+#[test]
+fn pairs_of_faults_for_tools() {
+    let singles = file("pairs", "");
+    let text = std::fs::read_to_string(&singles).expect("a file");
+    std::fs::write(&singles, text.replace("pairs = \"byte\"", "")).expect("a file");
+    let singles = singles.to_str().expect("plain");
+    let output = drivebench(&["campaign", singles, "--pairs", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let own = &json["pairs"][0];
+    assert_eq!(
+        (&own["faults"], &own["pairs"], &own["played"]),
+        (&11.into(), &55.into(), &55.into())
+    );
+    let byte = &own["counts"][0];
+    assert_eq!(byte["apart"], "one byte");
+    assert_eq!(byte["classes"]["silent-corruption"], 36);
+    for (arguments, expected) in [
+        (&["campaign", "--pairs"][..], "<CAMPAIGN>..."),
+        (
+            &["campaign", "9.6-two-bits-a-byte", "--pairs"],
+            "name a campaign of all single faults",
+        ),
+        (
+            &["campaign", "9.8-driver-single-bits", "--pairs"],
+            "see --sample",
+        ),
+        (
+            &["campaign", "unitek/5.3-read-back", "--pairs"],
+            "has no ring",
+        ),
+        (
+            &["campaign", "9.6-single-bits", "--sample", "10"],
+            "--pairs",
+        ),
+        (
+            &["campaign", "9.6-single-bits", "--pairs", "--sample", "0"],
+            "1..=1000000",
+        ),
+    ] {
+        let output = drivebench(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert_eq!(stdout(&output), "", "{arguments:?}");
+        assert!(stderr(&output).contains(expected), "{}", stderr(&output));
+    }
+    let sample = [
+        "campaign",
+        "9.8-driver-single-bits",
+        "--pairs",
+        "--sample",
+        "5",
+    ];
+    let output = drivebench(&sample);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(
+        stdout(&output).contains("5 of 31011750 pairs, seed 0"),
+        "{}",
+        stdout(&output)
+    );
+}

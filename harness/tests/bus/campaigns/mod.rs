@@ -6,6 +6,7 @@ mod judge;
 
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::campaign::find::{find, names};
+use harness::campaign::pairs::Apart;
 use harness::campaign::report::{json, table};
 use harness::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign, Wrong};
 use harness::library::Entry;
@@ -14,6 +15,7 @@ use harness::scenario::problem::Problems;
 use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -116,6 +118,64 @@ fn shared_cases_have_the_evidence_of_cases_from_the_start() {
         }
     }
     assert!(two_links > 20, "{two_links} cases with faults on two links");
+}
+
+/// The counts of all pairs of a small campaign against each of its pairs, played from the start.
+#[test]
+fn counted_pairs_are_what_each_pair_is_from_the_start() {
+    let head = "schema = 1\ntitle = \"t\"\nscenario = \"9.6-every-write\"\n";
+    for faults in [
+        // Bytes of process data, in which two bits are a silent corruption.
+        "links = [\"master->2\", \"1->0\"]\nbytes = \"34..36\"\nfaults = [\"bits\"]\nbits = [\"b\", \"0\", \"3\", \"p\", \"s\"]",
+        "links = [\"2->1\", \"0->master\"]\nbytes = \"17..19\"\nfaults = [\"drop\", \"insert\", \"gap\", \"delay\", \"break\"]\n\
+         inserted = [\"88\"]\ngaps = [6]\ndelays = [\"3ms\"]\nbreaks = [\"1ms\"]",
+    ] {
+        let campaign = load(&format!("{head}{faults}\n")).expect("a campaign");
+        let counted = campaign.count_pairs(1, &|_| {}).expect("counts");
+        assert_eq!(campaign.count_pairs(3, &|_| {}).as_ref(), Ok(&counted));
+        let singles: Vec<_> = campaign.cases.iter().map(|case| case.first).collect();
+        let mut expected = BTreeMap::new();
+        let mut closer = 0;
+        for (place, second) in singles.iter().enumerate() {
+            for first in &singles[..place] {
+                let case = CaseFaults {
+                    first: *first,
+                    second: Some(*second),
+                };
+                let (outcome, _) = campaign.play(&case).expect("a class");
+                *expected
+                    .entry((Apart::of(&case), outcome.class))
+                    .or_insert(0) += 1;
+                let named = outcome.evidence.named == Some(second.link);
+                let across = Apart::of(&case) == Apart::Links;
+                closer += u64::from(named && across && outcome.class == CaseClass::Located);
+            }
+        }
+        for apart in Apart::ALL {
+            for class in CaseClass::ALL {
+                let own = expected.get(&(apart, class)).copied().unwrap_or(0);
+                assert_eq!(counted.counts.count(apart, class), own, "{apart:?} {class}");
+            }
+        }
+        assert_eq!(counted.counts.closer(), closer);
+        assert_eq!(counted.counts.played(), counted.pairs());
+        assert!(expected.len() > 4, "{expected:?}");
+    }
+}
+
+/// A sample is drawn without one pair twice, and a sample of all pairs has the counts of all.
+#[test]
+fn a_sample_of_all_pairs_has_their_counts() {
+    let text = "schema = 1\ntitle = \"t\"\nscenario = \"9.6-every-write\"\nfaults = [\"bits\"]\nlinks = [\"master->2\", \"2->1\"]\n\
+                bytes = \"35\"\n";
+    let campaign = load(text).expect("a campaign");
+    let counted = campaign.count_pairs(1, &|_| {}).expect("counts");
+    let sampled = campaign.sample_pairs(1_000, 7, 2, &|_| {}).expect("counts");
+    assert_eq!(sampled.counts, counted.counts);
+    assert_eq!((sampled.seed, counted.seed), (Some(7), None));
+    let few = campaign.sample_pairs(20, 7, 2, &|_| {}).expect("counts");
+    assert_eq!(few.counts.played(), 20);
+    snapshot("pairs", &format!("{}\n{}", counted.table(), few.table()));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! (`bus`, ND21 11.5). What it reports is taken for what it knows.
 
 use super::class::{CaseEvidence, Wrong, named};
-use super::sound::{Sound, all_back};
+use super::sound::Sound;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options};
 use crate::buses::novobus::language::plan::PlannedCall;
@@ -130,7 +130,7 @@ impl ByDriver {
         let every: Vec<_> = (0..link.link.drives(0)).map(quiet).collect();
         self.step(link, &every, &mut evidence, &mut Vec::new());
         settle(&mut link.link);
-        evidence.all_back = all_back(&link.link);
+        evidence.all_back = self.sound.all_back(&link.link);
         (evidence, answers)
     }
 

@@ -4,7 +4,7 @@
 
 use super::class::{CaseEvidence, Wrong};
 use super::conversation::Answers;
-use super::sound::{Drives, Sound, all_back};
+use super::sound::{DrivesBeyondBus, Sound};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::campaign::fault::{CaseFaults, link_index};
@@ -42,7 +42,7 @@ pub struct ByManual {
 }
 
 /// What a master by the manual talks to.
-pub(super) trait Wire: Drives {
+pub(super) trait Wire: DrivesBeyondBus {
     /// Sends bytes without a gap; returns what came back until the last one had been sent.
     fn exchange(&mut self, bytes: &[u8]) -> Vec<Received>;
 }
@@ -218,7 +218,7 @@ impl<W: Wire> Play<'_, W> {
         self.kept = heard;
         self.evidence.wrong = self.wrong_values();
         if !self.evidence.confirmed || self.of.sound.waits_as(&self.wire) {
-            self.evidence.all_back = all_back(&self.wire);
+            self.evidence.all_back = self.of.sound.all_back(&self.wire);
             return;
         }
         // Something is left that only the next telegrams can show.
@@ -233,7 +233,7 @@ impl<W: Wire> Play<'_, W> {
             }
             self.repair(answers.restart(wrong));
         }
-        self.evidence.all_back = all_back(&self.wire);
+        self.evidence.all_back = self.of.sound.all_back(&self.wire);
     }
 
     /// Notes the link that the master blames for a wrong byte.

@@ -7,22 +7,25 @@
 
 use super::by_manual::{ByManual, Wire};
 use super::class::CaseEvidence;
-use super::sound::Drives;
+use super::sound::{Compared, DrivesBeyondBus};
 use crate::campaign::fault::{CaseFaults, Injected};
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_sim::novobus::cells::Cells;
-use harness_sim::novobus::shared::{Became, Passage, RingState, SharedRing};
+use harness_sim::novobus::shared::{
+    Became, MetSoFar, Passage, SentStream, SharedRing, SharedState,
+};
+use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
-/// How many states of places are kept at most: 200 MB. Beyond it everything is forgotten; cases go on from the start.
-const MOST_STATES: usize = 100_000;
+/// Number of steps beyond which they are forgotten: some 300 MB. Cases go on from the start.
+const MOST_STEPS: usize = 300_000;
 
 /// How many outcomes are kept at most.
 const MOST_OUTCOMES: usize = 200_000;
 
-/// The opening with the faults of at most one link, by which it is told apart from others.
+/// The opening with the faults of at most one link, by which it differs from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Front(usize);
 
@@ -45,7 +48,7 @@ struct Kept {
 pub(crate) struct Sharing<'a> {
     of: &'a ByManual,
     ring: SharedRing,
-    start: RingState,
+    start: SharedState,
     fronts: Vec<Kept>,
     /// The front without a fault, by how long the faults of the case last.
     sound: HashMap<usize, Front>,
@@ -54,16 +57,26 @@ pub(crate) struct Sharing<'a> {
     /// The same by the faults, for which nothing is to be worked out.
     damaged: BTreeMap<(usize, Injected), Front>,
     outcomes: HashMap<Fork, Rc<CaseEvidence>>,
+    /// Comparisons of drives, by the numbers of their states.
+    compared: RefCell<Vec<Option<Compared>>>,
 }
 
 /// A ring of which the state is known.
 struct Known<'a> {
     ring: &'a mut SharedRing,
-    state: RingState,
+    state: SharedState,
     drives: u8,
+    compared: &'a RefCell<Vec<Option<Compared>>>,
 }
 
-impl Drives for Known<'_> {
+impl Fork {
+    /// The same place and state, of another front that brings the place the same bytes.
+    pub(super) const fn of(self, front: Front) -> Self {
+        Self { front, ..self }
+    }
+}
+
+impl DrivesBeyondBus for Known<'_> {
     fn count(&self) -> u8 {
         self.drives
     }
@@ -74,6 +87,24 @@ impl Drives for Known<'_> {
 
     fn bus_end(&self, drive: u8) -> Option<&BusEnd> {
         Some(self.ring.drive(&self.state, drive)?.bus_end())
+    }
+
+    fn compared(
+        &self,
+        drive: u8,
+        compare: impl FnOnce(&Cells, &BusEnd) -> Compared,
+    ) -> Option<Compared> {
+        let number = self.ring.drive_number(&self.state, drive)?;
+        let mut all = self.compared.borrow_mut();
+        if let Some(known) = all.get(number).copied().flatten() {
+            return Some(known);
+        }
+        let own = compare(self.cells(drive)?, self.bus_end(drive)?);
+        if all.len() <= number {
+            all.resize(number + 1, None);
+        }
+        all[number] = Some(own);
+        Some(own)
     }
 }
 
@@ -98,6 +129,7 @@ impl<'a> Sharing<'a> {
             forks: HashMap::new(),
             damaged: BTreeMap::new(),
             outcomes: HashMap::new(),
+            compared: RefCell::default(),
         })
     }
 
@@ -106,11 +138,27 @@ impl<'a> Sharing<'a> {
         if self.outcomes.len() > MOST_OUTCOMES {
             self.outcomes.clear();
         }
-        if self.ring.kept() > MOST_STATES
+        if self.ring.kept() > MOST_STEPS
             && let Some(new) = Self::new(self.of)
         {
             *self = new;
         }
+    }
+
+    /// How much has been met so far.
+    pub(super) fn mark(&self) -> MetSoFar {
+        self.ring.mark()
+    }
+
+    /// Forgets what comes of forks that were met since `mark`, if that has become too much; says whether it has. Fronts that were met
+    /// since then must not be there.
+    pub(super) fn forget_after(&mut self, mark: MetSoFar) -> bool {
+        let much = self.ring.kept() > 2 * MOST_STEPS;
+        if much {
+            self.ring.forget_after(mark);
+            self.compared.borrow_mut().clear();
+        }
+        much
     }
 
     fn keep(&mut self, passage: Passage, lasts: usize) -> Front {
@@ -149,6 +197,19 @@ impl<'a> Sharing<'a> {
         })
     }
 
+    /// For how many byte times one or two faults last.
+    pub(super) fn lasts(&self, first: &Injected, second: Option<&Injected>) -> usize {
+        self.of.lasts(&CaseFaults {
+            first: *first,
+            second: second.copied(),
+        })
+    }
+
+    /// What is sent on a link in a front.
+    pub(super) fn arriving(&self, front: Front, link: usize) -> Option<SentStream> {
+        self.fronts[front.0].passage.sent_on(link)
+    }
+
     fn passage(&mut self, fork: Fork) -> Passage {
         let front = &self.fronts[fork.front.0].passage;
         let (start, ring) = (&self.start, &mut self.ring);
@@ -183,6 +244,7 @@ impl<'a> Sharing<'a> {
             ring: &mut self.ring,
             state: passage.after().clone(),
             drives: self.of.answers().shape.drives,
+            compared: &self.compared,
         };
         let lasts = self.fronts[fork.front.0].lasts;
         self.of.play_on(known, heard, lasts).0

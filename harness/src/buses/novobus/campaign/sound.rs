@@ -16,11 +16,8 @@ pub struct Sound {
     history: BTreeMap<(u8, u16), BTreeSet<u8>>,
 }
 
-/// The first cell of RAM and the last of the registers (ND21 10.1).
-const CELLS: std::ops::RangeInclusive<u16> = 0xFD80..=0xFFFF;
-
 /// The drives of a ring, past their bus.
-pub trait Drives {
+pub trait DrivesBeyondBus {
     /// How many there are.
     fn count(&self) -> u8;
 
@@ -29,9 +26,29 @@ pub trait Drives {
 
     /// Its end of the bus.
     fn bus_end(&self, drive: u8) -> Option<&BusEnd>;
+
+    /// What a comparison of a drive gives, which is always the same for the same state of it; `None` if the ring has not got the drive.
+    fn compared(
+        &self,
+        drive: u8,
+        compare: impl FnOnce(&Cells, &BusEnd) -> Compared,
+    ) -> Option<Compared> {
+        Some(compare(self.cells(drive)?, self.bus_end(drive)?))
+    }
 }
 
-impl Drives for SimulatedLink {
+/// A drive beside the same drive without a fault.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared {
+    /// A cell holds something else.
+    differs: bool,
+    /// It waits for the same, so that it answers the same to all that follows.
+    waits: bool,
+    /// It is not in the error mode.
+    back: bool,
+}
+
+impl DrivesBeyondBus for SimulatedLink {
     fn count(&self) -> u8 {
         self.drives(0)
     }
@@ -47,15 +64,10 @@ impl Drives for SimulatedLink {
 
 /// The addresses at which two drives differ. The record of a bus error (14.10.1) and of the addressee of the last telegram (9.2) does
 /// not count as damage.
-fn differences(a: &Cells, b: &Cells) -> Vec<u16> {
-    if a == b {
-        return Vec::new();
-    }
+fn differences<'c>(a: &'c Cells, b: &'c Cells) -> impl Iterator<Item = u16> + 'c {
     let noted = ERRORCODE..=ERRORCODE + 1;
-    CELLS
-        .filter(|address| a.peek(*address) != b.peek(*address))
-        .filter(|address| !noted.contains(address) && *address != BUS_ADDR)
-        .collect()
+    a.differences(b)
+        .filter(move |address| !noted.contains(address) && *address != BUS_ADDR)
 }
 
 impl Sound {
@@ -82,11 +94,23 @@ impl Sound {
         self.end = now.clone();
     }
 
+    fn compare(&self, now: &impl DrivesBeyondBus, drive: u8) -> Option<Compared> {
+        let (cells, end) = (self.end.cells(drive)?, self.end.bus_end(drive)?);
+        now.compared(drive, |own, own_end| Compared {
+            differs: differences(cells, own).next().is_some(),
+            waits: own_end.waits_as(end) && own.peek(BUS_ADDR) == cells.peek(BUS_ADDR),
+            back: !own_end.in_error(),
+        })
+    }
+
     /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
     #[must_use]
-    pub fn wrong(&self, now: &impl Drives, confirmed: bool) -> Vec<Wrong> {
+    pub fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<Wrong> {
         let mut wrong = Vec::new();
         for drive in 0..now.count() {
+            if self.compare(now, drive).is_some_and(|own| !own.differs) {
+                continue;
+            }
             let (Some(sound), Some(cells)) = (self.end.cells(drive), now.cells(drive)) else {
                 continue;
             };
@@ -108,26 +132,25 @@ impl Sound {
 
     /// Whether every drive waits for the same as without a fault: then all that follows is the same.
     #[must_use]
-    pub fn waits_as(&self, now: &impl Drives) -> bool {
-        let same = |drive| {
-            let waits = now.bus_end(drive)?.waits_as(self.end.bus_end(drive)?);
-            let meant = now.cells(drive)?.peek(BUS_ADDR) == self.end.cells(drive)?.peek(BUS_ADDR);
-            Some(waits && meant)
-        };
-        (0..now.count()).all(|drive| same(drive).unwrap_or(false))
+    pub fn waits_as(&self, now: &impl DrivesBeyondBus) -> bool {
+        self.every_drive(now, |own| own.waits)
+    }
+
+    /// Whether no drive is in the error mode.
+    #[must_use]
+    pub fn all_back(&self, now: &impl DrivesBeyondBus) -> bool {
+        self.every_drive(now, |own| own.back)
+    }
+
+    fn every_drive(&self, now: &impl DrivesBeyondBus, which: impl Fn(Compared) -> bool) -> bool {
+        (0..now.count()).all(|drive| self.compare(now, drive).is_some_and(&which))
     }
 
     /// Whether any drive watches for silence (9.9).
     #[must_use]
-    pub fn any_monitors(ring: &impl Drives) -> bool {
+    pub fn any_monitors(ring: &impl DrivesBeyondBus) -> bool {
         use harness_proto::nd21::{bits::flags2::MONITORING, ram::FLAGS2};
         let monitors = |cells: &Cells| cells.peek(FLAGS2) & MONITORING != 0;
         (0..ring.count()).any(|drive| ring.cells(drive).is_some_and(monitors))
     }
-}
-
-/// Whether no drive is in the error mode.
-#[must_use]
-pub fn all_back(ring: &impl Drives) -> bool {
-    (0..ring.count()).all(|drive| ring.bus_end(drive).is_some_and(|end| !end.in_error()))
 }
