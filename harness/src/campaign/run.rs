@@ -219,6 +219,15 @@ impl Campaign {
         matches!(self.played, Played::ByDriver(_))
     }
 
+    /// The driver, where it plays.
+    #[cfg(test)]
+    pub(crate) fn driver(&self) -> Option<&ByDriver> {
+        match &self.played {
+            Played::ByDriver(by_driver) => Some(by_driver),
+            Played::ByManual(_) => None,
+        }
+    }
+
     /// Plays one case on a ring of its own.
     ///
     /// # Errors

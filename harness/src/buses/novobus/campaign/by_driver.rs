@@ -18,10 +18,21 @@ use harness_proto::time::{Instant, Span};
 /// telegram without an end does not stay unseen. It belongs to the oscilloscope's picture (ND21 14.2.1).
 const QUIET: u16 = 0xFD90;
 
+/// The conversation without a fault before one of its steps: all bytes are back, so every link has carried as many.
+#[derive(Clone, Debug)]
+struct Before {
+    link: SimulatedLink,
+    /// How many bytes the master has sent.
+    sent: u64,
+    /// What the jobs have brought.
+    answers: Vec<Option<u32>>,
+}
+
 /// Calls of the driver that are ready to be disturbed.
 #[derive(Clone, Debug)]
 pub struct ByDriver {
-    start: SimulatedLink,
+    /// The conversation before each step: a case begins before the step of its first fault.
+    before: Vec<Before>,
     calls: Vec<Vec<(u8, PlannedCall)>>,
     sound: Sound,
     /// What the jobs bring without a fault.
@@ -49,21 +60,30 @@ impl ByDriver {
         }
         let mut by_driver = Self {
             sound: Sound::new(start.clone()),
-            start,
+            before: Vec::new(),
             calls,
             answers: Vec::new(),
             sent: Vec::new(),
         };
         let mut link = Spied {
-            link: by_driver.start.clone(),
+            link: start,
             sound: Some(by_driver.sound.clone()),
             sent: Vec::new(),
             quiet: false,
         };
-        let (evidence, answers) = by_driver.play_on(&mut link);
+        let mut before = Vec::new();
+        let note = |link: &Spied, answers: &[_]| {
+            before.push(Before {
+                link: link.link.clone(),
+                sent: link.sent.len() as u64,
+                answers: answers.to_vec(),
+            });
+        };
+        let (evidence, answers) = by_driver.play_on(&mut link, 0, Vec::new(), note);
         if evidence.noticed || !evidence.confirmed {
             return None;
         }
+        by_driver.before = before;
         by_driver.sent = link.sent;
         by_driver.sound = link.sound?;
         by_driver.answers = answers;
@@ -76,11 +96,23 @@ impl ByDriver {
         &self.sent
     }
 
-    /// Plays a case.
+    /// Plays a case, from the start of the step in which its first fault happens.
     #[must_use]
     pub fn play(&self, case: &CaseFaults) -> CaseEvidence {
+        let first = case.faults().map(|fault| fault.byte).min();
+        let step = self
+            .before
+            .partition_point(|before| Some(before.sent) < first);
+        self.play_from(step.saturating_sub(1), case)
+    }
+
+    /// Plays a case from the start of this step, before which no fault happens.
+    fn play_from(&self, step: usize, case: &CaseFaults) -> CaseEvidence {
+        let Some(before) = self.before.get(step) else {
+            return CaseEvidence::default();
+        };
         let mut link = Spied {
-            link: self.start.clone(),
+            link: before.link.clone(),
             sound: None,
             sent: Vec::new(),
             quiet: false,
@@ -92,16 +124,24 @@ impl ByDriver {
                     .inject(0, placed, Moment::Byte(fault.byte + distance));
             }
         }
-        self.play_on(&mut link).0
+        let answers = before.answers.clone();
+        self.play_on(&mut link, step, answers, |_, _| {}).0
     }
 
-    fn play_on(&self, link: &mut Spied) -> (CaseEvidence, Vec<Option<u32>>) {
+    /// Plays the steps from `from` on, before which the jobs have brought `answers`; `before` is called before each of them.
+    fn play_on(
+        &self,
+        link: &mut Spied,
+        from: usize,
+        mut answers: Vec<Option<u32>>,
+        mut before: impl FnMut(&Spied, &[Option<u32>]),
+    ) -> (CaseEvidence, Vec<Option<u32>>) {
         let mut evidence = CaseEvidence {
             confirmed: true,
             ..CaseEvidence::default()
         };
-        let mut answers = Vec::new();
-        for calls in &self.calls {
+        for calls in self.calls.iter().skip(from) {
+            before(link, &answers);
             self.step(link, calls, &mut evidence, &mut answers);
             settle(&mut link.link);
         }
@@ -236,5 +276,41 @@ impl Line for Spied {
             sound.note(&self.link);
         }
         more
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::campaign::find::{find, names};
+    use std::path::Path;
+
+    /// A case that begins before the step of its first fault against the same case from the start of the conversation: a random sample
+    /// of every campaign of the driver.
+    #[test]
+    fn a_case_from_its_step_is_the_case_from_the_start() {
+        let seed = std::env::var("DRIVEBENCH_SEED")
+            .ok()
+            .and_then(|seed| seed.parse().ok())
+            .unwrap_or(9_800);
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut later = 0;
+        for name in names() {
+            let campaign = find(Path::new(name)).expect("a built-in campaign");
+            let Some(by_driver) = campaign.driver() else {
+                continue;
+            };
+            for _ in 0..60 {
+                let case = random.choice(&campaign.cases).expect("cases");
+                let first = case.faults().map(|fault| fault.byte).min();
+                later += usize::from(first > Some(by_driver.before[1].sent));
+                assert_eq!(
+                    by_driver.play(case),
+                    by_driver.play_from(0, case),
+                    "{name}: {}; repeat with: DRIVEBENCH_SEED={seed} cargo test --lib a_case_from_its_step",
+                    case.name(campaign.shape.drives)
+                );
+            }
+        }
+        assert!(later > 60, "{later} cases began behind the first step");
     }
 }
