@@ -142,7 +142,11 @@ fn every_command_over_every_way_in() {
         );
         ended(&desk.run("read 3 MODE"), 2, "the rig has no drive 3");
         ended(&desk.run("read 1 SPED_CMD"), 2, "did you mean `SPEED_CMD`?");
-        desk.shows("qualify --filter unitek-5.1-too-short", SAFE);
+        // Where the computer stands still, conversations are flaky or inconclusive.
+        let qualified = desk.run("qualify --filter unitek-5.1-too-short");
+        let text = said(&qualified);
+        let right = matches!(qualified.status.code(), Some(0 | 5)) && text.contains(SAFE);
+        assert!(right && !text.contains("failed qualify"), "{text}");
     }
 }
 

@@ -198,6 +198,9 @@ fn faults() -> Vec<(&'static str, Vec<(u64, LinkFault)>)> {
 fn interposer(transport: &str) {
     let served = Served::start(transport, true, &[("--cut", "2->1", 1)]);
     let mut link = served.interposed();
+    // The served ring may take a while to begin.
+    let begun = (0..50).any(|_| !exchange(&mut link, &SYNCOS).is_empty());
+    assert!(begun, "nothing comes back");
     for (name, faults) in faults() {
         let mut model = simulated();
         let expected = play(&mut model, &faults);
