@@ -14,10 +14,12 @@ use crate::capture::{
 use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::regular;
+use crate::report::pcapng::name as link_label;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use harness_sim::record::LineByte;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -113,8 +115,30 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         capture.end(),
     );
     output.result(&line)?;
+    output.say(&damaged(&capture));
     output.say(&details(&judged));
     Ok(Exit::of(&[judged.verdict], false))
+}
+
+/// Where bytes arrived damaged: it is a cable or a sender, and no drive that receives them.
+fn damaged(capture: &Capture) -> String {
+    let mut text = String::new();
+    for (ring, trace) in capture.traces.iter().enumerate() {
+        for link in &trace.channels {
+            let bad = |own: &&LineByte| own.error.is_some() || own.received.is_none();
+            let count = link.octets().iter().filter(bad).count();
+            if count > 0 {
+                // Writing to a String cannot fail.
+                let _infallible = writeln!(
+                    text,
+                    "  note: {} damaged over {}: by the cable there, or by the sender in front of it",
+                    counted(count, "byte"),
+                    link_label(ring, link)
+                );
+            }
+        }
+    }
+    text
 }
 
 /// A verdict on a capture of which bytes or frames may be missing: what differs does not accuse a drive.
@@ -275,7 +299,13 @@ fn details(judged: &Judged) -> String {
     }
     if judged.verdict != Verdict::Passed || judged.links.differ > 0 {
         let shown = judged.links.show("capture", "model");
-        let _infallible = write!(text, "\n{shown}");
+        let right = match judged.verdict {
+            Verdict::Passed => {
+                "what the master received is right; what a link between drives carried is not that of the model:\n"
+            }
+            _ => "",
+        };
+        let _infallible = write!(text, "\n{right}{shown}");
     }
     text
 }
