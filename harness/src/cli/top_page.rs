@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use crate::buses::commands::TopArguments;
-use crate::web::{LiveNews, LivePage, LiveScene};
+use crate::web::{LiveNews, LivePage, LivePicture, LiveScene};
 use std::time::{Duration, Instant};
 
 /// Why it takes no orders.
@@ -21,15 +21,15 @@ pub(crate) struct TopPage {
 }
 
 impl TopPage {
-    /// Serves the page that `--web` asks for, if it does. Its tables have these heads.
+    /// Serves the page that `--web` asks for, if it does. Its tables have these heads; it has a picture where the bus is heard.
     ///
     /// # Errors
     /// [`Failure`]: the address is not free, or other machines could reach it.
     pub(crate) fn open(
         arguments: &TopArguments,
         title: String,
-        stations: &[&'static str],
-        traffic: &[&'static str],
+        (stations, traffic): (&[&'static str], &[&'static str]),
+        picture: Option<LivePicture>,
     ) -> Result<Option<Self>, Failure> {
         let Some(place) = &arguments.web else {
             return Ok(None);
@@ -38,6 +38,7 @@ impl TopPage {
             title,
             stations: stations.to_vec(),
             traffic: traffic.to_vec(),
+            picture,
             read_only: Some(READ_ONLY.to_owned()),
             ..LiveScene::default()
         };
@@ -61,6 +62,11 @@ impl TopPage {
             self.page.feed().clear();
         }
         wanted
+    }
+
+    /// Whether nothing has been shown since a page was opened.
+    pub(crate) const fn just_opened(&self) -> bool {
+        self.last.is_none()
     }
 
     /// Whether news are due.

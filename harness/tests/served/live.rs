@@ -48,12 +48,17 @@ impl Page {
 
     /// Opens the stream of events, and reads up to the scene.
     fn events(&self) -> Events {
+        self.opened().0
+    }
+
+    /// The same, with the scene.
+    fn opened(&self) -> (Events, String) {
         let mut stream = connect(&self.address);
         let text = self.request("GET /events", &format!("http://{}", self.address), "");
         stream.write_all(text.as_bytes()).expect("sent");
         let mut events = Events(BufReader::new(stream));
-        events.until("\"title\":");
-        events
+        let scene = events.until("\"title\":");
+        (events, scene)
     }
 }
 
@@ -245,4 +250,40 @@ fn the_page_of_a_bench_in_use_only_looks_on() {
         let status = child.wait().expect("an end");
         assert_eq!(status.code(), Some(130), "{rig}");
     }
+}
+
+/// `top --web` on a port shows what the bench exchanges: a column for each link that it hears.
+#[test]
+fn the_page_of_a_bench_in_use_shows_its_bytes() {
+    let mut sim = Sim::start(&["--rig", "sim:3", "--tcp", "127.0.0.1:0"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig = format!(
+        "schema = 1\n[rig]\nid = \"live\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"{}\"\n",
+        sim.address()
+    );
+    std::fs::write(folder.path().join("live.toml"), rig).expect("room");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(["top", "--rig", "live.toml", "--web", "127.0.0.1:0"])
+        .current_dir(folder.path())
+        .env("DRIVEBENCH_STATE", folder.path().join("state"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program");
+    let mut line = String::new();
+    let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
+    out.read_line(&mut line).expect("a line");
+    let (mut events, scene) = Page::of(line.trim_end()).opened();
+    assert!(
+        scene.contains(r#""columns":["master->2","0->master"]"#),
+        "{scene}"
+    );
+    // A command to drive 0 and its answer (ND21 9.3, 10.1): FD leaves the master, and 00 comes back.
+    events.until(r#"[0,"FD","d"]"#);
+    events.until(r#"[1,"C1","d"]"#);
+    let id = child.id().to_string();
+    let ended = Command::new("kill").args(["-TERM", &id]).status();
+    assert!(ended.expect("kill").success());
+    assert_eq!(child.wait().expect("an end").code(), Some(130));
 }

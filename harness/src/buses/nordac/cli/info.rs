@@ -147,7 +147,7 @@ pub(super) fn top(
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
         let title = format!("{}: inverters on PROFIBUS", session.rig().id());
-        let mut page = TopPage::open(arguments, title, &HEADING, &[])?;
+        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), None)?;
         if let Some(page) = &page {
             output.result(&page.line())?;
         }

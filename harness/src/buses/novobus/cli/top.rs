@@ -5,7 +5,7 @@
 
 use super::args::TopArguments;
 use super::rig::{self, OpenBench, RigName, Use};
-use super::top_page::{RingPage, TRAFFIC};
+use super::top_page::{HeardLinks, RingPage, TRAFFIC};
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
@@ -79,9 +79,11 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
         let heading = heading(&name, bench);
         let mut reader = Reader::new(bench);
         let title = format!("{}: {}", heading.rig, heading.rings.join("; "));
-        match TopPage::open(arguments, title, &view::COLUMNS, &TRAFFIC)? {
+        let heard = HeardLinks::of(bench);
+        let picture = heard.as_ref().map(HeardLinks::picture);
+        match TopPage::open(arguments, title, (&view::COLUMNS, &TRAFFIC), picture)? {
             Some(page) => {
-                let page = RingPage::new(page, heading);
+                let page = RingPage::new(page, heading, heard);
                 on_page(&mut reader, page, arguments.every, output)
             }
             None if arguments.once => once(&mut reader, heading, output),
@@ -250,9 +252,10 @@ fn on_page(
 ) -> Result<Exit, Failure> {
     let flag = interrupt_flag();
     output.result(&page.page.line())?;
+    let bench = reader.bench;
     let page = RefCell::new(page);
     let wanted = || page.borrow_mut().page.is_wanted();
-    let mut show = |reading| page.borrow_mut().show(reading);
+    let mut show = |reading| page.borrow_mut().show(bench, reading);
     let mut wait = |time| {
         std::thread::sleep(time);
         None

@@ -1,8 +1,11 @@
 //! What the page of `top --web` shows of rings.
 
+use super::rig::OpenBench;
+use crate::buses::novobus::serve::recorder::{Recorder, Rows, links, picture};
 use crate::cli::top_page::TopPage;
+use crate::link::{Line, Link};
 use crate::top::{Disturbance, Heading, Snapshot, Top, TopRow};
-use crate::web::LiveNews;
+use crate::web::{LiveNews, LivePicture};
 
 /// Heads of the table of traffic.
 pub(super) const TRAFFIC: [&str; 7] = [
@@ -21,29 +24,102 @@ pub(super) struct RingPage {
     top: Top,
     /// The disturbances that it has told, with how often each had been then.
     told: Vec<Disturbance>,
+    /// What the ports hear; `None` for simulated drives, whose record has no bound.
+    heard: Option<HeardLinks>,
+}
+
+/// What the ports of a bench hear, as a picture that grows.
+pub(super) struct HeardLinks {
+    sizes: Vec<u8>,
+    /// The links that are heard, by their place among all.
+    columns: Vec<usize>,
+    recorder: Recorder,
+}
+
+impl HeardLinks {
+    /// The links that the ports of a bench hear; `None` where it has none.
+    pub(super) fn of(bench: &OpenBench) -> Option<Self> {
+        bench.with_rig(|session| {
+            session.ports()?;
+            let rings = session.rig().rings().count();
+            let link = session.link();
+            let sizes: Vec<u8> = (0..rings).map(|ring| link.drives(ring)).collect();
+            let all = sizes.iter().enumerate();
+            let all = all.flat_map(|(ring, drives)| {
+                (0..=usize::from(*drives)).map(move |place| (ring, place))
+            });
+            let heard = all
+                .enumerate()
+                .filter(|(_, own)| link.listens(own.0, own.1));
+            Some(Self {
+                columns: heard.map(|(column, _)| column).collect(),
+                recorder: Recorder::new(&sizes, link.medium(0).octet_time()),
+                sizes,
+            })
+        })?
+    }
+
+    /// The picture without a row.
+    pub(super) fn picture(&self) -> LivePicture {
+        let links = links(&self.sizes);
+        let names = self.columns.iter().filter_map(|own| links.get(*own));
+        picture(names.cloned().collect())
+    }
+
+    /// What was heard since the last call; nothing where the page was just opened.
+    fn rows(&mut self, bench: &OpenBench, just_opened: bool) -> Rows {
+        let now = bench.with_rig(|session| {
+            let link = session.link();
+            let rings = if just_opened { 0 } else { self.sizes.len() };
+            for ring in 0..rings {
+                for (place, own) in link.trace(ring).channels.iter().enumerate() {
+                    self.recorder.carry(ring, place, own.octets());
+                }
+            }
+            let now = link.now();
+            if let Some(ports) = session.ports() {
+                ports.forget_record();
+            }
+            now
+        });
+        let mut rows = now.map_or_else(Rows::default, |now| self.recorder.rows(now));
+        for cell in rows.rows.iter_mut().flat_map(|row| &mut row.cells) {
+            let column = self.columns.iter().position(|own| *own == cell.0);
+            cell.0 = column.unwrap_or(0);
+        }
+        rows
+    }
 }
 
 impl RingPage {
     /// The page of rings.
-    pub(super) fn new(page: TopPage, heading: Heading) -> Self {
+    pub(super) fn new(page: TopPage, heading: Heading, heard: Option<HeardLinks>) -> Self {
         Self {
             page,
             top: Top::new(heading),
             told: Vec::new(),
+            heard,
         }
     }
 
     /// Shows what was read.
-    pub(super) fn show(&mut self, reading: Snapshot) {
+    pub(super) fn show(&mut self, bench: &OpenBench, reading: Snapshot) {
         if !self.page.is_due() {
             return;
         }
-        let notes = self.notes(&reading);
+        let mut notes = self.notes(&reading);
+        let just_opened = self.page.just_opened();
+        let heard = self.heard.as_mut();
+        let heard = heard.map(|own| own.rows(bench, just_opened));
+        let heard = heard.unwrap_or_default();
+        notes.extend(heard.notes);
         self.top.take(reading);
         let rows = self.top.rows().into_iter();
         self.page.show(LiveNews {
             stations: rows.map(|TopRow { cells, .. }| cells.to_vec()).collect(),
             traffic: self.traffic(),
+            rows: heard.rows,
+            left_out: heard.left_out,
             notes,
             ..LiveNews::default()
         });

@@ -1,12 +1,12 @@
 //! The live page of served rings: the space-time picture of ND21 9.7 as it grows.
 
-use super::recorder::links;
+use super::recorder::{links, picture};
 use super::server::Server;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::counted::counted;
 use crate::link::Line;
 use crate::serve::{Answer, ServedBus};
-use crate::web::{FaultPlace, LiveNews, LiveOrder, LivePicture, LiveScene, LiveView};
+use crate::web::{FaultPlace, LiveNews, LiveOrder, LiveScene, LiveView};
 use harness_proto::nd21::cells::cell;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange, Value};
@@ -145,21 +145,7 @@ impl LiveView for Server {
             stations: vec!["drive", "bus", "mode", "display", "speed rpm", "BusAddr"],
             traffic: vec!["link", "bytes", "not SYNCO", "damaged"],
             places: columns.iter().enumerate().map(place).collect(),
-            picture: Some(LivePicture {
-                heading: "Bytes in space and time",
-                note: "A column is a link, a row is one byte time, and time goes down: a byte moves one link to the right with each row. \
-                       The master sends on the first link and receives from the last one.",
-                columns,
-                legend: vec![
-                    ('d', "a byte"),
-                    ('s', "SYNCO (80)"),
-                    ('z', "a zero: the sender may be in the error mode (9.7)"),
-                    (
-                        'x',
-                        "damaged: sent \u{2192} arrived; ~ marked bad, -- nothing",
-                    ),
-                ],
-            }),
+            picture: Some(picture(columns)),
             faults: FAULTS.map(|(_, words)| words).to_vec(),
             scripts: scripts(sizes.first().copied().unwrap_or(1))
                 .into_iter()

@@ -2,7 +2,7 @@
 
 mod control;
 mod live;
-mod recorder;
+pub(super) mod recorder;
 mod server;
 mod state;
 

@@ -3,7 +3,7 @@
 use crate::buses::novobus::locate::{Location, MAX_ZEROS, locate};
 use crate::counted::counted;
 use crate::link::link_name;
-use crate::web::{LiveCell, LiveRow, MAX_CELLS, MAX_ROWS};
+use crate::web::{LiveCell, LivePicture, LiveRow, MAX_CELLS, MAX_ROWS};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::sync::SYNCO;
@@ -29,7 +29,7 @@ pub(super) struct LinkCount {
 
 /// What all links have carried since a page was opened.
 #[derive(Clone, Debug)]
-pub(super) struct Recorder {
+pub(in crate::buses::novobus) struct Recorder {
     byte: Span,
     /// The drives of each ring, and its first column.
     rings: Vec<(u8, usize)>,
@@ -43,14 +43,14 @@ pub(super) struct Recorder {
 
 /// Rows that are complete.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rows {
-    pub(super) rows: Vec<LiveRow>,
-    pub(super) left_out: u64,
-    pub(super) notes: Vec<String>,
+pub(in crate::buses::novobus) struct Rows {
+    pub(in crate::buses::novobus) rows: Vec<LiveRow>,
+    pub(in crate::buses::novobus) left_out: u64,
+    pub(in crate::buses::novobus) notes: Vec<String>,
 }
 
 /// The names of all links, in the order of the columns.
-pub(super) fn links(sizes: &[u8]) -> Vec<String> {
+pub(in crate::buses::novobus) fn links(sizes: &[u8]) -> Vec<String> {
     let rings = sizes.iter().enumerate();
     rings
         .flat_map(|(ring, drives)| {
@@ -59,9 +59,28 @@ pub(super) fn links(sizes: &[u8]) -> Vec<String> {
         .collect()
 }
 
+/// The picture of these links.
+pub(in crate::buses::novobus) fn picture(columns: Vec<String>) -> LivePicture {
+    LivePicture {
+        heading: "Bytes in space and time",
+        note: "A column is a link, a row is one byte time, and time goes down: a byte moves one link to the right with each row. \
+               The master sends on the first link and receives from the last one.",
+        columns,
+        legend: vec![
+            ('d', "a byte"),
+            ('s', "SYNCO (80)"),
+            ('z', "a zero: the sender may be in the error mode (9.7)"),
+            (
+                'x',
+                "damaged: sent \u{2192} arrived; ~ marked bad, -- nothing",
+            ),
+        ],
+    }
+}
+
 impl Recorder {
     /// Records rings of these sizes, whose bytes take `byte`.
-    pub(super) fn new(sizes: &[u8], byte: Span) -> Self {
+    pub(in crate::buses::novobus) fn new(sizes: &[u8], byte: Span) -> Self {
         let mut columns = 0;
         let ring = |drives: &u8| {
             let first = columns;
@@ -81,7 +100,12 @@ impl Recorder {
     }
 
     /// Takes what a link has carried.
-    pub(super) fn carry(&mut self, ring: usize, link: usize, bytes: &[LineByte]) {
+    pub(in crate::buses::novobus) fn carry(
+        &mut self,
+        ring: usize,
+        link: usize,
+        bytes: &[LineByte],
+    ) {
         let Some(&(drives, first)) = self.rings.get(ring) else {
             return;
         };
@@ -114,7 +138,7 @@ impl Recorder {
 
     /// The rows of byte times that are over at `now`, the newest of them within the bounds of a picture. Those in which links carried SYNCO
     /// or nothing are folded.
-    pub(super) fn rows(&mut self, now: Instant) -> Rows {
+    pub(in crate::buses::novobus) fn rows(&mut self, now: Instant) -> Rows {
         let over = now.since_start().units() / self.byte.units().max(1);
         let rest = self.slots.split_off(&over);
         let slots = std::mem::replace(&mut self.slots, rest);

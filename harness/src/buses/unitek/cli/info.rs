@@ -77,7 +77,7 @@ pub(super) fn top(
     on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
         let title = format!("{}: drives on CAN", session.rig().id());
-        let mut page = TopPage::open(arguments, title, &HEADING, &[])?;
+        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), None)?;
         if let Some(page) = &page {
             output.result(&page.line())?;
         }
