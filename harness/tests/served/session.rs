@@ -2,6 +2,7 @@
 
 use crate::program::{Desk, ended};
 use crate::ring::Served;
+use crate::serve::Sim;
 use harness::port::Endpoint;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Lines, Write};
@@ -352,4 +353,70 @@ fn a_capture_of_a_port() {
         (now - 600_000_000_000..=now).contains(&nanos),
         "{nanos} {now}"
     );
+}
+
+/// Scenarios on drives of the other buses at ports: between them the session reads the drives, and a scenario that is broken off leaves them
+/// in their safe state.
+#[test]
+fn scenarios_on_ports_of_other_buses() {
+    let mut can = Sim::start(&["--bus", "unitek", "--slcan", "127.0.0.1:0"]);
+    let mut line = Sim::start(&["--bus", "nordac", "--slaves", "8", "--tcp", "127.0.0.1:0"]);
+    let limits = "[limits]\nallow_motion = true\nallow_unsupervised = true\n";
+    let port = |bus: &str, way: String| {
+        format!("schema = 2\n[rig]\nid = \"{bus}\"\n[port.1]\nbus = \"{bus}\"\nrate = 500\n{way}\n")
+    };
+    let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
+    let unitek = format!("slcan = \"{}\"\ndrives = [{{ node = 1 }}]", can.address());
+    let nordac = format!(
+        "tcp = \"{}\"\ndrives = [{{ address = 8, ppo = 1 }}]",
+        line.address()
+    );
+    for (bus, way, drive, cell, scenario, turns) in [
+        (
+            "unitek",
+            unitek,
+            "1",
+            "SPEED_ACTUAL",
+            "unitek-5.1-too-short",
+            "bus unitek\ndrive 1\n> 201 31 CD 0C\nwait 60s\n",
+        ),
+        (
+            "nordac",
+            nordac,
+            "8",
+            "HIW",
+            "nordac-en-1-whole-telegrams",
+            "bus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\non 8\nexchange 8 HSW=20%\nwait 60s\n",
+        ),
+    ] {
+        let mut text = port(bus, way);
+        text += match bus {
+            "unitek" => "[limits]\nallow_motion = true\n",
+            _ => limits,
+        };
+        let file = format!("{bus}.toml");
+        std::fs::write(desk.path(&file), text).expect("room");
+        let mut session = Session::open(&desk, &["--rig", &file, "--move"]);
+        let run = session.ask(&json!({"id": 1, "do": "run", "path": scenario}));
+        assert_eq!(run["result"]["verdict"], "passed", "{run}");
+        let read = session.ask(&json!({"id": 2, "do": "read", "drive": drive, "cells": [cell]}));
+        assert!(read.get("result").is_some(), "{read}");
+        let other = session.ask(&json!({"id": 3, "do": "run", "path": "9.7-parity-error"}));
+        assert_eq!(other["result"]["verdict"], "skipped", "{other}");
+        let turns = format!("title turns\n{turns}");
+        session.send(
+            json!({"id": 4, "do": "run", "scenario": turns})
+                .to_string()
+                .as_bytes(),
+        );
+        std::thread::sleep(std::time::Duration::from_secs(3));
+        session.send(br#"{"id":5,"do":"cancel","of":4}"#);
+        let answers = [session.answer(), session.answer()];
+        assert!(answers.iter().any(|own| own["id"] == 5), "{answers:?}");
+        let read = session.ask(&json!({"id": 6, "do": "read", "drive": drive, "cells": [cell]}));
+        assert!(read.get("result").is_some(), "{read}");
+        let (last, output) = session.end();
+        assert_eq!(last["code"], 0, "{last}");
+        ended(&output, 0, "safe state: ");
+    }
 }

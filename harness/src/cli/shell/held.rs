@@ -8,6 +8,8 @@ use crate::cli::output::Output;
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::segment::SegmentRun;
+use crate::rig::segment::run::{PortPlayer, PortRun};
 use crate::rig::{End, Options, Played, Rig, SessionError};
 use harness_proto::time::Span;
 
@@ -82,6 +84,9 @@ pub(crate) trait HeldDrives: PortDrives {
     /// The name of a drive's actual speed.
     const SPEED: &'static str;
 
+    /// What plays scenarios on them.
+    type Player: PortPlayer<Drives = Self>;
+
     /// Runs a command.
     ///
     /// # Errors
@@ -103,9 +108,9 @@ pub(crate) trait HeldDrives: PortDrives {
 }
 
 /// The drives of a port that a session holds.
-pub(crate) struct HeldPort<D: PortDrives>(PortSession<D>);
+pub(crate) struct HeldPort<D: HeldDrives>(PortRun<D::Player>);
 
-impl<D: PortDrives> HeldPort<D> {
+impl<D: HeldDrives> HeldPort<D> {
     /// Takes a rig, and looks at its interlocks.
     ///
     /// # Errors
@@ -113,13 +118,17 @@ impl<D: PortDrives> HeldPort<D> {
     pub(crate) fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
         let mut session = PortSession::open(rig, options)?;
         session.look_at_interlocks();
-        Ok(Self(session))
+        Ok(Self(PortRun::on(session, options)))
+    }
+
+    const fn session(&mut self) -> &mut PortSession<D> {
+        self.0.session_mut()
     }
 }
 
 impl<D: HeldDrives> HeldBench for HeldPort<D> {
     fn drives(&self) -> Vec<String> {
-        let drives = self.0.drives().listed();
+        let drives = self.0.session().drives().listed();
         drives
             .iter()
             .map(|own| D::number(own).to_string())
@@ -131,17 +140,32 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
     }
 
     fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
-        D::perform(&mut self.0, &command, output)
+        D::perform(self.session(), &command, output)
     }
 
     fn pass(&mut self, time: Span) -> Result<(), Failure> {
-        D::pass(&mut self.0, time)
+        D::pass(self.session(), time)
     }
 
-    fn play(&mut self, _: &Entry) -> Result<Played, Failure> {
-        Err(Failure::refused(
-            "a session plays no scenario on drives of this bench yet; end it and use `drivebench run --rig`",
-        ))
+    fn play(&mut self, entry: &Entry) -> Result<Played, Failure> {
+        if self.session().listens_only() {
+            return Err(Failure::refused(
+                "scenarios send, and the rig's file says `listen_only = true`",
+            ));
+        }
+        self.0.forget_drives();
+        let played = self.0.play(&entry.source, None);
+        // The scenario's master asked them, and they are in their safe state.
+        self.session().drives().forget();
+        let played = played.map_err(|error| {
+            Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+        })?;
+        // A scenario that was cancelled is cleared up when the link is of use again.
+        let cancelled = self.trouble() == Some(Trouble::Interrupted);
+        match self.0.over().filter(|_| !cancelled) {
+            Some(why) => Err(Failure::Said(Exit::RigError, why)),
+            None => Ok(played),
+        }
     }
 
     fn strike(&mut self, _: &str) -> Result<(), Failure> {
@@ -157,37 +181,44 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
     }
 
     fn record(&mut self) -> Result<HeldRecord, Failure> {
-        Ok(HeldRecord::of(self.0.guarded(), 1))
+        Ok(HeldRecord::of(self.0.session().guarded(), 1))
     }
 
     fn forget(&mut self) {
-        if let Some(ports) = self.0.link().inner_mut().ports_mut() {
+        if let Some(ports) = self.session().link().inner_mut().ports_mut() {
             ports.forget_record();
         }
     }
 
     fn events(&mut self) -> Vec<String> {
-        Vec::new()
+        self.0.notes()
     }
 
     fn trouble(&self) -> Option<Trouble> {
-        self.0.guarded().trouble().cloned()
+        self.0.session().guarded().trouble().cloned()
     }
 
     fn overdue(&self) -> bool {
-        self.0.overdue()
+        self.0.session().overdue()
     }
 
     fn resume(&mut self) -> Result<(), Failure> {
-        if let Some(ports) = self.0.link().inner_mut().ports_mut() {
+        let session = self.session();
+        if let Some(ports) = session.link().inner_mut().ports_mut() {
             ports.resume();
         }
-        self.0.link().reset_after_denial();
-        self.0.drives().forget();
-        Ok(())
+        session.link().reset_after_denial();
+        session.drives().forget();
+        match self.0.clear_up() {
+            true => Ok(()),
+            false => Err(Failure::Said(
+                Exit::RigError,
+                "the drives were not seen in their safe state behind the scenario".to_owned(),
+            )),
+        }
     }
 
     fn end(self: Box<Self>, error: bool) -> End {
-        self.0.close(error)
+        Box::new(self.0).close(error)
     }
 }

@@ -93,18 +93,57 @@ impl<P: PortPlayer> PortRun<P> {
             let why = "scenarios send, and its file says `listen_only = true`; set it to false";
             return Err(failed(rig, why));
         }
-        let mut session = PortSession::<P::Drives>::open(rig, options)?;
-        let mut player = P::new(rig, options.allow_motion, options.ill_as_well);
+        Ok(Self::on(PortSession::open(rig, options)?, options))
+    }
+
+    /// Takes a rig that is open, of whose drives nothing is known.
+    pub(crate) fn on(mut session: PortSession<P::Drives>, options: &Options) -> Self {
+        let mut player = P::new(session.rig(), options.allow_motion, options.ill_as_well);
         player.shows_life(session.beats());
-        Ok(Self {
+        Self {
+            again: Again::new(!session.rig().is_simulated()),
             session,
             player,
             options: options.clone(),
-            again: Again::new(!rig.is_simulated()),
             notes: Vec::new(),
             over: None,
             unfinished: None,
-        })
+        }
+    }
+
+    /// The rig.
+    pub(crate) const fn session(&self) -> &PortSession<P::Drives> {
+        &self.session
+    }
+
+    /// The same, to be used between scenarios.
+    pub(crate) const fn session_mut(&mut self) -> &mut PortSession<P::Drives> {
+        &mut self.session
+    }
+
+    /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed. Returns whether that
+    /// was done, or nothing was to do.
+    pub(crate) fn clear_up(&mut self) -> bool {
+        let Some(own) = self.unfinished.take() else {
+            return true;
+        };
+        let safe = self.session.make_safe().confirmed;
+        if safe {
+            let notes = self.player.set_back(&own, &mut self.session);
+            self.notes.extend(notes);
+        } else {
+            self.unfinished = Some(own);
+        }
+        safe
+    }
+
+    /// Forgets what is known of the drives: others have used them.
+    pub(crate) fn forget_drives(&mut self) {
+        let (rig, options) = (self.session.rig(), &self.options);
+        self.player = P::new(rig, options.allow_motion, options.ill_as_well);
+        self.player.shows_life(self.session.beats());
+        self.again = Again::new(!self.session.rig().is_simulated());
+        self.over = None;
     }
 
     /// Takes simulated drives that were just switched on.
@@ -224,13 +263,11 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
     }
 
     fn close(mut self: Box<Self>, error: bool) -> End {
-        let mut notes = Vec::new();
-        if let Some(own) = self.unfinished.take() {
+        if self.unfinished.is_some() {
             self.session.resume();
-            if self.session.make_safe().confirmed {
-                notes = self.player.set_back(&own, &mut self.session);
-            }
+            self.clear_up();
         }
+        let notes = self.notes();
         let mut end = self.session.close(error);
         end.remarks.extend(notes);
         end

@@ -2,6 +2,7 @@
 
 use crate::buses::commands::DriveCommand;
 use crate::buses::nordac::rig::Inverters;
+use crate::buses::nordac::rig::Player;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -13,6 +14,8 @@ use harness_proto::time::Span;
 
 impl HeldDrives for Inverters {
     const SPEED: &'static str = "HIW";
+
+    type Player = Player;
 
     fn perform(
         session: &mut PortSession<Self>,

@@ -13,7 +13,7 @@ mod settle;
 pub(crate) mod talk;
 
 pub use permitted::limits;
-use player::Player;
+pub(crate) use player::Player;
 pub use session::{Inverters, Session};
 
 use super::language::Nordac;

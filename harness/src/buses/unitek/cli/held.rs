@@ -1,6 +1,7 @@
 //! Drives of a port that a session holds.
 
 use crate::buses::commands::DriveCommand;
+use crate::buses::unitek::rig::Player;
 use crate::buses::unitek::rig::UnitekDrives;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
@@ -12,6 +13,8 @@ use harness_proto::time::Span;
 
 impl HeldDrives for UnitekDrives {
     const SPEED: &'static str = "SPEED_ACTUAL";
+
+    type Player = Player;
 
     fn perform(
         session: &mut PortSession<Self>,

@@ -13,7 +13,7 @@ mod session;
 
 pub use permitted::limits;
 use permitted::special_register;
-use player::Player;
+pub(crate) use player::Player;
 pub use session::{Session, UnitekDrives};
 
 use super::language::Unitek;
