@@ -2,7 +2,10 @@
 
 use super::failure::Failure;
 use crate::buses::commands::TopArguments;
-use crate::web::{LiveNews, LivePage, LivePicture, LiveScene};
+use crate::capture::{Piece, Tape};
+use crate::cli::shell::HeldRecord;
+use crate::rig::port_session::{PortDrives, PortSession};
+use crate::web::{LiveNews, LivePage, LivePicture, LiveScene, MAX_ROWS};
 use std::time::{Duration, Instant};
 
 /// Why it takes no orders.
@@ -11,6 +14,16 @@ const READ_ONLY: &str = "This page only looks on: `top` reads drives, and a page
 
 /// How often a page gets news at most.
 const EVERY: Duration = Duration::from_millis(250);
+
+/// What the port of a bench has carried since the last call.
+pub(crate) fn heard<D: PortDrives>(session: &mut PortSession<D>) -> Vec<Piece> {
+    let record = HeldRecord::of(session.guarded(), 1);
+    if let Some(ports) = session.link().inner_mut().ports_mut() {
+        ports.forget_record();
+    }
+    let tape = Tape::of_ports(&record.traces, record.medium, record.now);
+    tape.pieces.into_iter().map(|(.., piece)| piece).collect()
+}
 
 /// The page of a bench in use.
 pub(crate) struct TopPage {
@@ -74,9 +87,12 @@ impl TopPage {
         self.last.is_none_or(|last| last.elapsed() >= EVERY)
     }
 
-    /// Shows what was read.
-    pub(crate) fn show(&mut self, news: LiveNews) {
+    /// Shows what was read, and the newest rows of the picture.
+    pub(crate) fn show(&mut self, mut news: LiveNews) {
         self.last = Some(Instant::now());
+        let hidden = news.rows.len().saturating_sub(MAX_ROWS);
+        news.rows.drain(..hidden);
+        news.left_out += hidden as u64;
         let at = format!("{:.1} s", self.opened.elapsed().as_secs_f64());
         let text = serde_json::to_string(&LiveNews { at, ..news });
         self.page.feed().publish(text.unwrap_or_default());

@@ -252,38 +252,61 @@ fn the_page_of_a_bench_in_use_only_looks_on() {
     }
 }
 
-/// `top --web` on a port shows what the bench exchanges: a column for each link that it hears.
+/// `top --web` on a port shows what the bench exchanges: a column for each link of a ring that it hears, or for each station.
 #[test]
-fn the_page_of_a_bench_in_use_shows_its_bytes() {
-    let mut sim = Sim::start(&["--rig", "sim:3", "--tcp", "127.0.0.1:0"]);
-    let folder = tempfile::tempdir().expect("a folder");
-    let rig = format!(
-        "schema = 1\n[rig]\nid = \"live\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"{}\"\n",
-        sim.address()
-    );
-    std::fs::write(folder.path().join("live.toml"), rig).expect("room");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(["top", "--rig", "live.toml", "--web", "127.0.0.1:0"])
-        .current_dir(folder.path())
-        .env("DRIVEBENCH_STATE", folder.path().join("state"))
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program");
-    let mut line = String::new();
-    let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
-    out.read_line(&mut line).expect("a line");
-    let (mut events, scene) = Page::of(line.trim_end()).opened();
-    assert!(
-        scene.contains(r#""columns":["master->2","0->master"]"#),
-        "{scene}"
-    );
-    // A command to drive 0 and its answer (ND21 9.3, 10.1): FD leaves the master, and 00 comes back.
-    events.until(r#"[0,"FD","d"]"#);
-    events.until(r#"[1,"C1","d"]"#);
-    let id = child.id().to_string();
-    let ended = Command::new("kill").args(["-TERM", &id]).status();
-    assert!(ended.expect("kill").success());
-    assert_eq!(child.wait().expect("an end").code(), Some(130));
+fn the_page_of_a_bench_in_use_shows_what_it_exchanges() {
+    let ring =
+        "schema = 1\n[rig]\nid = \"live\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = ";
+    let line = |bus: &str, drives: &str, way: &str| {
+        format!(
+            "schema = 2\n[rig]\nid = \"live\"\n[port.1]\nbus = \"{bus}\"\nrate = 500\ndrives = [{{ {drives} }}]\n{way} = "
+        )
+    };
+    for (served, rig, columns, shown) in [
+        (
+            &["--rig", "sim:3", "--tcp", "127.0.0.1:0"][..],
+            ring.to_owned(),
+            r#"["master->2","0->master"]"#,
+            // A command to drive 0 and its answer (ND21 9.3, 10.1): FD leaves the master, and C1 comes back.
+            [r#"[0,"FD","d"]"#, r#"[1,"C1","d"]"#],
+        ),
+        (
+            &["--bus", "unitek", "--slcan", "127.0.0.1:0"],
+            line("unitek", "node = 1", "slcan"),
+            r#"["bench","drive 1"]"#,
+            ["read 30 SPEED_ACTUAL", "30 SPEED_ACTUAL = "],
+        ),
+        (
+            &["--bus", "nordac", "--tcp", "127.0.0.1:0"],
+            line("nordac", "address = 8, ppo = 1", "tcp"),
+            r#"["bench","slave 8"]"#,
+            ["1813 Frequency  [", "1813 Frequency = "],
+        ),
+    ] {
+        let mut sim = Sim::start(served);
+        let folder = tempfile::tempdir().expect("a folder");
+        let rig = format!("{rig}\"{}\"\n", sim.address());
+        std::fs::write(folder.path().join("live.toml"), rig).expect("room");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+            .args(["top", "--rig", "live.toml", "--web", "127.0.0.1:0"])
+            .current_dir(folder.path())
+            .env("DRIVEBENCH_STATE", folder.path().join("state"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program");
+        let mut line = String::new();
+        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
+        out.read_line(&mut line).expect("a line");
+        let (mut events, scene) = Page::of(line.trim_end()).opened();
+        assert!(scene.contains(&format!("\"columns\":{columns}")), "{scene}");
+        for words in shown {
+            events.until(words);
+        }
+        let id = child.id().to_string();
+        let ended = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(ended.expect("kill").success());
+        assert_eq!(child.wait().expect("an end").code(), Some(130));
+    }
 }

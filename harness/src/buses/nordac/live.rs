@@ -72,6 +72,63 @@ fn telegram(slave: u8, octets: &[u8]) -> Vec<u8> {
     [&[0x68, length, length, 0x68][..], &body, &[sum, 0x16]].concat()
 }
 
+/// The picture of telegrams with these columns.
+fn picture(columns: Vec<String>) -> LivePicture {
+    LivePicture {
+        heading: "Telegrams",
+        note: "A column is a station, a row is a telegram, and time goes down.",
+        columns,
+        legend: ARROWS.to_vec(),
+    }
+}
+
+/// The picture of a bench with these slaves.
+pub(super) fn picture_of_port(slaves: &[u8]) -> LivePicture {
+    let names = slaves.iter().map(|slave| format!("slave {slave}"));
+    picture(std::iter::once("bench".to_owned()).chain(names).collect())
+}
+
+/// A telegram that a bench with these slaves has sent or received.
+pub(super) fn at_port(run: &TelegramRun, slaves: &[u8], reader: &mut Reader) -> LiveRow {
+    let place = run.from.map_or(0, |slave| {
+        let own = slaves.iter().position(|own| *own == slave);
+        own.map_or(0, |place| place + 1)
+    });
+    let last = run.octets.last();
+    let at = last.map_or(String::new(), |own| own.at.to_string());
+    let whole = run.octets.iter().all(|own| own.error.is_none());
+    arrow(run, (slaves, slaves.len() + 1), place, (whole, at), reader)
+}
+
+/// A telegram from the column of its station to that of its receiver, or to all; slaves have the columns behind the first.
+fn arrow(
+    run: &TelegramRun,
+    (slaves, columns): (&[u8], usize),
+    place: usize,
+    (whole, at): (bool, String),
+    reader: &mut Reader,
+) -> LiveRow {
+    let Some(said) = run.said() else {
+        let sent: Vec<_> = run.octets.iter().filter_map(|own| own.sent).collect();
+        let words = format!("lost  [{}]", hex(&sent));
+        return LiveRow::arrow(columns, (place, None), false, at, words);
+    };
+    let words = reader.read(&said);
+    let to = match (run.from, words.to) {
+        // The confirmation names no station.
+        (Some(_), _) => Some(0),
+        (None, Some(to)) => slaves.iter().position(|own| *own == to).map(|own| own + 1),
+        (None, None) => None,
+    };
+    let text = format!(
+        "{}  {}  [{}]",
+        words.service,
+        words.meaning,
+        hex(&said.octets)
+    );
+    LiveRow::arrow(columns, (place, to), whole, at, text)
+}
+
 /// What the page has seen of the line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recorder {
@@ -171,25 +228,8 @@ impl SegmentServer {
             from: slave,
             octets: run.octets.clone(),
         };
-        let Some(said) = run.said() else {
-            let sent: Vec<_> = run.octets.iter().filter_map(|own| own.sent).collect();
-            let words = format!("lost  [{}]", hex(&sent));
-            return LiveRow::arrow(self.columns(), (place, None), false, at, words);
-        };
-        let words = recorder.reader.read(&said);
-        let to = match (slave, words.to) {
-            // The confirmation names no station.
-            (Some(_), _) => Some(0),
-            (None, Some(to)) => slaves.iter().position(|own| *own == to).map(|own| own + 1),
-            (None, None) => None,
-        };
-        let text = format!(
-            "{}  {}  [{}]",
-            words.service,
-            words.meaning,
-            hex(&said.octets)
-        );
-        LiveRow::arrow(self.columns(), (place, to), whole, at, text)
+        let line = (&slaves[..], self.columns());
+        arrow(&run, line, place, (whole, at), &mut recorder.reader)
     }
 
     fn station(&self, address: u8) -> Vec<String> {
@@ -248,12 +288,7 @@ impl LiveView for SegmentServer {
                 "frequency",
             ],
             traffic: vec!["line", "telegrams", "octets"],
-            picture: Some(LivePicture {
-                heading: "Telegrams",
-                note: "A column is a station, a row is a telegram, and time goes down.",
-                columns: columns.collect(),
-                legend: ARROWS.to_vec(),
-            }),
+            picture: Some(picture(columns.collect())),
             places: PLACES.map(place).to_vec(),
             faults: FAULTS.map(|(_, words)| words).to_vec(),
             scripts: SCRIPTS.iter().map(script).collect(),

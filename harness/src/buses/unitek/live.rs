@@ -4,6 +4,7 @@ use super::report::table::hex;
 use super::report::{bits, meaning};
 use super::serve::SharedDrives;
 use crate::buses::unitek::language::identifier;
+use crate::buses::unitek::rig::Axis;
 use crate::counted::counted;
 use crate::serve::Answer;
 use crate::serve::frames::SharedBus;
@@ -53,6 +54,47 @@ const POSITION: u8 = 0x6D;
 /// Frames of the page that may wait for the bus.
 const ROOM: usize = 16;
 
+/// The picture of frames: a column for all masters, and one a drive.
+pub(super) fn picture(masters: &str, drives: impl Iterator<Item = String>) -> LivePicture {
+    LivePicture {
+        heading: "Frames",
+        note: "A column is a station, a row is a frame, and time goes down.",
+        columns: std::iter::once(masters.to_owned()).chain(drives).collect(),
+        legend: ARROWS.to_vec(),
+    }
+}
+
+/// A frame that a bench with these drives has sent or received.
+pub(super) fn at_port(frame: &LineFrame, drives: &[Axis]) -> LiveRow {
+    let number = frame.frame.id().number();
+    let place = |id: fn(&Axis) -> u16| {
+        let own = drives.iter().position(|own| u32::from(id(own)) == number);
+        own.map(|place| place + 1)
+    };
+    let ends = match place(|own| own.tx) {
+        Some(from) => (from, Some(0)),
+        None => (0, place(|own| own.rx)),
+    };
+    arrow(frame, drives.len() + 1, ends)
+}
+
+/// A frame from one column to another, or to all; drives have the columns behind the first.
+fn arrow(frame: &LineFrame, columns: usize, (from, to): (usize, Option<usize>)) -> LiveRow {
+    let end = match frame.ended {
+        FrameEnd::Good => String::new(),
+        FrameEnd::Lost => "  [lost]".to_owned(),
+        FrameEnd::Error(error) => format!("  [{error}]"),
+    };
+    let words = format!(
+        "{}  {}  {}{end}",
+        identifier(frame.frame.id()),
+        hex(&frame.frame),
+        meaning(&frame.frame, from > 0)
+    );
+    let good = frame.ended == FrameEnd::Good;
+    LiveRow::arrow(columns, (from, to), good, frame.at.to_string(), words)
+}
+
 impl SharedDrives {
     /// The column of a drive, counted behind that of all clients.
     fn column(&self, node: u8) -> Option<usize> {
@@ -78,19 +120,7 @@ impl SharedDrives {
             true => Some(0),
             false => self.receiver(&frame.frame),
         };
-        let end = match frame.ended {
-            FrameEnd::Good => String::new(),
-            FrameEnd::Lost => "  [lost]".to_owned(),
-            FrameEnd::Error(error) => format!("  [{error}]"),
-        };
-        let words = format!(
-            "{}  {}  {}{end}",
-            identifier(frame.frame.id()),
-            hex(&frame.frame),
-            meaning(&frame.frame, of_drive)
-        );
-        let good = frame.ended == FrameEnd::Good;
-        LiveRow::arrow(drives + 1, (from, to), good, frame.at.to_string(), words)
+        arrow(frame, drives + 1, (from, to))
     }
 
     fn station(&self, node: u8) -> Vec<String> {
@@ -179,14 +209,7 @@ impl LiveView for SharedDrives {
                 "POS_ACTUAL",
             ],
             traffic: vec!["bus", "frames"],
-            picture: Some(LivePicture {
-                heading: "Frames",
-                note: "A column is a station, a row is a frame, and time goes down.",
-                columns: std::iter::once("clients".to_owned())
-                    .chain(drives)
-                    .collect(),
-                legend: ARROWS.to_vec(),
-            }),
+            picture: Some(picture("clients", drives)),
             places: PLACES.map(place).to_vec(),
             faults: FAULTS.map(|(_, words)| words).to_vec(),
             scripts: SCRIPTS

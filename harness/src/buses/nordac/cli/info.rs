@@ -4,13 +4,16 @@ use super::bench::driver;
 use super::read::{Found, find};
 use crate::buses::commands::{Axes, InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error};
+use crate::buses::nordac::live;
+use crate::buses::nordac::report::{Reader, TelegramRun};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, ReplyWord, parameter};
+use crate::capture::Piece;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_page::TopPage;
+use crate::cli::top_page::{TopPage, heard};
 use crate::web::LiveNews;
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
@@ -147,26 +150,40 @@ pub(super) fn top(
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
         let title = format!("{}: inverters on PROFIBUS", session.rig().id());
-        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), None)?;
+        // The record of simulated drives has no bound.
+        let is_heard = !session.rig().is_simulated();
+        let picture = is_heard.then(|| live::picture_of_port(&slaves));
+        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), picture)?;
         if let Some(page) = &page {
             output.result(&page.line())?;
         }
-        let mut driver = driver(session);
-        let mut known = Vec::new();
-        for slave in slaves {
-            known.push((slave, driver.join(slave)?));
-        }
+        let mut reader = Reader::default();
         loop {
             if page.as_mut().is_none_or(TopPage::is_wanted) {
                 let mut rows = Vec::new();
-                for (slave, ppo) in &known {
-                    rows.push(row(&look(&mut driver, *slave, *ppo)?));
+                let mut driver = driver(session);
+                for slave in &slaves {
+                    let ppo = driver.join(*slave)?;
+                    rows.push(row(&look(&mut driver, *slave, ppo)?));
                 }
+                drop(driver);
                 match &mut page {
-                    Some(page) => page.show(LiveNews {
-                        stations: rows.iter().map(|row| row.to_vec()).collect(),
-                        ..LiveNews::default()
-                    }),
+                    Some(page) => {
+                        let heard = if is_heard { heard(session) } else { Vec::new() };
+                        let mut row = |own| match own {
+                            Piece::Telegram(from, octets) => {
+                                let run = TelegramRun { from, octets };
+                                Some(live::at_port(&run, &slaves, &mut reader))
+                            }
+                            _ => None,
+                        };
+                        let news = heard.into_iter().filter(|_| !page.just_opened());
+                        page.show(LiveNews {
+                            rows: news.filter_map(&mut row).collect(),
+                            stations: rows.iter().map(|row| row.to_vec()).collect(),
+                            ..LiveNews::default()
+                        });
+                    }
                     None => {
                         let page = output.fitted(&columns(&HEADING, &rows));
                         if arguments.once {
@@ -178,7 +195,7 @@ pub(super) fn top(
                     }
                 }
             }
-            driver.run(arguments.every)?;
+            driver(session).run(arguments.every)?;
         }
     })
 }

@@ -2,13 +2,15 @@
 
 use super::read::{Found, find};
 use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
+use crate::buses::unitek::live;
 use crate::buses::unitek::rig::UnitekDrives;
 use crate::buses::unitek::value::hex;
+use crate::capture::Piece;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_page::TopPage;
+use crate::cli::top_page::{TopPage, heard};
 use crate::web::LiveNews;
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
@@ -77,19 +79,32 @@ pub(super) fn top(
     on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
         let title = format!("{}: drives on CAN", session.rig().id());
-        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), None)?;
+        let drives = session.axes().to_vec();
+        // The record of simulated drives has no bound.
+        let is_heard = !session.rig().is_simulated();
+        let names = drives.iter().map(|own| format!("drive {}", own.node));
+        let picture = is_heard.then(|| live::picture("bench", names));
+        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), picture)?;
         if let Some(page) = &page {
             output.result(&page.line())?;
         }
         loop {
             if page.as_mut().is_none_or(TopPage::is_wanted) {
-                let drives = session.axes().to_vec();
                 let rows = rows(&find(session, &drives, &registers)?);
                 match &mut page {
-                    Some(page) => page.show(LiveNews {
-                        stations: rows.iter().map(|row| row.to_vec()).collect(),
-                        ..LiveNews::default()
-                    }),
+                    Some(page) => {
+                        let heard = if is_heard { heard(session) } else { Vec::new() };
+                        let row = |own: &Piece| match own {
+                            Piece::Frame(own) => Some(live::at_port(own, &drives)),
+                            _ => None,
+                        };
+                        let news = heard.iter().filter(|_| !page.just_opened());
+                        page.show(LiveNews {
+                            rows: news.filter_map(row).collect(),
+                            stations: rows.iter().map(|row| row.to_vec()).collect(),
+                            ..LiveNews::default()
+                        });
+                    }
                     None => {
                         let page = output.fitted(&columns(&HEADING, &rows));
                         if arguments.once {
