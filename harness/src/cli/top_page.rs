@@ -5,7 +5,7 @@ use crate::buses::commands::TopArguments;
 use crate::capture::{Piece, Tape};
 use crate::cli::shell::HeldRecord;
 use crate::rig::port_session::{PortDrives, PortSession};
-use crate::web::{LiveNews, LivePage, LivePicture, LiveScene, MAX_ROWS};
+use crate::web::{LiveNews, LivePage, LivePicture, LiveRow, LiveScene, MAX_ROWS};
 use std::time::{Duration, Instant};
 
 /// Why it takes no orders.
@@ -85,6 +85,23 @@ impl TopPage {
     /// Whether news are due.
     pub(crate) fn is_due(&self) -> bool {
         self.last.is_none_or(|last| last.elapsed() >= EVERY)
+    }
+
+    /// Shows the rows of the table, and those of the picture of what the port has carried since the last call.
+    pub(crate) fn show_port<const N: usize>(
+        &mut self,
+        stations: &[[String; N]],
+        mut rows: Vec<LiveRow>,
+    ) {
+        if self.last.is_none() {
+            // Nobody has looked on until now.
+            rows.clear();
+        }
+        self.show(LiveNews {
+            stations: stations.iter().map(|row| row.to_vec()).collect(),
+            rows,
+            ..LiveNews::default()
+        });
     }
 
     /// Shows what was read, and the newest rows of the picture.

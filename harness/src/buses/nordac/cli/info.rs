@@ -14,7 +14,6 @@ use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
 use crate::cli::top_page::{TopPage, heard};
-use crate::web::LiveNews;
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
 
@@ -170,19 +169,14 @@ pub(super) fn top(
                 match &mut page {
                     Some(page) => {
                         let heard = if is_heard { heard(session) } else { Vec::new() };
-                        let mut row = |own| match own {
+                        let row = |own| match own {
                             Piece::Telegram(from, octets) => {
                                 let run = TelegramRun { from, octets };
                                 Some(live::at_port(&run, &slaves, &mut reader))
                             }
                             _ => None,
                         };
-                        let news = heard.into_iter().filter(|_| !page.just_opened());
-                        page.show(LiveNews {
-                            rows: news.filter_map(&mut row).collect(),
-                            stations: rows.iter().map(|row| row.to_vec()).collect(),
-                            ..LiveNews::default()
-                        });
+                        page.show_port(&rows, heard.into_iter().filter_map(row).collect());
                     }
                     None => {
                         let page = output.fitted(&columns(&HEADING, &rows));

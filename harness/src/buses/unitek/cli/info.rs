@@ -11,7 +11,6 @@ use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
 use crate::cli::top_page::{TopPage, heard};
-use crate::web::LiveNews;
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
 
@@ -98,12 +97,7 @@ pub(super) fn top(
                             Piece::Frame(own) => Some(live::at_port(own, &drives)),
                             _ => None,
                         };
-                        let news = heard.iter().filter(|_| !page.just_opened());
-                        page.show(LiveNews {
-                            rows: news.filter_map(row).collect(),
-                            stations: rows.iter().map(|row| row.to_vec()).collect(),
-                            ..LiveNews::default()
-                        });
+                        page.show_port(&rows, heard.iter().filter_map(row).collect());
                     }
                     None => {
                         let page = output.fitted(&columns(&HEADING, &rows));
