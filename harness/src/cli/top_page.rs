@@ -94,7 +94,7 @@ impl TopPage {
         mut rows: Vec<LiveRow>,
     ) {
         if self.last.is_none() {
-            // Nobody has looked on until now.
+            // These are from before the page was opened.
             rows.clear();
         }
         self.show(LiveNews {

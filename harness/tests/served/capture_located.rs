@@ -85,3 +85,66 @@ fn its_files_are_joined() {
     let twice = desk.run(&["import", files[0], files[0]]);
     ended(&twice, 2, "is given twice");
 }
+
+/// A pseudo terminal behind a link that stays when it goes, as udev's names do.
+fn plugged(link: &std::path::Path) -> OwnedFd {
+    let (far, path) = port();
+    let _gone = std::fs::remove_file(link);
+    std::os::unix::fs::symlink(path, link).expect("a link");
+    far
+}
+
+/// A serial adapter that comes back is taken up again.
+#[test]
+fn an_adapter_that_comes_back_is_heard() {
+    let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
+    let link = desk.path("adapter");
+    let far = plugged(&link);
+    let tap = format!("0->master={}", name(&link));
+    let arguments = ["capture", "--tap", &tap, "-o", "back.pcapng"];
+    let mut listener = Listener::start(desk.command(&arguments));
+    send(&far, &[0x42]);
+    listener.hears("0->master 42");
+    drop(far);
+    listener.hears("0->master the adapter was pulled out");
+    let far = plugged(&link);
+    listener.hears("0->master the adapter is back");
+    send(&far, &[0x43]);
+    listener.hears("0->master 43");
+    listener.signal(Signal::TERM);
+    let (_, said) = listener.end();
+    assert!(said.contains("2 bytes, 0 damaged"), "{said}");
+}
+
+/// Nothing is kept before the line of `--trigger`; with it come the bytes in front of it.
+#[test]
+fn a_trigger_begins_the_file() {
+    let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
+    for (sent, kept) in [(&[0x42][..], 0), (&[0x42, 0x43], 2)] {
+        let (far, path) = port();
+        let tap = format!("0->master={}", name(&path));
+        let arguments = [
+            "capture",
+            "--tap",
+            &tap,
+            "--trigger",
+            "43",
+            "-o",
+            "t.pcapng",
+        ];
+        let mut listener = Listener::start(desk.command(&arguments));
+        send(&far, sent);
+        listener.hears(if kept > 0 { "43" } else { "42" });
+        listener.signal(Signal::TERM);
+        let (_, said) = listener.end();
+        assert!(said.contains("not judged"), "{said}");
+        let file = std::fs::read(desk.path("t.pcapng")).expect("a file");
+        // Packets of a byte (link type 250) are blocks of type 6.
+        let (mut rest, mut packets) = (&file[..], 0);
+        while let [k0, k1, k2, k3, l0, l1, l2, l3, ..] = *rest {
+            packets += u32::from(u32::from_le_bytes([k0, k1, k2, k3]) == 6);
+            rest = &rest[u32::from_le_bytes([l0, l1, l2, l3]) as usize..];
+        }
+        assert_eq!(packets, kept, "{said}");
+    }
+}
