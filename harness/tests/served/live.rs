@@ -3,7 +3,8 @@
 use crate::serve::{Sim, connect};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 
 /// A page of the program: where it is, and its token.
 pub(crate) struct Page {
@@ -221,6 +222,30 @@ fn a_page_for_other_machines_needs_permission() {
     }
 }
 
+/// `top --web` of a rig, in its own process.
+fn top(rig: &str, folder: &Path) -> (Child, Page) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(["top", "--rig", rig, "--web", "127.0.0.1:0"])
+        .current_dir(folder)
+        .env("DRIVEBENCH_STATE", folder.join("state"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program");
+    let mut line = String::new();
+    let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
+    out.read_line(&mut line).expect("a line");
+    (child, Page::of(line.trim_end()))
+}
+
+fn terminate(child: &Child) {
+    let ended = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(ended.expect("kill").success());
+}
+
 /// `top --web` shows the table of `top`, and takes no order; a signal ends it.
 #[test]
 fn the_page_of_a_bench_in_use_only_looks_on() {
@@ -229,24 +254,13 @@ fn the_page_of_a_bench_in_use_only_looks_on() {
         ("sim:unitek:2", "\"stations\":[[\"1\","),
         ("sim:nordac", "\"stations\":[[\"8\","),
     ] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-            .args(["top", "--rig", rig, "--web", "127.0.0.1:0"])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program");
-        let mut line = String::new();
-        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
-        out.read_line(&mut line).expect("a line");
-        let page = Page::of(line.trim_end());
+        let folder = tempfile::tempdir().expect("a folder");
+        let (mut child, page) = top(rig, folder.path());
         page.events().until(shown);
         let (status, said) = page.post("/fault", r#"{"place":0,"fault":0}"#);
         assert_eq!(status, "403", "{rig}");
         assert!(said.starts_with("This page only looks on"), "{said}");
-        let id = child.id().to_string();
-        let ended = Command::new("kill").args(["-TERM", &id]).status();
-        assert!(ended.expect("kill").success());
+        terminate(&child);
         let status = child.wait().expect("an end");
         assert_eq!(status.code(), Some(130), "{rig}");
     }
@@ -287,26 +301,13 @@ fn the_page_of_a_bench_in_use_shows_what_it_exchanges() {
         let folder = tempfile::tempdir().expect("a folder");
         let rig = format!("{rig}\"{}\"\n", sim.address());
         std::fs::write(folder.path().join("live.toml"), rig).expect("room");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-            .args(["top", "--rig", "live.toml", "--web", "127.0.0.1:0"])
-            .current_dir(folder.path())
-            .env("DRIVEBENCH_STATE", folder.path().join("state"))
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program");
-        let mut line = String::new();
-        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
-        out.read_line(&mut line).expect("a line");
-        let (mut events, scene) = Page::of(line.trim_end()).opened();
+        let (mut child, page) = top("live.toml", folder.path());
+        let (mut events, scene) = page.opened();
         assert!(scene.contains(&format!("\"columns\":{columns}")), "{scene}");
         for words in shown {
             events.until(words);
         }
-        let id = child.id().to_string();
-        let ended = Command::new("kill").args(["-TERM", &id]).status();
-        assert!(ended.expect("kill").success());
+        terminate(&child);
         assert_eq!(child.wait().expect("an end").code(), Some(130));
     }
 }
