@@ -13,6 +13,9 @@ use std::fmt;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+/// The most changes of a rig that a summary names, each with how many more scenarios it would let be played.
+const NAMED_UNLOCKS: usize = 8;
+
 /// The verdicts of a run so far.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
@@ -144,9 +147,13 @@ impl Tally {
         );
         let mut unlocks: Vec<_> = self.unlocks.iter().collect();
         unlocks.sort_by_key(|(what, count)| (std::cmp::Reverse(**count), *what));
-        let unlocks: Vec<_> = unlocks
-            .iter()
-            .map(|(what, count)| format!("{} ({count})", together(what)))
+        let (first, others) = unlocks.split_at(unlocks.len().min(NAMED_UNLOCKS));
+        let named = first.iter().map(|(what, count)| (together(what), **count));
+        let others: usize = others.iter().map(|(_, count)| **count).sum();
+        let others = (others > 0).then(|| ("other rigs".to_owned(), others));
+        let unlocks: Vec<_> = named
+            .chain(others)
+            .map(|(what, count)| format!("{what} ({count})"))
             .collect();
         if !unlocks.is_empty() {
             let _infallible = writeln!(text, "more scenarios with: {}", unlocks.join(", "));
@@ -258,6 +265,25 @@ mod tests {
              an interposer at 2->1 (1), a ring of 100 drives (1), a simulated rig (1)\n"
         );
         assert_eq!(of(&[passed()]).summary().lines().count(), 1);
+    }
+
+    #[test]
+    fn a_long_list_of_what_is_missing_is_short() {
+        let at = |place: u8| format!("{}->{place}", place + 1);
+        let taps = (0..99).map(|place| Unlock::Tap(at(place)));
+        let long = Skip::from(Why::NoTap(at(0))).and(taps.chain([Unlock::Interposer(at(97))]));
+        let sizes = (1..=9).map(|size| Outcome::skipped(Skip::other_size(vec![size], vec![20])));
+        let outcomes: Vec<_> = [Outcome::skipped(long)].into_iter().chain(sizes).collect();
+        let summary = of(&outcomes).summary();
+        let line = summary.lines().last();
+        assert_eq!(
+            line,
+            Some(
+                "more scenarios with: taps at 99 links and an interposer at 98->97 (1), a ring of 1 drive (1), a ring of 2 drives (1), \
+                 a ring of 3 drives (1), a ring of 4 drives (1), a ring of 5 drives (1), a ring of 6 drives (1), a ring of 7 drives (1), \
+                 other rigs (2)"
+            )
+        );
     }
 
     /// A scenario that was named itself is not skipped in silence where the rig's limits deny it; one of a folder or of all is.

@@ -175,12 +175,49 @@ pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
     let limits = (!limits.is_empty()).then(|| format!("{} in [limits]", limits.join(" and ")));
     let motion = settings.contains(&LimitSetting::Motion);
     let option = motion.then(|| "--allow-motion".to_owned());
-    let others = unlocks.iter().filter(|own| setting(own).is_none());
+    let taps = at_places("tap", unlocks.iter().filter_map(Unlock::tap));
+    let interposers = at_places("interposer", unlocks.iter().filter_map(Unlock::interposer));
+    let others = unlocks
+        .iter()
+        .filter(|own| setting(own).is_none() && own.tap().is_none() && own.interposer().is_none());
     let all = limits
         .into_iter()
         .chain(option)
+        .chain(taps)
+        .chain(interposers)
         .chain(others.map(Unlock::to_string));
     all.collect::<Vec<_>>().join(" and ")
+}
+
+/// The most links that are named one by one.
+const NAMED_LINKS: usize = 3;
+
+/// `a tap at 1->0`, `taps at 1->0 and 2->1`, `taps at 99 links`.
+fn at_places<'a>(what: &str, places: impl Iterator<Item = &'a str>) -> Option<String> {
+    let places: Vec<_> = places.collect();
+    let article = if what.starts_with('i') { "an" } else { "a" };
+    match places.as_slice() {
+        [] => None,
+        [place] => Some(format!("{article} {what} at {place}")),
+        few if few.len() <= NAMED_LINKS => Some(format!("{what}s at {}", few.join(" and "))),
+        many => Some(format!("{what}s at {} links", many.len())),
+    }
+}
+
+impl Unlock {
+    fn tap(&self) -> Option<&str> {
+        match self {
+            Self::Tap(place) => Some(place),
+            _ => None,
+        }
+    }
+
+    fn interposer(&self) -> Option<&str> {
+        match self {
+            Self::Interposer(place) => Some(place),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for Unlock {
