@@ -290,6 +290,56 @@ fn what_is_left_to_the_drive_excuses_nothing_else() {
     }
 }
 
+/// What comes back stands beside what was asked again behind a whole check sequence (ND21 9.8), where a byte was lost or drives sent zeros
+/// unasked in front of it.
+#[test]
+fn answers_behind_a_lost_byte_are_read_again() {
+    for name in ["9.9-driver-silence", "14.11.14-time-out-only"] {
+        let judged = judge(&imported(&built_in(name)), &options(None)).expect("judged");
+        assert_eq!(judged.verdict, Verdict::Passed, "{name}");
+    }
+    let lost = "> 80*4\n! 2->1 byte 2: drop\n+5ms > 00*17 FF 44 72 4C 41\n";
+    let read = "> 88 FE C0 20 FE DE\n";
+    let write = "> 8A FE 82 FF 20 FE 9F\n";
+    for (header, steps, verdict) in [
+        ("", [lost, read].concat(), Verdict::Passed),
+        ("", [lost, read, write, read].concat(), Verdict::Passed),
+        (
+            "drive 1 deviates writes-ignored\n",
+            [lost, read, write, read].concat(),
+            Verdict::Failed,
+        ),
+        (
+            "drive 1 deviates checksum-wrong\n",
+            [lost, read].concat(),
+            Verdict::Failed,
+        ),
+    ] {
+        let text = format!("title lost\nring 3\ndrive 1 memory FE20 = 5A\n{header}{steps}");
+        let judged = judge(&imported(&run(&text)), &options(None)).expect("judged");
+        assert_eq!(judged.verdict, verdict, "{text}");
+    }
+}
+
+/// A drive whose supply was off in a silence of 300 ms has lost its RAM (ND21 14.2); a shorter one excuses nothing, nor what was read in front.
+#[test]
+fn a_supply_that_was_off_in_a_silence_accuses_no_drive() {
+    let write = "> 8A FE 82 FF 20 FE 9F\n";
+    let read = "> 88 FE C0 20 FE DE\n";
+    for (silence, steps, verdict) in [
+        ("400ms", [write, "", read], Verdict::Inconclusive),
+        ("200ms", [write, "", read], Verdict::Failed),
+        ("400ms", [write, read, ""], Verdict::Failed),
+    ] {
+        let [first, second, third] = steps;
+        let text = format!(
+            "title lost\nring 3\ndrive 1 deviates writes-ignored\n{first}{second}wait {silence}\n> 80\n{third}"
+        );
+        let judged = judge(&imported(&run(&text)), &options(None)).expect("judged");
+        assert_eq!(judged.verdict, verdict, "{text}");
+    }
+}
+
 /// Complete ND21s must be declared in the header of a scenario.
 #[test]
 fn with_a_setup() {

@@ -43,8 +43,8 @@ pub struct Judged {
 const MOST_STARTS: usize = 6;
 
 /// Why plain memory differs from a right drive.
-const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself or that a reset has changed (ND21 9.4, 10.5, 14.2): \
-     describe the drives with --setup";
+const OF_DRIVES: &str = "what differs is process data, or lies in cells that a drive may write itself or that a reset has changed, or a supply that was off in a \
+     silence (ND21 9.4, 10.5, 14.2): describe the drives with --setup";
 
 /// Why bytes that are missing at the end accuse no drive.
 const UNDER_WAY: &str = "the capture ends while bytes are under way: those that it lacks at its end were due within the time by which its ports are late; \

@@ -5,10 +5,15 @@ use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::nd21::own::is_own;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
+use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, Trace};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// In a silence of this time a drive can be switched off and be back.
+const RESTART: Span = Span::from_millis(300);
 
 /// The section of ResetH8.
 const RESET: &str = "10.5";
@@ -21,8 +26,8 @@ pub(crate) struct Told {
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
     pub(crate) unforeseen: BTreeSet<usize>,
     /// Bytes received that plain memory may answer with other bytes than a right drive: process data, of which its settings choose the cell
-    /// (ND21 9.4), and data of cells that were written and that a drive may write itself (14.2), or that a reset may have changed (10.5), with
-    /// their checking bytes.
+    /// (ND21 9.4), and data of cells that were written and that a drive may write itself or may have lost in a silence, without its supply
+    /// (14.2), or that a reset may have changed (10.5), with their checking bytes.
     pub(crate) own: BTreeSet<usize>,
 }
 
@@ -34,18 +39,17 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .iter()
         .flat_map(|link| link.octets())
         .filter_map(|byte| {
-            Some((
-                byte.sent?,
-                byte.error.is_none() && byte.sent == byte.received,
-            ))
+            let whole = byte.error.is_none() && byte.sent == byte.received;
+            Some((byte.at, (byte.sent?, whole)))
         })
         .collect();
+    let bytes: Vec<_> = sent.iter().map(|(_, byte)| *byte).collect();
     // PAUSE gets no answer (9.2).
-    let asked: Vec<_> = roles(size, &sent)
+    let asked: Vec<_> = roles(size, &bytes)
         .into_iter()
         .zip(&sent)
-        .filter(|(role, (byte, _))| !(*role == Role::Idle && *byte == PAUSE))
-        .map(|(role, _)| role)
+        .filter(|(role, (_, (byte, _)))| !(*role == Role::Idle && *byte == PAUSE))
+        .map(|(role, (at, _))| Asked { role, at: *at })
         .collect();
     let mut told = Told::default();
     for link in trace.channels.iter().filter(|link| link.from.is_some()) {
@@ -66,33 +70,78 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
     told
 }
 
-/// Reads a link beside what was asked.
-fn of_link(link: &Channel, asked: &[Role]) -> Told {
+/// A byte that the master has sent and that comes back.
+#[derive(Clone, Copy)]
+struct Asked {
+    role: Role,
+    /// When its stop bit had passed.
+    at: Instant,
+}
+
+/// Where the bytes behind each whole check sequence begin, with the time at which it had been sent.
+fn behind_sequences(asked: &[Asked]) -> Vec<(Instant, usize)> {
+    let in_sequence = |own: Option<&Asked>| own.is_some_and(|own| own.role == Role::CheckSequence);
+    let ends = asked.iter().enumerate().filter(|(index, own)| {
+        in_sequence(Some(own)) && !in_sequence(asked.get(index.saturating_add(1)))
+    });
+    ends.map(|(index, own)| (own.at, index + 1)).collect()
+}
+
+/// What was asked behind a check sequence that has come back whole at `at`: `beside`, where no byte was lost and none came unasked.
+fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
+    if sequences.binary_search_by_key(&beside, |own| own.1).is_ok() {
+        return beside;
+    }
+    let sent = sequences.partition_point(|(sent, _)| *sent <= at);
+    let last = sequences.get(sent.wrapping_sub(1));
+    last.map_or(beside, |own| own.1)
+}
+
+/// Reads a link beside what was asked. What comes back stands beside what was asked until bytes are lost or drives send zeros unasked (9.9);
+/// a whole check sequence ends that (9.8).
+fn of_link(link: &Channel, asked: &[Asked]) -> Told {
+    let sequences = behind_sequences(asked);
     let mut reader = Reader {
         told: Told::default(),
         own: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
         written: BTreeSet::new(),
+        lost: BTreeSet::new(),
         last: BTreeMap::new(),
         reset: BTreeSet::new(),
         open: BTreeMap::new(),
     };
     let mut observer = Observer::new(link.from, link.to);
     let mut addressed = false;
-    let bytes = link.octets().iter().filter_map(|byte| match link.to {
-        None => byte.arrival(),
-        Some(_) => byte.sent.map(Received::good),
+    let bytes = link.octets().iter().filter_map(|byte| {
+        let read = match link.to {
+            None => byte.arrival(),
+            Some(_) => byte.sent.map(Received::good),
+        };
+        read.map(|read| (byte.at, read))
     });
-    for ((index, byte), role) in bytes.enumerate().zip(asked) {
+    let (mut beside, mut last, mut watch) = (0, None, SequenceWatch::default());
+    for (index, (at, byte)) in bytes.enumerate() {
         let seen = observer.see(Some(byte.byte), byte.error);
+        if last
+            .replace(at)
+            .is_some_and(|last| at.since(last) >= RESTART)
+        {
+            reader.maybe_restarted();
+        }
+        let role = asked.get(beside).map_or(Role::Foreign, |own| own.role);
+        beside += 1;
+        if watch.see(byte.byte, byte.error.is_none()) == SequenceProgress::Complete {
+            beside = behind(&sequences, beside, at);
+        }
         addressed |= matches!(role, Role::Address { .. });
         // In the error mode bytes are not the answers to those of the master's. Where bytes were lost, answers do not stand
         // beside what was asked: then both seldom speak of the same drive.
-        if *role == Role::Foreign || seen.section() == "9.7" {
+        if role == Role::Foreign || seen.section() == "9.7" {
             reader.break_off();
         } else if role.drive() == seen.drive {
             let is_data = seen.role == meaning::ByteRole::Data;
-            reader.read(index, byte.byte, *role, is_data, seen.fits);
+            reader.read(index, byte.byte, role, is_data, seen.fits);
             // Where no address was seen yet, the capture does not show which drive is meant.
             let may_be_of_a_drive = role.drive().is_some() || !addressed;
             if matches!(role, Role::ProcessData { .. }) && may_be_of_a_drive {
@@ -111,6 +160,8 @@ struct Reader {
     now: BTreeMap<(u8, u16), Option<u8>>,
     /// Cells that the master has written.
     written: BTreeSet<(u8, u16)>,
+    /// Of these, those that a drive may have lost since: its supply may have been off in a silence.
+    lost: BTreeSet<(u8, u16)>,
     /// The section of the last command to each drive.
     last: BTreeMap<u8, &'static str>,
     /// Drives that were reset.
@@ -120,6 +171,11 @@ struct Reader {
 }
 
 impl Reader {
+    /// In a silence the supply of drives may have been switched off and on: the RAM is lost then (14.2).
+    fn maybe_restarted(&mut self) {
+        self.lost.extend(&self.written);
+    }
+
     fn read(&mut self, index: usize, byte: u8, role: Role, is_data: bool, fits: Option<bool>) {
         match role {
             Role::Data {
@@ -159,6 +215,7 @@ impl Reader {
                         let cell = (drive, address.wrapping_add(offset));
                         self.now.insert(cell, None);
                         self.written.insert(cell);
+                        self.lost.remove(&cell);
                     }
                 }
             }
@@ -181,7 +238,7 @@ impl Reader {
         let (mut changed, mut own) = (false, false);
         for (index, address, value) in self.open.remove(&drive).unwrap_or_default() {
             let left = match self.written.contains(&(drive, address)) {
-                true => is_of_the_drive(address),
+                true => is_of_the_drive(address) || self.lost.contains(&(drive, address)),
                 false => self.reset.contains(&drive),
             };
             if left {
