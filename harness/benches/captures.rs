@@ -3,7 +3,7 @@
 
 use divan::counter::ItemsCount;
 use harness::capture::read;
-use harness::report::svg::{Options, RowPlacing, svg};
+use harness::report::svg::{RowPlacing, SvgOptions, svg};
 use harness::report::vcd::Signals;
 use harness::report::{csv, pcapng, vcd};
 use harness_proto::line::{LineError, Rate};
@@ -130,7 +130,7 @@ fn csv_written(bencher: divan::Bencher<'_, '_>) {
 #[divan::bench(args = ["index", "time"])]
 fn picture(bencher: divan::Bencher<'_, '_>, scale: &str) {
     let traces = hundred();
-    let options = Options {
+    let options = SvgOptions {
         title: "100 axes",
         id: "ring",
         scale: if scale == "time" {

@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{CyclePace, Job, Master, Options};
+use harness_proto::novobus::master::{CyclePace, Job, Master, MasterOptions};
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
@@ -50,7 +50,7 @@ struct Player {
 impl Player {
     fn new(drives: u64, work: Work) -> Self {
         let size = RingSize::new(drives).expect("1 to 250");
-        let mut master = Master::new(size, Rate::Baud38400, Options::default());
+        let mut master = Master::new(size, Rate::Baud38400, MasterOptions::default());
         if matches!(work, Work::Exchange) {
             let all: Vec<u8> = (0..size.drives()).collect();
             master

@@ -3,7 +3,7 @@
 use super::{TelegramCutter, judge_shared, live_text, share_a_line};
 use crate::capture::live::{LiveLine, seconds};
 use crate::capture::{
-    Capture, Carries, LiveRecorder, Options, Piece, RecordedPlace, Tape, judge, read,
+    Capture, Carries, JudgeOptions, LiveRecorder, Piece, RecordedPlace, Tape, judge, read,
 };
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
@@ -190,7 +190,7 @@ fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
 const MOST_PIECES: usize = 20_000;
 
 fn verdict(capture: &Capture) -> Option<Verdict> {
-    let options = Options {
+    let options = JudgeOptions {
         title: "begun in mid-conversation",
         setup: None,
         tolerance: Span::from_millis(10),

@@ -1,6 +1,6 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use super::{ComparedRun, Options, diff, read, scenario};
+use super::{ComparedRun, JudgeOptions, diff, read, scenario};
 use crate::report::{csv, json, pcapng, svg, vcd};
 use harness_proto::time::Span;
 
@@ -55,7 +55,7 @@ pub fn import(data: &[u8]) {
     assert!(shown.is_ok(), "a sink takes everything");
     let picture = svg::svg(
         &capture.traces,
-        &svg::Options {
+        &svg::SvgOptions {
             title: "any",
             id: "any",
             scale: svg::RowPlacing::Time,
@@ -68,7 +68,7 @@ pub fn import(data: &[u8]) {
         "a picture of {} bytes",
         picture.len()
     );
-    let options = Options {
+    let options = JudgeOptions {
         title: "any",
         setup: None,
         tolerance: Span::ZERO,

@@ -22,7 +22,7 @@ mod tape;
 mod telegrams;
 
 pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
-pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario};
+pub use crate::buses::rings::capture::scenario::{JudgeOptions, SketchError, scenario};
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 

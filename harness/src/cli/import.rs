@@ -8,8 +8,8 @@ use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, ComparedRun, Imported, Judged, Options, ReadSettings, diff as compare, is_capture,
-    judge, read_files, scenario,
+    Capture, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings, diff as compare,
+    is_capture, judge, read_files, scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -82,7 +82,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     if share_a_line(&capture.traces) {
         return of_shared_line((&capture, lost), &title, setup.as_ref(), arguments, output);
     }
-    let options = Options {
+    let options = JudgeOptions {
         title: &title,
         setup: setup.as_ref(),
         tolerance: span(arguments.tolerance),
@@ -235,7 +235,7 @@ fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> O
 
 fn as_scenario(
     capture: &Capture,
-    options: &Options<'_>,
+    options: &JudgeOptions<'_>,
     arguments: &ImportArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {

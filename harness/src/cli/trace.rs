@@ -8,7 +8,7 @@ use crate::buses::{SharedForm, bits_per_second, carry_frames, rows, share_a_line
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;
-use crate::report::svg::{Options, RowPlacing, svg};
+use crate::report::svg::{RowPlacing, SvgOptions, svg};
 use crate::report::table::{LEGEND, TablePart, table, wires};
 use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
@@ -126,7 +126,7 @@ fn write(
         TraceFormat::Vcd => vcd::write(shown.traces, shown.rate, signals(showing), out),
         TraceFormat::Pcapng => pcapng::write(shown.traces, shown.rate, out),
         TraceFormat::Svg => {
-            let options = Options {
+            let options = SvgOptions {
                 title: shown.title,
                 id: "ring",
                 scale: match showing.time {

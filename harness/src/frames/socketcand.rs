@@ -116,7 +116,7 @@ impl Request {
 
 /// What the server says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum SocketcandAnswer {
     /// `hi`, at the beginning.
     Hi,
     /// `ok`.
@@ -131,7 +131,7 @@ pub enum Answer {
     Error(String),
 }
 
-impl Answer {
+impl SocketcandAnswer {
     /// Reads a message, its brackets included.
     ///
     /// # Errors
@@ -361,52 +361,61 @@ mod tests {
     #[test]
     fn answers_are_read_and_written() {
         for (text, answer) in [
-            ("< hi >", Answer::Hi),
-            ("< ok >", Answer::Ok),
-            ("< echo >", Answer::Echo),
+            ("< hi >", SocketcandAnswer::Hi),
+            ("< ok >", SocketcandAnswer::Ok),
+            ("< echo >", SocketcandAnswer::Echo),
             (
                 "< frame 123 23.424242 1A220344 >",
-                Answer::Frame(a_frame("123#1A220344"), TIME),
+                SocketcandAnswer::Frame(a_frame("123#1A220344"), TIME),
             ),
             (
                 "< frame 123 23.424242  >",
-                Answer::Frame(a_frame("123#"), TIME),
+                SocketcandAnswer::Frame(a_frame("123#"), TIME),
             ),
             (
                 "< error 040 23.424242 >",
-                Answer::ErrorFrame(class::BUS_OFF, TIME),
+                SocketcandAnswer::ErrorFrame(class::BUS_OFF, TIME),
             ),
             (
                 "< error unknown command >",
-                Answer::Error("unknown command".to_owned()),
+                SocketcandAnswer::Error("unknown command".to_owned()),
             ),
         ] {
-            assert_eq!(Answer::parse(text.as_bytes()), Ok(answer.clone()), "{text}");
+            assert_eq!(
+                SocketcandAnswer::parse(text.as_bytes()),
+                Ok(answer.clone()),
+                "{text}"
+            );
             let mut out = Vec::new();
             answer.write(&mut out);
             assert_eq!(String::from_utf8(out).expect("text"), text);
         }
         // The broadcast manager's form, and a server that writes fewer places.
-        let spaced = Answer::parse(b"< frame 123 23.5 1A 22 >");
+        let spaced = SocketcandAnswer::parse(b"< frame 123 23.5 1A 22 >");
         let half = Stamp {
             seconds: 23,
             micros: 500_000,
         };
-        assert_eq!(spaced, Ok(Answer::Frame(a_frame("123#1A22"), half)));
+        assert_eq!(
+            spaced,
+            Ok(SocketcandAnswer::Frame(a_frame("123#1A22"), half))
+        );
         for text in [
             "< frame 123 23.4 1A2 >",
             "< frame 1234 1.0 1A >",
             "< frame 123 1A >",
             "< bye >",
         ] {
-            let error = Answer::parse(text.as_bytes()).expect_err(text).to_string();
+            let error = SocketcandAnswer::parse(text.as_bytes())
+                .expect_err(text)
+                .to_string();
             assert!(
                 error.contains(text) && error.contains("expected"),
                 "{error}"
             );
         }
         let mut nested = Vec::new();
-        Answer::Error("received < a >".to_owned()).write(&mut nested);
+        SocketcandAnswer::Error("received < a >".to_owned()).write(&mut nested);
         assert_eq!(nested, b"< error received ' a ' >");
     }
 
@@ -435,7 +444,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_message_panics(message in prop::collection::vec(any::<u8>(), 0..80)) {
-            let _any = (Request::parse(&message), Answer::parse(&message));
+            let _any = (Request::parse(&message), SocketcandAnswer::parse(&message));
             let mut messages = Messages::default();
             for character in message {
                 let _any = messages.push(character);
@@ -451,9 +460,9 @@ mod tests {
             Request::Send(frame).write(&mut out);
             prop_assert_eq!(Request::parse(&out), Ok(Request::Send(frame)));
             out.clear();
-            Answer::Frame(frame, stamp).write(&mut out);
+            SocketcandAnswer::Frame(frame, stamp).write(&mut out);
             prop_assert!(out.len() <= MAX_MESSAGE);
-            prop_assert_eq!(Answer::parse(&out), Ok(Answer::Frame(frame, stamp)));
+            prop_assert_eq!(SocketcandAnswer::parse(&out), Ok(SocketcandAnswer::Frame(frame, stamp)));
         }
     }
 }

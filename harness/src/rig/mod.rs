@@ -48,6 +48,7 @@ pub use watchdog::Alarm;
 
 /// Rigs with rings in use, and how they are examined and judged.
 pub use crate::buses::rings::rig::{
-    Driven, Health, Keeper, LikelyCause, Run, Session, Unhealthy, Way, examine, figures, play_one,
+    Driven, Keeper, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures,
+    play_one,
 };
 pub(crate) use crate::buses::rings::rig::{judge, left_open, run, sim};

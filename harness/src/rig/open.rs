@@ -4,7 +4,7 @@ use super::Rig;
 use super::ends::Ends;
 use super::file::{Endpoint, Marks, Transport};
 use super::lock::{PortLock, PortLockError};
-use super::scan::{self, MatchError, Port};
+use super::scan::{self, FoundPort, MatchError};
 use crate::buses;
 use crate::link::{InnerLink, Ports};
 use crate::port::{self, OpenError, PortSettings, Wire};
@@ -123,7 +123,7 @@ fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: Ports) -> InnerLink 
 
 fn wire(
     endpoint: &Endpoint,
-    ports: &[Port],
+    ports: &[FoundPort],
     locks: &mut Vec<PortLock>,
 ) -> Result<Wire, OpenRigError> {
     let named = endpoint.port.clone().unwrap_or_default();

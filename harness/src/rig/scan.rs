@@ -21,14 +21,14 @@ const TELLING: [&str; 4] = [
 
 /// A serial port.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Port {
+pub struct FoundPort {
     /// Its device, such as `/dev/ttyUSB0`.
     pub device: PathBuf,
     /// What udev says of it: ID_SERIAL_SHORT and so on.
     pub udev: BTreeMap<String, String>,
 }
 
-impl Port {
+impl FoundPort {
     /// Whether every key has this value.
     #[must_use]
     pub fn fits(&self, wanted: &BTreeMap<String, String>) -> bool {
@@ -71,9 +71,12 @@ pub struct MatchError {
 ///
 /// # Errors
 /// There is none, or more than one.
-pub fn resolve(ports: &[Port], wanted: &BTreeMap<String, String>) -> Result<PathBuf, MatchError> {
+pub fn resolve(
+    ports: &[FoundPort],
+    wanted: &BTreeMap<String, String>,
+) -> Result<PathBuf, MatchError> {
     let fitting: Vec<_> = ports.iter().filter(|port| port.fits(wanted)).collect();
-    let names = |ports: &mut dyn Iterator<Item = &Port>| {
+    let names = |ports: &mut dyn Iterator<Item = &FoundPort>| {
         let names: Vec<_> = ports
             .map(|port| port.device.display().to_string())
             .collect();
@@ -98,7 +101,7 @@ pub fn resolve(ports: &[Port], wanted: &BTreeMap<String, String>) -> Result<Path
 /// The serial ports of the machine whose files stand under `root`, which is `/` but in tests. What cannot be
 /// read is not there.
 #[must_use]
-pub fn scan(root: &Path) -> Vec<Port> {
+pub fn scan(root: &Path) -> Vec<FoundPort> {
     let entries = std::fs::read_dir(root.join("sys/class/tty"))
         .into_iter()
         .flatten();
@@ -121,7 +124,7 @@ fn natural(device: &Path) -> (String, u32) {
     )
 }
 
-fn port(root: &Path, folder: &Path) -> Option<Port> {
+fn port(root: &Path, folder: &Path) -> Option<FoundPort> {
     // Consoles and pseudo-terminals have no device behind them.
     if !folder.join("device").exists() {
         return None;
@@ -140,7 +143,7 @@ fn port(root: &Path, folder: &Path) -> Option<Port> {
     let keys = udev
         .lines()
         .filter_map(|line| line.strip_prefix("E:")?.split_once('='));
-    Some(Port {
+    Some(FoundPort {
         device: Path::new("/dev").join(folder.file_name()?),
         udev: keys
             .filter(|(key, _)| key.starts_with("ID_"))
@@ -151,7 +154,7 @@ fn port(root: &Path, folder: &Path) -> Option<Port> {
 
 /// A block of a rig file for each port, to choose from: each is made for ring 1, and as a comment for an SLCAN adapter.
 #[must_use]
-pub fn propose(ports: &[Port]) -> String {
+pub fn propose(ports: &[FoundPort]) -> String {
     let mut text = String::new();
     for (number, port) in ports.iter().enumerate() {
         let device = port.device.display().to_string();

@@ -1,6 +1,6 @@
 //! Invariants that hold after every cycle, for any bus write and any outside input. A drive that breaks one is
 //! in an impossible state: a mistake in this model. Builds with debug assertions check every cycle, and so does a
-//! `Watch` that has begun.
+//! `InvariantWatch` that has begun.
 
 use super::positioning::Positioning;
 use super::world::Mode;
@@ -79,12 +79,12 @@ fn released(mode: Mode) -> bool {
 
 /// What is known of the invariants of a drive.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Watch {
+pub(crate) struct InvariantWatch {
     watching: bool,
     broken: Option<&'static str>,
 }
 
-impl Watch {
+impl InvariantWatch {
     /// Starts to watch: the first broken invariant is kept from now on.
     pub(crate) fn begin(&mut self) {
         self.watching = true;
@@ -127,7 +127,7 @@ mod tests {
             speed,
             position,
         };
-        let mut watch = Watch::default();
+        let mut watch = InvariantWatch::default();
         watch.begin();
         watch.look(&state(0.0, 0.0));
         assert_eq!(watch.broken(), None);

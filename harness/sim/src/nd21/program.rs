@@ -6,7 +6,7 @@
 use super::cycle_control::{CycleControl, Orders};
 use super::eeprom_controller::{EepromController, parity_is_right};
 use super::error_state;
-use super::invariants::{State, Watch};
+use super::invariants::{InvariantWatch, State};
 use super::monitor::{self, EndSwitches};
 use super::motion::{Demand, Motion, Outside};
 use super::outputs::{self, Encoder};
@@ -82,7 +82,7 @@ pub struct Program {
     quiet: bool,
     /// Something has come from outside since the last cycle: what is watched is to be looked at.
     stirred: bool,
-    pub(crate) invariants: Watch,
+    pub(crate) invariants: InvariantWatch,
     /// The last values of the input ports.
     shown_inputs: Option<(Inputs, Option<ErrorCode>)>,
 }
@@ -117,7 +117,7 @@ impl Program {
             mode: Mode::Reset,
             quiet: false,
             stirred: true,
-            invariants: Watch::default(),
+            invariants: InvariantWatch::default(),
             shown_inputs: None,
         };
         program.start();

@@ -4,7 +4,7 @@ use crate::novobus::deviation::{DeviantMaster, MasterDeviation};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
-    Counters, CyclePace, Event, Job, JobId, Master, Options, Phase, Refused,
+    Counters, CyclePace, Event, Job, JobId, Master, MasterOptions, Phase, Refused,
 };
 use harness_proto::time::Instant;
 
@@ -33,7 +33,7 @@ impl AnyMaster {
     pub fn new(
         ring: RingSize,
         rate: Rate,
-        options: Options,
+        options: MasterOptions,
         deviates: Option<&'static MasterDeviation>,
     ) -> Self {
         match deviates {

@@ -2,7 +2,7 @@
 
 use super::clock::AdapterClock;
 use crate::frames::slcan::{self, Command, Report, STAMP_PERIOD, flags};
-use crate::frames::socketcand::{Answer, Messages, Request, class};
+use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, class};
 use harness_proto::can::{BusError, Frame, Heard};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
@@ -216,9 +216,9 @@ impl Socketcand {
 
     fn push(&mut self, character: u8, read: Instant) -> Option<Event> {
         let answer = self.messages.push(character)?;
-        let answer = answer.and_then(|message| Answer::parse(&message));
+        let answer = answer.and_then(|message| SocketcandAnswer::parse(&message));
         let heard = match answer {
-            Ok(Answer::Frame(frame, stamp)) => {
+            Ok(SocketcandAnswer::Frame(frame, stamp)) => {
                 let since = Span::from_micros(
                     (stamp.seconds % SECONDS) * 1_000_000 + u64::from(stamp.micros),
                 );
@@ -227,14 +227,20 @@ impl Socketcand {
                     Heard::Frame(frame),
                 ));
             }
-            Ok(Answer::ErrorFrame(bits, _)) if bits & class::BUS_OFF != 0 => BusError::BusOff,
-            Ok(Answer::ErrorFrame(bits, _)) if bits & class::NO_ACKNOWLEDGE != 0 => {
+            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::BUS_OFF != 0 => {
+                BusError::BusOff
+            }
+            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::NO_ACKNOWLEDGE != 0 => {
                 BusError::NoAcknowledge
             }
-            Ok(Answer::ErrorFrame(bits, _)) if bits & class::RESTARTED != 0 => return None,
-            Ok(Answer::ErrorFrame(..)) => BusError::ErrorFrame,
-            Ok(Answer::Hi | Answer::Ok | Answer::Echo) => return None,
-            Ok(Answer::Error(text)) => {
+            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::RESTARTED != 0 => {
+                return None;
+            }
+            Ok(SocketcandAnswer::ErrorFrame(..)) => BusError::ErrorFrame,
+            Ok(SocketcandAnswer::Hi | SocketcandAnswer::Ok | SocketcandAnswer::Echo) => {
+                return None;
+            }
+            Ok(SocketcandAnswer::Error(text)) => {
                 return Some(Event::Ended(format!(
                     "the server of socketcand reports: {text}"
                 )));

@@ -3,7 +3,7 @@
 use super::adapter::{Adapter, Slcan, Socketcand};
 use super::transport::{Stream, Transport};
 use crate::frames::slcan::{self, BitTiming, Command, Report, rate_of};
-use crate::frames::socketcand::{Answer, Messages, Request};
+use crate::frames::socketcand::{Messages, Request, SocketcandAnswer};
 use crate::port::{Endpoint, OpenError, Outgoing, Wire, open_adapter};
 use crate::trouble::Trouble;
 use harness_proto::can::BitRate;
@@ -350,13 +350,13 @@ impl<'a> Talk<'a> {
     fn open_socketcand(&mut self, channel: &str) -> Result<(), AdapterError> {
         const CHANNEL: &str =
             "name a bus that the server has, such as can0, and let the server bring it up";
-        self.expect("a greeting", &Answer::Hi, "")?;
+        self.expect("a greeting", &SocketcandAnswer::Hi, "")?;
         self.request(&Request::Open(channel.to_owned()))?;
-        self.expect("< open >", &Answer::Ok, CHANNEL)?;
+        self.expect("< open >", &SocketcandAnswer::Ok, CHANNEL)?;
         self.request(&Request::RawMode)?;
         self.expect(
             "< rawmode >",
-            &Answer::Ok,
+            &SocketcandAnswer::Ok,
             "use a server of socketcand with a raw mode",
         )
     }
@@ -370,7 +370,7 @@ impl<'a> Talk<'a> {
     fn expect(
         &mut self,
         command: &'static str,
-        wanted: &Answer,
+        wanted: &SocketcandAnswer,
         remedy: &'static str,
     ) -> Result<(), AdapterError> {
         let end = Instant::now() + PATIENCE;
@@ -381,10 +381,10 @@ impl<'a> Talk<'a> {
             let Some(message) = self.messages.push(character) else {
                 continue;
             };
-            let answer = message.and_then(|message| Answer::parse(&message));
+            let answer = message.and_then(|message| SocketcandAnswer::parse(&message));
             match answer.map_err(|error| self.other(SOCKETCAND, error))? {
                 answer if answer == *wanted => return Ok(()),
-                Answer::Error(text) => {
+                SocketcandAnswer::Error(text) => {
                     return Err(AdapterError::Refused {
                         port: self.wire.name().to_owned(),
                         what: format!("{command} ({text})"),

@@ -1,7 +1,7 @@
 //! A conversation with a client, without I/O: requests in; answers, and what the client's station hears, out.
 
 use crate::frames::slcan::{self, BitTiming, Command, Report, flags, rate_of};
-use crate::frames::socketcand::{Answer, Messages, Request, Stamp, class};
+use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, Stamp, class};
 use harness_proto::can::{BitRate, BusError, Frame, Heard};
 use harness_proto::time::Instant;
 use std::time::Duration;
@@ -67,7 +67,7 @@ impl Session {
     /// What the client receives before it has said anything.
     pub(super) fn greet(&self, out: &mut Vec<u8>) {
         if let Self::Socketcand(_) = self {
-            Answer::Hi.write(out);
+            SocketcandAnswer::Hi.write(out);
         }
     }
 
@@ -279,32 +279,32 @@ impl Daemon {
             Err(error) => {
                 // The daemon answers no `send`, not even one with a mistake, and clients expect no answer to it.
                 if !error.concerns("< send ") {
-                    Answer::Error(error.to_string()).write(out);
+                    SocketcandAnswer::Error(error.to_string()).write(out);
                 }
                 acts.push(Act::Say(error.to_string()));
                 return;
             }
         };
         let refusal = match (self.mode, request) {
-            (_, Request::Echo) => return Answer::Echo.write(out),
+            (_, Request::Echo) => return SocketcandAnswer::Echo.write(out),
             (Mode::NoBus, Request::Open(_)) => {
                 self.mode = Mode::Bcm;
                 acts.push(Act::Join { listen_only: false });
-                return Answer::Ok.write(out);
+                return SocketcandAnswer::Ok.write(out);
             }
             (Mode::NoBus, _) => "no bus is open; < open can0 > expected first",
             (_, Request::RawMode) => {
                 self.mode = Mode::Raw;
-                return Answer::Ok.write(out);
+                return SocketcandAnswer::Ok.write(out);
             }
             (_, Request::BcmMode) => {
                 self.mode = Mode::Bcm;
-                return Answer::Ok.write(out);
+                return SocketcandAnswer::Ok.write(out);
             }
             (_, Request::Send(frame)) => return acts.push(Act::Send(frame)),
             (_, Request::Open(_)) => "a bus is open already; connect again for another one",
         };
-        Answer::Error(refusal.to_owned()).write(out);
+        SocketcandAnswer::Error(refusal.to_owned()).write(out);
         acts.push(Act::Say(refusal.to_owned()));
     }
 
@@ -318,14 +318,14 @@ impl Daemon {
             micros: time.subsec_micros(),
         };
         let answer = match heard {
-            Heard::Frame(frame) => Answer::Frame(frame, stamp),
+            Heard::Frame(frame) => SocketcandAnswer::Frame(frame, stamp),
             Heard::Error(error) => {
                 let class = match error {
                     BusError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
                     BusError::NoAcknowledge => class::NO_ACKNOWLEDGE,
                     BusError::BusOff => class::BUS_OFF,
                 };
-                Answer::ErrorFrame(class, stamp)
+                SocketcandAnswer::ErrorFrame(class, stamp)
             }
         };
         answer.write(out);

@@ -2,7 +2,7 @@
 
 use super::{DAMAGED, built_in, root, run};
 use harness::capture::Capture;
-use harness::report::svg::{Options, RowPlacing, svg};
+use harness::report::svg::{RowPlacing, SvgOptions, svg};
 use harness::report::{csv, vcd};
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -12,7 +12,7 @@ const SMALL: &str = "title small\nring 2\ndrive 1 memory FE13 = 88\n! 1->0 byte 
     > 88 FF C0 13 FE D1\n> 80*4 81\n+5ms > 80\n";
 
 fn picture(capture: &Capture, title: &str, scale: RowPlacing) -> String {
-    let options = Options {
+    let options = SvgOptions {
         title,
         id: "test",
         scale,
@@ -152,7 +152,7 @@ fn hostile_titles_stay_text() {
     let (_, title) = all.iter().find(|(name, _)| name == "title").expect("one");
     assert!(title.starts_with("&lt;/title&gt;&lt;script&gt;"), "{title}");
     assert!(!picture.contains('\u{0}') && !picture.contains('\u{1b}'));
-    let options = Options {
+    let options = SvgOptions {
         title: "",
         id: "x\"><script>",
         scale: RowPlacing::Index,

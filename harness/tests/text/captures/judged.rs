@@ -1,15 +1,15 @@
 //! Captures beside the model, beside each other, and as scenarios.
 
 use super::{DAMAGED, built_in, pcapng, run, text};
-use harness::capture::{Capture, ComparedRun, Options, diff, judge, read, scenario};
+use harness::capture::{Capture, ComparedRun, JudgeOptions, diff, judge, read, scenario};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::LineError;
 use harness_proto::time::Span;
 use harness_sim::record::LineByte;
 
-fn options<'o>(setup: Option<&'o Source>) -> Options<'o> {
-    Options {
+fn options<'o>(setup: Option<&'o Source>) -> JudgeOptions<'o> {
+    JudgeOptions {
         title: "test",
         setup,
         tolerance: Span::ZERO,
@@ -409,7 +409,7 @@ fn the_first_difference() {
 #[test]
 fn hostile_names_stay_titles() {
     let capture = run("title a\nring 2\n> 80\n");
-    let hostile = Options {
+    let hostile = JudgeOptions {
         title: "x\n> 88\n# y\u{1b}[0m",
         ..options(None)
     };

@@ -1,7 +1,7 @@
 //! Captures of adapters that give bytes in portions, late, and that end in the middle of a conversation.
 
 use super::run;
-use harness::capture::{Capture, Judged, Listened, Options, judge};
+use harness::capture::{Capture, JudgeOptions, Judged, Listened, judge};
 use harness::scenario::verdict::Verdict;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte};
@@ -38,7 +38,7 @@ fn given(capture: &Capture, moments: [u64; 2], until: u64) -> Capture {
 }
 
 fn judged(capture: &Capture) -> Judged {
-    let options = Options {
+    let options = JudgeOptions {
         title: "test",
         setup: None,
         tolerance: Span::from_millis(50),

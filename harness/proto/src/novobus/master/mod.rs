@@ -77,7 +77,7 @@ pub use cycle::CyclePace;
 pub use event::{Counters, Event};
 pub use fault::{BusStop, Fault, LinkEnd, RingLink};
 pub use job::{Data, Job, JobId, Outcome, Refused, Repeat};
-pub use options::{Options, Packing};
+pub use options::{MasterOptions, Packing};
 
 use super::address::RingSize;
 use super::check_sequence::{CHECK_SEQUENCE, SequenceWatch};
@@ -98,7 +98,7 @@ use store::Store;
 #[derive(Clone, Debug)]
 pub struct Master {
     ring: RingSize,
-    options: Options,
+    options: MasterOptions,
     byte_time: Span,
     /// From the beginning of a byte to when it must be back.
     patience: Span,
@@ -152,7 +152,7 @@ pub enum Phase {
 impl Master {
     /// Creates a master for a ring of this size on a line of this rate.
     #[must_use]
-    pub fn new(ring: RingSize, rate: Rate, options: Options) -> Self {
+    pub fn new(ring: RingSize, rate: Rate, options: MasterOptions) -> Self {
         let byte_time = rate.byte_time();
         // A byte needs one byte time to the first drive and one for each drive that passes it on.
         let round = u64::from(ring.drives()) + 1;

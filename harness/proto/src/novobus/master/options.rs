@@ -1,11 +1,11 @@
-//! Options of a master: packing, time-outs, number of attempts.
+//! MasterOptions of a master: packing, time-outs, number of attempts.
 
 use super::super::properties::ReadLongAnswer;
 use crate::time::Span;
 
-/// Options of a master. Every field has a default.
+/// MasterOptions of a master. Every field has a default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
+pub struct MasterOptions {
     /// Maximum number of jobs that the master holds: queued, under way, or with a result that was not fetched
     /// (ND21 11.6: "to avoid overloading the buffer each result should be called up").
     pub capacity: u16,
@@ -28,7 +28,7 @@ pub struct Options {
     pub check_first: bool,
 }
 
-impl Default for Options {
+impl Default for MasterOptions {
     fn default() -> Self {
         Self {
             capacity: 1024,

@@ -20,10 +20,10 @@ fn size(drives: u8) -> RingSize {
 
 /// A master that has counted its drives and may send long without an answer.
 fn ready(drives: u8, packing: Packing) -> Master {
-    let options = Options {
+    let options = MasterOptions {
         packing,
         slack: Span::from_millis(60_000),
-        ..Options::default()
+        ..MasterOptions::default()
     };
     let mut master = Master::new(size(drives), Rate::Baud38400, options);
     let start: Vec<u8> = (0..4)
@@ -275,7 +275,7 @@ fn an_address_is_believed_when_it_stays() {
 /// Nothing is sent to a ring that does not answer, once all that may be is under way.
 #[test]
 fn what_is_under_way_is_bounded() {
-    let mut master = Master::new(size(5), Rate::Baud38400, Options::default());
+    let mut master = Master::new(size(5), Rate::Baud38400, MasterOptions::default());
     let sent = (0..1000)
         .filter_map(|_| master.poll_transmit(Instant::START))
         .count();

@@ -7,7 +7,7 @@ use crate::novobus::reference;
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind};
-use harness_proto::novobus::master::{CyclePace, Event, Job, JobId, Master, Options, Phase};
+use harness_proto::novobus::master::{CyclePace, Event, Job, JobId, Master, MasterOptions, Phase};
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::time::Instant;
 
@@ -64,7 +64,7 @@ impl Play {
     fn new(size: RingSize) -> Self {
         Self {
             size,
-            master: Master::new(size, Rate::Baud38400, Options::default()),
+            master: Master::new(size, Rate::Baud38400, MasterOptions::default()),
             now: Instant::START,
             sent: Vec::new(),
             sound: Sound::new(size),

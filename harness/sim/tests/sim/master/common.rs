@@ -2,7 +2,7 @@
 
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{Event, Job, JobId, Master, Options, Outcome, Phase};
+use harness_proto::novobus::master::{Event, Job, JobId, Master, MasterOptions, Outcome, Phase};
 use harness_proto::time::Instant;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::plain::PlainDrive;
@@ -24,7 +24,7 @@ pub(crate) fn size(drives: u8) -> RingSize {
 
 impl Couple<PlainDrive> {
     /// Plain drives, and a master with these options.
-    pub(crate) fn plain(drives: u8, options: Options) -> Self {
+    pub(crate) fn plain(drives: u8, options: MasterOptions) -> Self {
         Self::new(drives, options, |_| PlainDrive::default())
     }
 
@@ -40,7 +40,7 @@ impl Couple<PlainDrive> {
 }
 
 impl<D: Device> Couple<D> {
-    pub(crate) fn new(drives: u8, options: Options, device: impl FnMut(u8) -> D) -> Self {
+    pub(crate) fn new(drives: u8, options: MasterOptions, device: impl FnMut(u8) -> D) -> Self {
         let ring = Ring::new(size(drives), Rate::Baud38400, device);
         Self::with(Master::new(size(drives), Rate::Baud38400, options), ring)
     }

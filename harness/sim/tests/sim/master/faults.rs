@@ -6,7 +6,7 @@ use super::common::{Couple, Random, repeat, seed, size};
 use harness_proto::line::Rate;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{
-    CyclePace, Event, Job, JobId, Master, Options, Outcome, Packing, Phase,
+    CyclePace, Event, Job, JobId, Master, MasterOptions, Outcome, Packing, Phase,
 };
 use harness_proto::time::Span;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
@@ -131,7 +131,7 @@ fn job(random: &mut Random, drives: u8, number: u16) -> (Job, u16) {
 fn couple(random: &mut Random) -> Couple<Counted> {
     let drives = 1 + random.below(20) as u8;
     let monitoring = random.below(2) == 0;
-    let options = Options {
+    let options = MasterOptions {
         capacity: 64,
         packing: match random.below(3) {
             0 => Packing::NONE,
@@ -143,7 +143,7 @@ fn couple(random: &mut Random) -> Couple<Counted> {
             _ => Packing::ALL,
         },
         attempts: if random.below(4) == 0 { 2 } else { 15 },
-        ..Options::default()
+        ..MasterOptions::default()
     };
     let mut couple = Couple::new(drives, options, |_| Counted::new(monitoring));
     for k in 0..drives {
@@ -313,10 +313,10 @@ fn every_job_ends_with_the_truth_or_a_named_failure() {
         couple.steps(BOUND / 4);
         if couple.master.phase() == Phase::Stopped {
             stopped += 1;
-            let options = Options {
+            let options = MasterOptions {
                 attempts: 15,
                 check_first: true,
-                ..Options::default()
+                ..MasterOptions::default()
             };
             let master = Master::new(size(drives), Rate::Baud38400, options);
             couple = Couple::with(master, couple.ring);

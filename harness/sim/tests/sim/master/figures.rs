@@ -3,7 +3,7 @@
 
 use super::common::{Couple, size};
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{CyclePace, Event, Job, Options, Outcome, Packing};
+use harness_proto::novobus::master::{CyclePace, Event, Job, MasterOptions, Outcome, Packing};
 use harness_proto::novobus::timing::{exchange_bytes, position_bytes};
 use harness_proto::time::{Instant, Span};
 
@@ -52,7 +52,7 @@ fn rounds(couple: &Couple) -> Vec<(Instant, u64)> {
 #[test]
 fn nominal_and_actual_values_take_what_the_manual_says() {
     for drives in SIZES {
-        let mut couple = Couple::plain(drives, Options::default()).ready();
+        let mut couple = Couple::plain(drives, MasterOptions::default()).ready();
         let all: Vec<u8> = (0..drives).collect();
         for k in 0..drives {
             // DataIn 08 (nsoll), DataOut 18 (ND21 14.10.3).
@@ -92,7 +92,7 @@ fn nominal_and_actual_values_take_what_the_manual_says() {
 #[test]
 fn position_targets_take_what_the_manual_says() {
     for drives in SIZES {
-        let mut couple = Couple::plain(drives, Options::default()).ready();
+        let mut couple = Couple::plain(drives, MasterOptions::default()).ready();
         // In a ring of one the drive has been addressed before, as in the table.
         let read = Command::ReadByte { address: 0xFE13 };
         couple.submit(Job::new(size(drives).first(), read));
@@ -126,7 +126,7 @@ fn position_targets_take_what_the_manual_says() {
 /// share telegrams need less than the table has.
 #[test]
 fn a_ring_of_one_needs_no_address_byte() {
-    let mut couple = Couple::plain(1, Options::default()).ready();
+    let mut couple = Couple::plain(1, MasterOptions::default()).ready();
     let rounds = 60;
     for n in 0..rounds {
         for address in POSITION {
@@ -150,9 +150,9 @@ fn a_ring_of_one_needs_no_address_byte() {
 /// reading of short addresses is none of those that the manual leaves open, 9.2).
 #[test]
 fn packing_can_be_switched_off() {
-    let options = Options {
+    let options = MasterOptions {
         packing: Packing::NONE,
-        ..Options::default()
+        ..MasterOptions::default()
     };
     let mut couple = Couple::plain(3, options).ready();
     for k in 0..3 {
@@ -171,7 +171,7 @@ fn packing_can_be_switched_off() {
 /// telegrams, in two rounds, and no byte more than the exchange of process data and its own six.
 #[test]
 fn commands_are_woven_into_process_data() {
-    let mut couple = Couple::plain(3, Options::default()).ready();
+    let mut couple = Couple::plain(3, MasterOptions::default()).ready();
     couple
         .master
         .set_exchange(&[2, 0, 1], CyclePace::Continuous)
@@ -210,7 +210,7 @@ fn commands_are_woven_into_process_data() {
 /// A drive that takes no part in the exchange gets a telegram between two rounds.
 #[test]
 fn others_are_not_starved_by_the_exchange() {
-    let mut couple = Couple::plain(4, Options::default()).ready();
+    let mut couple = Couple::plain(4, MasterOptions::default()).ready();
     couple
         .master
         .set_exchange(&[0, 1], CyclePace::Continuous)
@@ -228,7 +228,7 @@ fn others_are_not_starved_by_the_exchange() {
 /// Rounds on request, and at a period: values given by the caller for each.
 #[test]
 fn rounds_begin_when_they_are_asked_for() {
-    let mut couple = Couple::plain(2, Options::default()).ready();
+    let mut couple = Couple::plain(2, MasterOptions::default()).ready();
     for k in 0..2 {
         couple.poke(k, 0xFF32, 0x08);
         couple.poke(k, 0xFF34, 0x08);
@@ -267,7 +267,7 @@ fn rounds_begin_when_they_are_asked_for() {
 #[test]
 fn the_line_has_no_gaps() {
     for drives in [1, 6, 100, 250] {
-        let mut couple = Couple::plain(drives, Options::default()).ready();
+        let mut couple = Couple::plain(drives, MasterOptions::default()).ready();
         let mut jobs = 0;
         for n in 0..20_000u32 {
             while couple.master.jobs() < 400 {
@@ -297,7 +297,7 @@ fn the_line_has_no_gaps() {
 /// PAUSE loosens the data flow and gets no answer (ND21 9.2).
 #[test]
 fn pause_is_sent_on_request() {
-    let mut couple = Couple::plain(2, Options::default()).ready();
+    let mut couple = Couple::plain(2, MasterOptions::default()).ready();
     couple.master.pause(5);
     let heard = couple.heard.len();
     couple.steps(20);

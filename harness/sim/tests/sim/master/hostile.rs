@@ -5,7 +5,7 @@ use super::common::{Random, repeat, seed, size};
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::command::{Command, LAYOUTS};
 use harness_proto::novobus::master::{
-    CyclePace, Event, Job, Master, Options, Outcome, Packing, Phase,
+    CyclePace, Event, Job, Master, MasterOptions, Outcome, Packing, Phase,
 };
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -92,7 +92,7 @@ fn a_hostile_ring_does_no_harm() {
         let mut random = Random(seed().wrapping_mul(CASES).wrapping_add(case));
         let place = || format!("case {case}; {}", repeat("a_hostile_ring"));
         let drives = 1 + random.below(250) as u8;
-        let options = Options {
+        let options = MasterOptions {
             capacity: random.below(40) as u16,
             attempts: random.below(20) as u8,
             packing: if random.below(2) == 0 {
@@ -102,7 +102,7 @@ fn a_hostile_ring_does_no_harm() {
             },
             slack: Span::from_millis(random.below(30)),
             check_first: random.below(2) == 0,
-            ..Options::default()
+            ..MasterOptions::default()
         };
         let rate = Rate::ALL[random.below(3) as usize];
         let mut master = Master::new(size(drives), rate, options);

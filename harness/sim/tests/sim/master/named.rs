@@ -5,7 +5,7 @@ use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind};
 use harness_proto::novobus::master::{
-    BusStop, CyclePace, Event, Fault, Job, LinkEnd, Master, Options, Outcome, Packing, Phase,
+    BusStop, CyclePace, Event, Fault, Job, LinkEnd, Master, MasterOptions, Outcome, Packing, Phase,
     Refused, RingLink,
 };
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
@@ -51,10 +51,10 @@ fn stop<D: Device>(couple: &Couple<D>) -> Option<BusStop> {
 }
 
 /// Few attempts, so that the end comes soon.
-fn few() -> Options {
-    Options {
+fn few() -> MasterOptions {
+    MasterOptions {
         attempts: 3,
-        ..Options::default()
+        ..MasterOptions::default()
     }
 }
 
@@ -115,7 +115,7 @@ fn a_broken_ring_is_silent_without_monitoring() {
 #[test]
 fn a_ring_that_is_joined_again_goes_on() {
     for monitoring in [false, true] {
-        let options = Options::default();
+        let options = MasterOptions::default();
         let mut couple = Couple::new(4, options, |_| Counted::new(monitoring)).ready();
         couple.ring.suffer_link(2, LinkFault::Cut);
         let id = couple.submit(Job::new(0, WRITE));
@@ -427,9 +427,9 @@ fn jobs_behind_a_reset_get_through() {
 /// Jobs that cannot be done are refused, with the range in the message (ND21 10.1-10.3).
 #[test]
 fn jobs_that_cannot_be_done_are_refused() {
-    let options = Options {
+    let options = MasterOptions {
         capacity: 3,
-        ..Options::default()
+        ..MasterOptions::default()
     };
     let mut master = Master::new(size(4), Rate::Baud38400, options);
     let mut message = |drive, command| {
@@ -485,10 +485,10 @@ fn read_long_has_two_answers() {
             read_long,
             ..Properties::default()
         };
-        let options = Options {
+        let options = MasterOptions {
             read_long,
             packing: Packing::ALL,
-            ..Options::default()
+            ..MasterOptions::default()
         };
         let mut couple = Couple::new(2, options, |_| PlainDrive::new(properties, [0; 256])).ready();
         for (i, byte) in (0..4).zip([0x11, 0x22, 0x33, 0x44]) {
@@ -509,13 +509,13 @@ fn read_long_has_two_answers() {
 /// In a ring of more than 128 drives SYNCO is the address of one of them as well.
 #[test]
 fn drive_128_is_not_taken_for_synco() {
-    let mut couple = Couple::plain(130, Options::default()).ready();
+    let mut couple = Couple::plain(130, MasterOptions::default()).ready();
     let sent = couple.master.counters().sent;
     // Link 1 ends at drive 128.
     couple.ring.arm_link(1, sent + 20, PARITY);
     couple.steps(600);
     assert_eq!(faults(&couple), [Fault::Damaged(link(129, 128))]);
-    let mut couple = Couple::plain(130, Options::default()).ready();
+    let mut couple = Couple::plain(130, MasterOptions::default()).ready();
     let sent = couple.master.counters().sent;
     couple.ring.arm_link(130, sent + 20, PARITY);
     couple.steps(600);
@@ -528,7 +528,7 @@ fn every_ring_size_starts() {
     for drives in (1..=250u64).step_by(13) {
         let size = RingSize::new(drives).expect("1 to 250");
         let ring = Ring::new(size, Rate::Baud9600, |_| PlainDrive::default());
-        let master = Master::new(size, Rate::Baud9600, Options::default());
+        let master = Master::new(size, Rate::Baud9600, MasterOptions::default());
         let mut couple = Couple::with(master, ring);
         couple.steps(drives as usize + 10);
         assert_eq!(couple.master.phase(), Phase::Running, "{drives}");
@@ -545,7 +545,7 @@ fn a_master_out_of_step_blames_its_own_link() {
         ..Flips::default()
     });
     for byte in 1..=12 {
-        let mut couple = Couple::plain(3, Options::default()).ready();
+        let mut couple = Couple::plain(3, MasterOptions::default()).ready();
         couple.submit(Job::new(1, READ));
         couple.ring.arm_link(3, 6 + byte, start);
         couple.steps(600);

@@ -6,7 +6,7 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
 use harness_proto::novobus::master::{
-    CyclePace, Event, Fault, Job, LinkEnd, Options, Outcome, Packing, Phase, RingLink,
+    CyclePace, Event, Fault, Job, LinkEnd, MasterOptions, Outcome, Packing, Phase, RingLink,
 };
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::sync::SYNCO;
@@ -28,9 +28,9 @@ fn flip(data: u8) -> LinkFault {
 /// and the telegrams are those of the print.
 #[test]
 fn the_example_of_9_8_byte_by_byte() {
-    let options = Options {
+    let options = MasterOptions {
         packing: Packing::NONE,
-        ..Options::default()
+        ..MasterOptions::default()
     };
     let mut couple = Couple::plain(100, options).ready();
     for k in 95..100 {
@@ -178,7 +178,7 @@ fn every_single_bit_blames_the_right_link() {
     let mut runs = 0;
     let mut forms = BTreeSet::new();
     for drives in 1..=4u8 {
-        let sound = Couple::plain(drives, Options::default());
+        let sound = Couple::plain(drives, MasterOptions::default());
         let mut counting = sound;
         counting.steps(usize::from(drives) + 6);
         conversation(&mut counting);
@@ -200,7 +200,7 @@ fn every_single_bit_blames_the_right_link() {
                 for fault in noticed_faults() {
                     let place = || format!("ring {drives}, link {link}, byte {byte}, {fault}");
                     runs += 1;
-                    let mut couple = Couple::plain(drives, Options::default());
+                    let mut couple = Couple::plain(drives, MasterOptions::default());
                     couple.ring.arm_link(link, byte, fault);
                     couple.steps(usize::from(drives) + 6);
                     let jobs = conversation(&mut couple);
@@ -282,7 +282,8 @@ fn a_second_fault_during_the_recovery_does_no_harm() {
         for link in 0..=usize::from(drives) {
             for (byte, fault) in (0..170).flat_map(|byte| second.map(|fault| (byte, fault))) {
                 let place = || format!("ring {drives}, link {link}, byte {byte}, {fault}");
-                let mut couple = Couple::new(drives, Options::default(), |_| Counted::new(false));
+                let mut couple =
+                    Couple::new(drives, MasterOptions::default(), |_| Counted::new(false));
                 couple.steps(usize::from(drives) + 6);
                 let sent = couple.master.counters().sent;
                 couple

@@ -2,12 +2,12 @@
 
 use super::common::Couple;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{Job, Options, Outcome};
+use harness_proto::novobus::master::{Job, MasterOptions, Outcome};
 
 /// ND21 9.7, the telegram of the example; 10.1.
 #[test]
 fn one_read_on_a_ring_of_three() {
-    let mut couple = Couple::plain(3, Options::default()).ready();
+    let mut couple = Couple::plain(3, MasterOptions::default()).ready();
     couple.poke(1, 0xFE13, 0x88);
     let id = couple.submit(Job::new(1, Command::ReadByte { address: 0xFE13 }));
     couple.finish(40);

@@ -8,7 +8,7 @@ use harness_sim::record::Trace;
 
 /// How two traces differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TelegramDifference {
+pub struct TraceDifference {
     /// How many telegrams each side has.
     counts: [usize; 2],
     /// The first place, counted from 1, at which the telegrams differ, and what stands there on each side.
@@ -20,7 +20,7 @@ pub struct TelegramDifference {
 
 /// Compares the telegrams of two runs in their order. Their times may differ by `tolerance`.
 #[must_use]
-pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TelegramDifference {
+pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TraceDifference {
     let sides = [left, right].map(|traces| traces.iter().flat_map(said).collect::<Vec<_>>());
     let [left, right] = &sides;
     let same = |one: &Said, other: &Said| {
@@ -33,7 +33,7 @@ pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TelegramD
         late.since(early)
     });
     let differs = equal < left.len().max(right.len());
-    TelegramDifference {
+    TraceDifference {
         counts: [left.len(), right.len()],
         first: differs.then(|| (equal + 1, [words(left, equal), words(right, equal)])),
         late: late.max().unwrap_or(Span::ZERO),
@@ -59,7 +59,7 @@ fn words(all: &[Said], place: usize) -> String {
     )
 }
 
-impl TelegramDifference {
+impl TraceDifference {
     /// Whether the telegrams are the same, and their times within the tolerance.
     #[must_use]
     pub fn is_none(&self) -> bool {

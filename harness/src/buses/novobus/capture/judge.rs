@@ -2,7 +2,7 @@
 
 use super::begin::{after_silences, from, is_midway, is_one_telegram};
 use super::open::explanations;
-use super::scenario::{Options, SketchError, scenario_with, unforeseen};
+use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::locate::locate;
@@ -96,7 +96,7 @@ fn first(problems: &Problems) -> String {
 ///
 /// # Errors
 /// [`JudgeError`].
-pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
+pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let judged = judge_whole(capture, options)?;
     if judged.verdict != Verdict::Failed || !is_midway(capture) {
         return Ok(judged);
@@ -133,7 +133,7 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
     Ok(judged)
 }
 
-fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
+fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let told = unforeseen(capture);
     let judged = judge_as(capture, options, &told, &Header::default())?;
     if judged.verdict != Verdict::Failed || options.setup.is_some() {
@@ -158,7 +158,7 @@ fn judge_whole(capture: &Capture, options: &Options<'_>) -> Result<Judged, Judge
 /// Judges a capture beside simulated drives with more in their header.
 fn judge_as(
     capture: &Capture,
-    options: &Options<'_>,
+    options: &JudgeOptions<'_>,
     told: &[Told],
     more: &Header,
 ) -> Result<Judged, JudgeError> {
@@ -246,7 +246,7 @@ fn not_captured(capture: &Capture) -> String {
 /// What the model does where the same is done to it.
 fn model(
     capture: &Capture,
-    options: &Options<'_>,
+    options: &JudgeOptions<'_>,
     more: &Header,
 ) -> Result<(Capture, Vec<String>), JudgeError> {
     let text = scenario_with(capture, options, more)?;

@@ -30,7 +30,7 @@ const TITLE: usize = 100;
 
 /// How a scenario is made of a capture.
 #[derive(Clone, Debug)]
-pub struct Options<'o> {
+pub struct JudgeOptions<'o> {
     /// What it is called; any text.
     pub title: &'o str,
     /// A scenario whose header describes the drives: models, cells, properties. Without one the drives are plain, and their cells hold what
@@ -68,14 +68,14 @@ pub enum SketchError {
 ///
 /// # Errors
 /// [`SketchError`].
-pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, SketchError> {
+pub fn scenario(capture: &Capture, options: &JudgeOptions<'_>) -> Result<String, SketchError> {
     scenario_with(capture, options, &Header::default())
 }
 
 /// The scenario's text, with more in its header.
 pub(super) fn scenario_with(
     capture: &Capture,
-    options: &Options<'_>,
+    options: &JudgeOptions<'_>,
     more: &Header,
 ) -> Result<String, SketchError> {
     let mut rings = Vec::new();
@@ -145,7 +145,7 @@ impl<'c> Ring<'c> {
 
 fn head(
     capture: &Capture,
-    options: &Options<'_>,
+    options: &JudgeOptions<'_>,
     rings: &[Ring<'_>],
     more: &Header,
 ) -> Result<Scenario, SketchError> {

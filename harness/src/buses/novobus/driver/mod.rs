@@ -42,7 +42,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// How the masters of the rings work.
-    pub master: master::Options,
+    pub master: master::MasterOptions,
     /// How long a call waits for the end of its job, beside what the ring itself needs.
     pub patience: Span,
     /// How long a call of several steps waits for the drive: an EEPROM byte, a calculation.
@@ -59,7 +59,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            master: master::Options::default(),
+            master: master::MasterOptions::default(),
             patience: Span::from_millis(5_000),
             drive_patience: Span::from_millis(5_000),
             motion_patience: Span::from_millis(60_000),

@@ -49,7 +49,7 @@ impl<'l> Masters<'l> {
     pub(crate) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
         // A late byte must not count as lost, because the recovery stops every drive.
-        let own = master::Options {
+        let own = master::MasterOptions {
             slack: match link.lead() {
                 Lead::NONE => options.master.slack,
                 _ => options.master.slack.max(BUSY_HOST),

@@ -99,7 +99,7 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     {
         note(arrival(byte).to_owned());
     }
-    let options = capture::Options {
+    let options = capture::JudgeOptions {
         title: "any",
         setup: None,
         tolerance: harness_proto::time::Span::ZERO,

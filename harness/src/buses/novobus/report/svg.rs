@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug)]
-pub struct Options<'o> {
+pub struct SvgOptions<'o> {
     /// The heading; any text.
     pub title: &'o str,
     /// In front of the names of the picture's parts, where several stand in one page: letters and digits.
@@ -43,7 +43,7 @@ path.x{stroke:#ff8a80}path.y{fill:#ff8a80}}";
 
 /// One or two rings of a run, each a picture of its own, one below the other.
 #[must_use]
-pub fn svg(traces: &[Trace], options: &Options<'_>) -> String {
+pub fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
     let most = MAX_AREAS / traces.len().max(1);
     let placing = (options.scale, options.rate);
     let pictures: Vec<_> = traces

@@ -76,7 +76,7 @@ pub enum Unhealthy {
 
 /// What a healthy ring showed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Health {
+pub struct RingHealth {
     /// How many drives each ring has.
     pub rings: Vec<RingSize>,
     /// Drives that reported a fault before the ring was brought back: ring and drive.
@@ -91,8 +91,8 @@ pub fn examine(
     link: &mut dyn Link,
     rings: &[RingSize],
     attempts: u8,
-) -> Result<Health, (usize, Unhealthy)> {
-    let mut health = Health {
+) -> Result<RingHealth, (usize, Unhealthy)> {
+    let mut health = RingHealth {
         rings: rings.to_vec(),
         reported: Vec::new(),
     };

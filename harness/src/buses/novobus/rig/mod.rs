@@ -19,6 +19,6 @@ pub(crate) mod sim;
 pub use cause::LikelyCause;
 pub use condition::InterlockCondition;
 pub use driven::Driven;
-pub use health::{Health, Unhealthy, examine};
+pub use health::{RingHealth, Unhealthy, examine};
 pub use run::{Keeper, Run, Way, play_one};
 pub use session::Session;

@@ -1,7 +1,7 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
 use super::cause::{self, LikelyCause};
-use super::health::{self, Health, Unhealthy, examine};
+use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
 use crate::buses::novobus::driver::{Axis, count_behind};
@@ -40,7 +40,7 @@ pub struct Session {
     ill_as_well: bool,
     ended: bool,
     /// What the check at its opening found.
-    opening: Option<Health>,
+    opening: Option<RingHealth>,
     // Given back in this order.
     around: Around,
     /// While drives may move.
@@ -219,7 +219,7 @@ impl Session {
 
     /// The result of the health check at opening; `None` if there was none, or if a ring failed it.
     #[must_use]
-    pub fn opening(&self) -> Option<&Health> {
+    pub fn opening(&self) -> Option<&RingHealth> {
         self.opening.as_ref()
     }
 
@@ -433,7 +433,7 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError::Ill`].
-    pub fn health(&mut self) -> Result<Health, SessionError> {
+    pub fn health(&mut self) -> Result<RingHealth, SessionError> {
         self.link.reset_after_denial();
         let attempts = self.rig.file.health.attempts;
         let health = examine(&mut self.link, &self.rings, attempts)

@@ -7,7 +7,9 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::Reply;
-use harness_proto::novobus::master::{Event, Job, JobId, Master, Options, Outcome, Phase, Refused};
+use harness_proto::novobus::master::{
+    Event, Job, JobId, Master, MasterOptions, Outcome, Phase, Refused,
+};
 use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, VecDeque};
@@ -42,7 +44,7 @@ impl DeviantMaster {
     pub fn new(
         ring: RingSize,
         rate: Rate,
-        options: Options,
+        options: MasterOptions,
         deviation: &'static MasterDeviation,
     ) -> Self {
         let options = match deviation.how {

@@ -4,7 +4,7 @@ use super::speech::Spoken;
 use super::table::DEVIATIONS;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{Data, Event, Job, JobId, Options, Phase};
+use harness_proto::novobus::master::{Data, Event, Job, JobId, MasterOptions, Phase};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 use std::fmt;
@@ -100,7 +100,7 @@ pub(super) type Due = (Phase, Instant, Span, Span);
 /// How a deviation is injected.
 pub(super) enum How {
     /// It works by other options.
-    Options(fn(Options) -> Options),
+    Options(fn(MasterOptions) -> MasterOptions),
     /// It sends other bytes.
     Sends(fn(&Spoken) -> Sending),
     /// It takes bytes for others.

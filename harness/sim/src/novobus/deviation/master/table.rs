@@ -6,7 +6,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, Field, Reply};
 use harness_proto::novobus::master::{
-    Data, Event, Fault, Job, JobId, LinkEnd, Options, Outcome, Phase, Repeat, RingLink,
+    Data, Event, Fault, Job, JobId, LinkEnd, MasterOptions, Outcome, Phase, Repeat, RingLink,
 };
 use harness_proto::novobus::sync::{Addressing, SYNCO};
 
@@ -370,7 +370,7 @@ pub(super) static DEVIATIONS: &[MasterDeviation] = &[
         name: "gives-up-at-once",
         section: "11.5",
         about: "it stops the bus at the first error",
-        how: How::Options(|options| Options {
+        how: How::Options(|options| MasterOptions {
             attempts: 0,
             ..options
         }),
@@ -379,7 +379,7 @@ pub(super) static DEVIATIONS: &[MasterDeviation] = &[
         name: "never-gives-up",
         section: "11.5",
         about: "it tries to correct an error 255 times before it stops the bus",
-        how: How::Options(|options| Options {
+        how: How::Options(|options| MasterOptions {
             attempts: u8::MAX,
             ..options
         }),

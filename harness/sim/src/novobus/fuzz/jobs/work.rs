@@ -3,7 +3,7 @@
 use crate::fault::{Flips, LinkFault};
 use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{Job, Options, Packing};
+use harness_proto::novobus::master::{Job, MasterOptions, Packing};
 use harness_proto::time::Span;
 
 /// The most jobs: each has a cell of its own.
@@ -225,11 +225,11 @@ impl Work {
 
     /// How its master works.
     #[must_use]
-    pub fn options(&self) -> Options {
-        Options {
+    pub fn options(&self) -> MasterOptions {
+        MasterOptions {
             capacity: 64,
             packing: self.packing,
-            ..Options::default()
+            ..MasterOptions::default()
         }
     }
 
