@@ -32,5 +32,6 @@ mod scenarios;
 mod ser2net;
 mod serve;
 mod session;
+mod session_hostile;
 mod shell;
 mod top;

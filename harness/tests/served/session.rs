@@ -9,15 +9,15 @@ use std::io::{BufRead, BufReader, Lines, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 
 /// A session that is open.
-struct Session {
-    child: Child,
-    input: Option<ChildStdin>,
-    lines: Lines<BufReader<ChildStdout>>,
+pub(crate) struct Session {
+    pub(crate) child: Child,
+    pub(crate) input: Option<ChildStdin>,
+    pub(crate) lines: Lines<BufReader<ChildStdout>>,
 }
 
 impl Session {
     /// Opens a session and reads its first two lines.
-    fn open(desk: &Desk, arguments: &[&str]) -> Self {
+    pub(crate) fn open(desk: &Desk, arguments: &[&str]) -> Self {
         let mut session = Self::start(desk, arguments);
         assert_eq!(session.next()["event"], "hello");
         let ready = session.next();
@@ -40,7 +40,7 @@ impl Session {
         }
     }
 
-    fn send(&mut self, line: &[u8]) {
+    pub(crate) fn send(&mut self, line: &[u8]) {
         let input = self.input.as_mut().expect("open");
         input.write_all(line).expect("a reader");
         input.write_all(b"\n").expect("a reader");
@@ -52,7 +52,7 @@ impl Session {
     }
 
     /// The next line that is no event.
-    fn answer(&mut self) -> Value {
+    pub(crate) fn answer(&mut self) -> Value {
         loop {
             let line = self.next();
             if line.get("event").is_none() {
@@ -61,13 +61,13 @@ impl Session {
         }
     }
 
-    fn ask(&mut self, request: &Value) -> Value {
+    pub(crate) fn ask(&mut self, request: &Value) -> Value {
         self.send(request.to_string().as_bytes());
         self.answer()
     }
 
     /// Ends the input; returns the last line and how the program ended.
-    fn end(mut self) -> (Value, Output) {
+    pub(crate) fn end(mut self) -> (Value, Output) {
         drop(self.input.take());
         let last = self.lines.map_while(Result::ok).last().expect("a line");
         let output = self.child.wait_with_output().expect("its end");
@@ -75,7 +75,7 @@ impl Session {
     }
 }
 
-fn code_of(answer: &Value) -> u64 {
+pub(crate) fn code_of(answer: &Value) -> u64 {
     answer["error"]["code"].as_u64().unwrap_or_default()
 }
 
@@ -204,6 +204,13 @@ fn a_session_holds_the_bench_and_ends_in_the_safe_state() {
     // Another program waits in vain, and is told for whom.
     let second = desk.run(&["shell", "--json", "--rig", "desk.toml"]);
     ended(&second, 75, "shell");
+    let last = String::from_utf8_lossy(&second.stdout);
+    let last = last.lines().last().expect("a line");
+    let last: Value = serde_json::from_str(last).expect("JSON");
+    let holder = format!("pid {} ", session.child.id());
+    let what = last["what"].as_str().expect("a sentence");
+    assert_eq!((&last["event"], &last["code"]), (&json!("end"), &json!(75)));
+    assert!(what.contains(&holder), "{what}");
     // A stop overtakes what is under way.
     session.send(br#"{"id":4,"do":"wait","ms":60000}"#);
     session.send(br#"{"id":5,"do":"stop"}"#);

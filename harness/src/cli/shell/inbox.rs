@@ -2,10 +2,13 @@
 
 use super::request::{SessionFault, SessionLine, SessionRequest, parse};
 use crate::cli::exit::Exit;
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
 use serde_json::Value;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::os::fd::AsFd;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::spawn;
@@ -14,11 +17,17 @@ use std::time::Duration;
 /// The longest line of input, in bytes. The rest of a longer one is skipped.
 pub(crate) const LONGEST: usize = 1 << 20;
 
-/// Maximum number of requests that wait.
+/// Maximum number of requests that wait, and of those that overtake.
 const MOST_WAITING: usize = 64;
 
 /// Maximum number of lines that wait to be written.
 const MOST_UNREAD: usize = 1024;
+
+/// Maximum number of bytes of these lines; a single line may be longer.
+const MOST_UNREAD_BYTES: usize = 16 << 20;
+
+/// The longest text of an error, in bytes.
+const LONGEST_ERROR: usize = 64 << 10;
 
 /// What the session does next.
 pub(crate) enum SessionItem {
@@ -28,6 +37,12 @@ pub(crate) enum SessionItem {
     Cancelled(Value),
     /// The input has ended.
     End,
+}
+
+impl SessionItem {
+    const fn overtakes(&self) -> bool {
+        matches!(self, Self::Ask(_, request) if request.overtakes())
+    }
 }
 
 #[derive(Default)]
@@ -90,20 +105,23 @@ impl RequestReader {
         }
     }
 
-    /// Lets a request wait for its turn; `false` where too many wait already. `stop` and `cancel` overtake.
+    /// Lets a request wait for its turn; `false` where too many wait already. `stop` and `cancel` overtake, and break off even then.
     pub(crate) fn push(&self, id: Value, request: SessionRequest) -> bool {
         let mut state = self.lock();
         match &request {
-            SessionRequest::Stop { .. } => {
-                self.break_off(&mut state, None);
-                state.waiting.push_front(SessionItem::Ask(id, request));
-            }
-            SessionRequest::Cancel { of } => {
-                self.break_off(&mut state, of.as_ref());
-                state.waiting.push_front(SessionItem::Ask(id, request));
-            }
-            _ if state.waiting.len() >= MOST_WAITING => return false,
-            _ => state.waiting.push_back(SessionItem::Ask(id, request)),
+            SessionRequest::Stop { .. } => self.break_off(&mut state, None),
+            SessionRequest::Cancel { of } => self.break_off(&mut state, of.as_ref()),
+            _ => {}
+        }
+        let overtakes = request.overtakes();
+        let alike = |own: &&SessionItem| own.overtakes() == overtakes;
+        if state.waiting.iter().filter(alike).count() >= MOST_WAITING {
+            return false;
+        }
+        let item = SessionItem::Ask(id, request);
+        match overtakes {
+            true => state.waiting.push_front(item),
+            false => state.waiting.push_back(item),
         }
         self.state.1.notify_one();
         true
@@ -135,10 +153,7 @@ impl RequestReader {
         for item in &mut state.waiting {
             if let SessionItem::Ask(id, request) = item
                 && meant(id)
-                && !matches!(
-                    request,
-                    SessionRequest::Stop { .. } | SessionRequest::Cancel { .. }
-                )
+                && !request.overtakes()
             {
                 *item = SessionItem::Cancelled(id.clone());
             }
@@ -155,10 +170,7 @@ impl RequestReader {
         }
         let item = state.waiting.pop_front();
         if let Some(SessionItem::Ask(id, request)) = &item
-            && !matches!(
-                request,
-                SessionRequest::Stop { .. } | SessionRequest::Cancel { .. }
-            )
+            && !request.overtakes()
         {
             state.under_way = Some(id.clone());
         }
@@ -199,42 +211,83 @@ enum Unwritten {
     Mark(SyncSender<()>),
 }
 
+/// What is known of the client that reads.
+struct Client {
+    /// Bytes that it has not read yet, but for those that the operating system holds.
+    unread: AtomicUsize,
+    /// It reads nothing any more.
+    gone: AtomicBool,
+    /// Ends what is under way on the bus.
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Client {
+    /// It reads nothing any more: motors must not turn on for it.
+    fn is_lost(&self) {
+        self.gone.store(true, Ordering::Relaxed);
+        self.interrupt.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Lines that wait to be written.
 #[derive(Clone)]
 pub(crate) struct LineWriter {
     lines: SyncSender<Unwritten>,
-    stuck: Arc<AtomicBool>,
+    client: Arc<Client>,
 }
 
 impl LineWriter {
-    /// Writes lines to an output in a thread of its own. The second value is dropped by that thread when all is written.
+    /// Writes lines to an output in a thread of its own. The second value is dropped by that thread when all is written. `interrupt` is set
+    /// when the client reads nothing any more.
     pub(crate) fn write(
         mut output: impl Write + Send + 'static,
+        interrupt: Arc<AtomicBool>,
     ) -> (Self, std::thread::JoinHandle<()>) {
         let (lines, waiting) = sync_channel(MOST_UNREAD);
-        let stuck = Arc::<AtomicBool>::default();
-        let broken = Arc::clone(&stuck);
+        let client = Arc::new(Client {
+            unread: AtomicUsize::new(0),
+            gone: AtomicBool::new(false),
+            interrupt,
+        });
+        let own = Arc::clone(&client);
         let thread = spawn(move || {
-            for own in waiting {
-                let written = match own {
-                    Unwritten::Text(text) => output.write_all(text.as_bytes()),
+            for next in waiting {
+                let text: String = match next {
+                    Unwritten::Text(text) => text,
                     Unwritten::Mark(done) => {
                         let _nobody_waits_any_more = done.send(());
                         continue;
                     }
                 };
+                let written = output.write_all(text.as_bytes());
                 if written.and_then(|()| output.flush()).is_err() {
-                    broken.store(true, Ordering::Relaxed);
-                    return;
+                    return own.is_lost();
                 }
+                own.unread.fetch_sub(text.len(), Ordering::Relaxed);
             }
         });
-        (Self { lines, stuck }, thread)
+        (Self { lines, client }, thread)
+    }
+
+    /// Notices in a thread of its own that nothing reads the other end of a pipe or a socket any more.
+    pub(crate) fn watch(&self, output: impl AsFd + Send + 'static) {
+        let client = Arc::clone(&self.client);
+        spawn(move || {
+            // No event is asked for: errors and the end of the reader are always reported.
+            let mut watched = [PollFd::new(&output, PollFlags::empty())];
+            while let Err(Errno::INTR) = poll(&mut watched, None) {}
+            if watched[0]
+                .revents()
+                .intersects(PollFlags::ERR | PollFlags::HUP)
+            {
+                client.is_lost();
+            }
+        });
     }
 
     /// Whether the client reads nothing any more.
     pub(crate) fn is_stuck(&self) -> bool {
-        self.stuck.load(Ordering::Relaxed)
+        self.client.gone.load(Ordering::Relaxed)
     }
 
     /// Writes a line of JSON.
@@ -244,10 +297,15 @@ impl LineWriter {
         }
     }
 
-    /// Writes a text.
+    /// Writes a text. A client that leaves too much unread is lost.
     pub(crate) fn text(&self, text: impl Into<String>) {
-        let lost = self.lines.try_send(Unwritten::Text(text.into())).is_err();
-        self.stuck.fetch_or(lost, Ordering::Relaxed);
+        let text = text.into();
+        let length = text.len();
+        let unread = self.client.unread.fetch_add(length, Ordering::Relaxed);
+        let fits = unread == 0 || unread + length <= MOST_UNREAD_BYTES;
+        if !fits || self.lines.try_send(Unwritten::Text(text)).is_err() {
+            self.client.is_lost();
+        }
     }
 
     /// Waits until all is written, for at most a second.
@@ -260,12 +318,93 @@ impl LineWriter {
 
     /// Writes an error.
     pub(crate) fn error(&self, id: Value, exit: Exit, what: impl Into<String>) {
+        let what = shortened(what.into());
         self.put(&SessionLine::Error {
             id,
             error: SessionFault {
                 code: exit as u8,
-                what: what.into(),
+                what,
             },
         });
+    }
+}
+
+/// A text of an error, which may repeat what the client has sent.
+fn shortened(mut text: String) -> String {
+    if text.len() > LONGEST_ERROR {
+        let mut ends = (0..=LONGEST_ERROR).rev();
+        text.truncate(ends.find(|at| text.is_char_boundary(*at)).unwrap_or(0));
+        text.push_str(" ... (shortened)");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use std::sync::mpsc::channel;
+
+    /// Requests that overtake have a bound of their own: an ordinary one always finds room behind them, and the first of them is done.
+    #[test]
+    fn what_overtakes_is_bounded() {
+        let interrupt = Arc::<AtomicBool>::default();
+        let inbox = RequestReader::new(Arc::clone(&interrupt));
+        inbox.begin();
+        let stops =
+            (0..10_000).map(|id| inbox.push(json!(id), SessionRequest::Stop { drive: None }));
+        assert_eq!(stops.filter(|done| *done).count(), MOST_WAITING);
+        assert!(interrupt.load(Ordering::Relaxed));
+        let asked = (0..10_000).map(|id| inbox.push(json!(id), SessionRequest::Info {}));
+        assert_eq!(asked.filter(|done| *done).count(), MOST_WAITING);
+        // One that is refused breaks off all the same.
+        assert!(!inbox.push(json!(0), SessionRequest::Cancel { of: None }));
+        let mut next = std::iter::from_fn(|| inbox.next(Duration::ZERO));
+        assert!(next.by_ref().take(MOST_WAITING).all(|own| own.overtakes()));
+        let rest: Vec<_> = next.collect();
+        let cancelled = |own: &SessionItem| matches!(own, SessionItem::Cancelled(_));
+        assert_eq!(
+            (rest.len(), rest.iter().all(cancelled)),
+            (MOST_WAITING, true)
+        );
+    }
+
+    /// An output that takes nothing until its other end is dropped.
+    struct Blocked(std::sync::mpsc::Receiver<()>);
+
+    impl Write for Blocked {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            let _until_the_test_ends = self.0.recv();
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn what_is_unread_is_bounded() {
+        // In lines, in bytes, and a single line of any length.
+        for (length, most) in [(10, MOST_UNREAD + 1), (1 << 20, 16), (40 << 20, 1)] {
+            let (held, blocked) = channel();
+            let interrupt = Arc::<AtomicBool>::default();
+            let (out, _) = LineWriter::write(Blocked(blocked), Arc::clone(&interrupt));
+            let line = "x".repeat(length);
+            let taken = std::iter::repeat_with(|| out.text(line.as_str()));
+            let taken = taken.take_while(|()| !out.is_stuck()).count();
+            // The thread that writes may have taken one from the queue.
+            assert!((most - 1..=most).contains(&taken), "{length}: {taken}");
+            assert!(interrupt.load(Ordering::Relaxed), "{length}");
+            drop(held);
+        }
+    }
+
+    #[test]
+    fn a_long_error_is_shortened() {
+        assert_eq!(shortened("a".repeat(LONGEST_ERROR)).len(), LONGEST_ERROR);
+        let long = shortened("\u{e9}".repeat(LONGEST_ERROR));
+        assert!(long.ends_with("\u{e9} ... (shortened)"));
+        assert!(long.len() <= LONGEST_ERROR + 20);
     }
 }

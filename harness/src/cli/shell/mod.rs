@@ -60,15 +60,17 @@ fn for_program(arguments: &ShellArguments, output: &mut Output) -> std::io::Resu
     // Nothing else may write to standard output from now on: it becomes standard error for the rest of the program.
     let lines = File::from(rustix::io::dup(rustix::stdio::stdout())?);
     rustix::stdio::dup2_stdout(rustix::stdio::stderr())?;
-    let (out, writer) = LineWriter::write(lines);
+    let [ended, interrupt] = [interrupt_flag(), interrupt_flag()];
+    let watched = lines.try_clone()?;
+    let (out, writer) = LineWriter::write(lines, Arc::clone(&interrupt));
+    out.watch(watched);
     out.put(&SessionLine::Event(SessionEvent::Hello {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
         rig: arguments.rig.clone(),
     }));
     let mut told = Output::collecting();
-    let flags = [interrupt_flag(), interrupt_flag()];
-    let exit = serve(arguments, &out, &mut told, flags, |inbox| {
+    let exit = serve(arguments, &out, &mut told, [ended, interrupt], |inbox| {
         inbox.read(std::io::stdin(), out.clone());
         Asker::Program
     });
@@ -91,23 +93,26 @@ fn for_people(arguments: &ShellArguments) -> std::io::Result<Exit> {
         true => Some(LineEditor::new(&arguments.rig).map_err(std::io::Error::other)?),
         false => None,
     };
-    let ((out, writer), editor) = match editor {
-        Some((editor, printer)) => (LineWriter::write(printer), Some(editor)),
-        None => (LineWriter::write(std::io::stdout()), None),
-    };
-    let flags = [
+    let [ended, interrupt] = [
         interrupt_flag_without_ctrl_c(),
         interrupt_flag_without_ctrl_c(),
     ];
+    let own = Arc::clone(&interrupt);
+    let ((out, writer), editor) = match editor {
+        Some((editor, printer)) => (LineWriter::write(printer, own), Some(editor)),
+        None => (LineWriter::write(std::io::stdout(), own), None),
+    };
     let piped = editor.is_none();
     let mut told = people_output(&out, piped);
-    let exit = serve(arguments, &out, &mut told, flags, |inbox| Asker::People {
-        turn: match editor {
-            Some(editor) => editor.read(inbox.clone(), out.clone()),
-            None => read_pipe(std::io::BufReader::new(input), inbox.clone(), out.clone()),
-        },
-        piped,
-        awaited: true,
+    let exit = serve(arguments, &out, &mut told, [ended, interrupt], |inbox| {
+        Asker::People {
+            turn: match editor {
+                Some(editor) => editor.read(inbox.clone(), out.clone()),
+                None => read_pipe(std::io::BufReader::new(input), inbox.clone(), out.clone()),
+            },
+            piped,
+            awaited: true,
+        }
     });
     drop(told);
     finish(out, &writer);

@@ -126,6 +126,11 @@ pub(crate) enum SessionRequest {
 }
 
 impl SessionRequest {
+    /// Whether it is done in front of all that waits.
+    pub(crate) const fn overtakes(&self) -> bool {
+        matches!(self, Self::Stop { .. } | Self::Cancel { .. })
+    }
+
     /// The words of the command line that does it; `None` for what is no command.
     pub(crate) fn words(&self) -> Option<Vec<String>> {
         let all =

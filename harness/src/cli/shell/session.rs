@@ -159,11 +159,16 @@ impl HeldSession {
         }
     }
 
+    /// A signal has ended the session, or the loss of its client.
+    fn is_over(&self) -> bool {
+        self.ended.load(Ordering::Relaxed) || self.out.is_stuck()
+    }
+
     /// Ends the session where its link is lost; after a denial it goes on.
     fn in_trouble(&mut self, told: &mut Output) -> Option<Exit> {
         match self.bench.trouble()? {
             // Answered already, or the loop ends by itself.
-            Trouble::Interrupted if self.ended.load(Ordering::Relaxed) => return None,
+            Trouble::Interrupted if self.is_over() => return None,
             Trouble::Interrupted | Trouble::Denied(_) => {}
             trouble => {
                 told.complain(&trouble.to_string());
@@ -301,7 +306,7 @@ impl HeldSession {
     /// Does a request and tells people what came of it.
     fn tell(&mut self, request: &SessionRequest, output: &mut Output) -> Exit {
         let done = self.perform(request, output);
-        let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
+        let cancelled = self.inbox.done() && !self.is_over();
         if cancelled {
             self.interrupt.store(false, Ordering::Relaxed);
         }
@@ -320,7 +325,7 @@ impl HeldSession {
     fn answer(&mut self, id: Value, request: &SessionRequest) {
         let mut output = Output::collecting();
         let done = self.perform(request, &mut output);
-        let cancelled = self.inbox.done() && !self.ended.load(Ordering::Relaxed);
+        let cancelled = self.inbox.done() && !self.is_over();
         if cancelled {
             self.interrupt.store(false, Ordering::Relaxed);
         }
