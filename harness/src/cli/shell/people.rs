@@ -363,11 +363,18 @@ fn completions(rig: &str, front: &str, start: usize) -> Vec<Pair> {
         let fits = names().filter(|name| name.starts_with(current));
         return fits.map(pair).collect();
     }
+    let own = OWN.iter().any(|(own, ..)| *own == name);
+    // The program's commands of these names take something else, but for the scenario of `run`.
+    if own && (name != "run" || words.len() > 1) {
+        return Vec::new();
+    }
     // What the rig is decides which cells there are.
     words.splice(1..1, ["--rig".to_owned(), rig.to_owned()]);
     words.push(current.to_owned());
     let fits = fitting(&command(), &words).words;
-    fits.iter().map(|word| pair(word)).collect()
+    let is_settled = |word: &str| own && word.starts_with('-') || SETTLED.contains(&word);
+    let fits = fits.iter().filter(|word| !is_settled(word));
+    fits.map(|word| pair(word)).collect()
 }
 
 impl Hinter for Words {
@@ -473,6 +480,16 @@ mod tests {
             offered("sim:3", "run 9.7-parity-error-").contains(&"9.7-parity-error-idle".to_owned())
         );
         assert_eq!(offered("sim:3", "help wa"), ["watch", "wait"]);
+        // The shell's own commands are not those of the program, and take no options.
+        for (name, ..) in OWN {
+            assert_eq!(offered("sim:3", &format!("{name} --")), [""; 0], "{name}");
+        }
+        for front in ["capture ", "wait ", "run 9.7-parity-error 9"] {
+            assert_eq!(offered("sim:3", front), [""; 0], "{front}");
+        }
+        let options = offered("sim:3", "watch 0 nist --");
+        assert!(options.contains(&"--every".to_owned()), "{options:?}");
+        assert!(!options.contains(&"--rig".to_owned()), "{options:?}");
     }
 
     #[test]
