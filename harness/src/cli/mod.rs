@@ -37,6 +37,7 @@ mod schema;
 pub(crate) mod shell;
 pub(crate) mod shrink;
 mod tally;
+pub(crate) mod top_line;
 pub(crate) mod top_page;
 mod trace;
 mod verify;

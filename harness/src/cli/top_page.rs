@@ -2,10 +2,7 @@
 
 use super::failure::Failure;
 use crate::buses::commands::TopArguments;
-use crate::capture::{Piece, Tape};
-use crate::cli::shell::HeldRecord;
-use crate::rig::port_session::{PortDrives, PortSession};
-use crate::web::{LiveNews, LivePage, LivePicture, LiveRow, LiveScene, MAX_ROWS};
+use crate::web::{LiveNews, LivePage, LivePicture, LiveScene, MAX_ROWS};
 use std::time::{Duration, Instant};
 
 /// Why it takes no orders.
@@ -14,16 +11,6 @@ const READ_ONLY: &str = "This page only looks on: `top` reads drives, and a page
 
 /// How often a page gets news at most.
 const EVERY: Duration = Duration::from_millis(250);
-
-/// What the port of a bench has carried since the last call.
-pub(crate) fn heard<D: PortDrives>(session: &mut PortSession<D>) -> Vec<Piece> {
-    let record = HeldRecord::of(session.guarded(), 1);
-    if let Some(ports) = session.link().inner_mut().ports_mut() {
-        ports.forget_record();
-    }
-    let tape = Tape::of_ports(&record.traces, record.medium, record.now);
-    tape.pieces.into_iter().map(|(.., piece)| piece).collect()
-}
 
 /// The page of a bench in use.
 pub(crate) struct TopPage {
@@ -34,7 +21,7 @@ pub(crate) struct TopPage {
 }
 
 impl TopPage {
-    /// Serves the page that `--web` asks for, if it does. Its tables have these heads; it has a picture where the bus is heard.
+    /// Serves the page that `--web` asks for, if it does. Its tables have these heads.
     ///
     /// # Errors
     /// [`Failure`]: the address is not free, or other machines could reach it.
@@ -42,7 +29,7 @@ impl TopPage {
         arguments: &TopArguments,
         title: String,
         (stations, traffic): (&[&'static str], &[&'static str]),
-        picture: Option<LivePicture>,
+        picture: LivePicture,
     ) -> Result<Option<Self>, Failure> {
         let Some(place) = &arguments.web else {
             return Ok(None);
@@ -51,7 +38,7 @@ impl TopPage {
             title,
             stations: stations.to_vec(),
             traffic: traffic.to_vec(),
-            picture,
+            picture: Some(picture),
             read_only: Some(READ_ONLY.to_owned()),
             ..LiveScene::default()
         };
@@ -85,23 +72,6 @@ impl TopPage {
     /// Whether news are due.
     pub(crate) fn is_due(&self) -> bool {
         self.last.is_none_or(|last| last.elapsed() >= EVERY)
-    }
-
-    /// Shows the rows of the table, and those of the picture of what the port has carried since the last call.
-    pub(crate) fn show_port<const N: usize>(
-        &mut self,
-        stations: &[[String; N]],
-        mut rows: Vec<LiveRow>,
-    ) {
-        if self.last.is_none() {
-            // These are from before the page was opened.
-            rows.clear();
-        }
-        self.show(LiveNews {
-            stations: stations.iter().map(|row| row.to_vec()).collect(),
-            rows,
-            ..LiveNews::default()
-        });
     }
 
     /// Shows what was read, and the newest rows of the picture.

@@ -16,6 +16,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// How far ahead a [kept](Line::keep) line is filled. A computer that stands still for half of this time leaves no gap.
 const KEPT: Span = Span::from_millis(40);
 
+/// Why a conversation on simulated drives ends that is recorded.
+const RECORD_FULL: &str = "it exchanges more than a capture can hold of one request: ask for less at a time, or end the capture first";
+
 /// A line or a link that sends nothing that the [gates](Gate) of its ports deny. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
 #[derive(Debug)]
@@ -39,6 +42,8 @@ pub struct Guarded<L> {
     faulty: bool,
     /// Whether the lines are [kept](Line::keep).
     keeps: bool,
+    /// How much the link behind the guard may have carried, and how that is counted; `None` where its record needs no limit.
+    most_carried: Option<(u64, fn(&L) -> u64)>,
 }
 
 impl<L: Line> Guarded<L> {
@@ -57,6 +62,7 @@ impl<L: Line> Guarded<L> {
             interrupt: Arc::default(),
             faulty: false,
             keeps: false,
+            most_carried: None,
         }
     }
 
@@ -306,6 +312,12 @@ impl<L: Line> Line for Guarded<L> {
         if self.interrupt.load(Ordering::Relaxed) && self.trouble.is_none() {
             self.trouble = Some(Trouble::Interrupted);
         }
+        if let Some((most, carried)) = self.most_carried
+            && self.trouble.is_none()
+            && carried(&self.inner) > most
+        {
+            self.trouble = Some(Trouble::Denied(RECORD_FULL.to_owned()));
+        }
         self.trouble != Some(Trouble::Interrupted) && self.inner.wait(until)
     }
 
@@ -348,6 +360,16 @@ impl<L: Line> Line for Guarded<L> {
             }
         }
         Some(now + Span::from_nanos(ahead.as_nanos() / 2))
+    }
+}
+
+impl<L: Link> Guarded<L> {
+    /// Ends the conversation in [trouble](Trouble::Denied) when the link has carried this many more pieces: its record has no bound of its
+    /// own.
+    pub(crate) fn limit_record(&mut self, most: Option<u64>) {
+        let now = self.inner.carried();
+        self.most_carried =
+            most.map(|most| (now.saturating_add(most), L::carried as fn(&L) -> u64));
     }
 }
 
@@ -427,6 +449,10 @@ impl<L: Link> Link for Guarded<L> {
 
     fn unused_faults(&self) -> Vec<String> {
         self.inner.unused_faults()
+    }
+
+    fn record(&mut self, on: bool) {
+        self.inner.record(on);
     }
 
     fn carried(&self) -> u64 {

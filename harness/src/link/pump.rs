@@ -246,7 +246,7 @@ impl<A: Accounting> Pump<A> {
         self.inner.iter_mut().for_each(InnerLink::begin);
     }
 
-    /// As [`PortLink::forget_record`](super::PortLink::forget_record).
+    /// As [`Link::record`](super::Link::record).
     pub(crate) fn forget_record(&mut self) {
         for port in &mut self.ports {
             port.log = [Vec::new(), Vec::new()];

@@ -132,6 +132,10 @@ impl Link for Ends {
         each!(self, link => link.unused_faults())
     }
 
+    fn record(&mut self, on: bool) {
+        each!(self, link => link.record(on));
+    }
+
     fn carried(&self) -> u64 {
         each!(self, link => link.carried())
     }

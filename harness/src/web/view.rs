@@ -91,6 +91,17 @@ pub struct LiveRow {
 }
 
 impl LiveRow {
+    /// The column of the station that sends, in a row of a shared line.
+    pub(crate) fn sender(&self) -> Option<usize> {
+        let sender = self.cells.iter().find(|own| own.2 == ARROWS[0].0);
+        sender.map(|own| own.0)
+    }
+
+    /// Whether no receiver has what a row of a shared line shows, or not as it was sent.
+    pub(crate) fn is_damaged(&self) -> bool {
+        self.cells.iter().any(|own| own.2 == ARROWS[2].0)
+    }
+
     /// A row of a shared line: what one station sends goes to another, or to all where `to` is `None`. There are `columns` stations.
     pub(crate) fn arrow(
         columns: usize,

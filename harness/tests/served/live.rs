@@ -246,17 +246,45 @@ fn terminate(child: &Child) {
     assert!(ended.expect("kill").success());
 }
 
-/// `top --web` shows the table of `top`, and takes no order; a signal ends it.
+/// `top --web` of simulated drives shows the table of `top`, the traffic and the picture, and takes no order; a signal ends it.
 #[test]
 fn the_page_of_a_bench_in_use_only_looks_on() {
-    for (rig, shown) in [
-        ("sim:2", "\"ring 1\""),
-        ("sim:unitek:2", "\"stations\":[[\"1\","),
-        ("sim:nordac", "\"stations\":[[\"8\","),
+    let file = "schema = 1\n[rig]\nid = \"live\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n";
+    let ring = [
+        "\"stations\":[[\"0\",",
+        "\"traffic\":[[\"ring 1\",",
+        "[0,\"FD\",\"d\"],[1,\"C1\",\"d\"]",
+    ];
+    for (rig, columns, shown) in [
+        ("sim:2", r#"["master->1","1->0","0->master"]"#, ring),
+        ("live.toml", r#"["master->1","1->0","0->master"]"#, ring),
+        (
+            "sim:unitek:2",
+            r#"["bench","drive 1","drive 2"]"#,
+            [
+                "\"stations\":[[\"1\",",
+                "\"traffic\":[[\"bench\",\"22\",",
+                "30 SPEED_ACTUAL = ",
+            ],
+        ),
+        (
+            "sim:nordac",
+            r#"["bench","slave 8"]"#,
+            [
+                "\"stations\":[[\"8\",",
+                "[\"slave 8\",\"",
+                "1813 Frequency = ",
+            ],
+        ),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("live.toml"), file).expect("room");
         let (mut child, page) = top(rig, folder.path());
-        page.events().until(shown);
+        let (mut events, scene) = page.opened();
+        assert!(scene.contains(&format!("\"columns\":{columns}")), "{scene}");
+        for words in shown {
+            events.until(words);
+        }
         let (status, said) = page.post("/fault", r#"{"place":0,"fault":0}"#);
         assert_eq!(status, "403", "{rig}");
         assert!(said.starts_with("This page only looks on"), "{said}");

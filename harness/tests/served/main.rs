@@ -32,6 +32,7 @@ mod scenarios;
 mod ser2net;
 mod serve;
 mod session;
+mod session_capture;
 mod session_hostile;
 mod shell;
 mod top;

@@ -46,7 +46,7 @@ impl Session {
         input.write_all(b"\n").expect("a reader");
     }
 
-    fn next(&mut self) -> Value {
+    pub(crate) fn next(&mut self) -> Value {
         let line = self.lines.next().expect("a line").expect("text");
         serde_json::from_str(&line).expect("JSON")
     }
@@ -64,6 +64,14 @@ impl Session {
     pub(crate) fn ask(&mut self, request: &Value) -> Value {
         self.send(request.to_string().as_bytes());
         self.answer()
+    }
+
+    /// The most memory that the program has taken so far, in KiB; `None` when it has ended.
+    pub(crate) fn peak(&self) -> Option<u64> {
+        let path = format!("/proc/{}/status", self.child.id());
+        let text = std::fs::read_to_string(path).ok()?;
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+        line.trim().strip_suffix(" kB")?.parse().ok()
     }
 
     /// Ends the input; returns the last line and how the program ended.

@@ -15,14 +15,6 @@ fn desk() -> Desk {
     Desk::new("drives = 3\ntransport = \"sim\"\n")
 }
 
-/// The most memory that the program has taken so far, in KiB; `None` when it has ended.
-fn peak(session: &Session) -> Option<u64> {
-    let path = format!("/proc/{}/status", session.child.id());
-    let text = std::fs::read_to_string(path).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix(" kB")?.parse().ok()
-}
-
 /// What a session on a ring of two drives says at its end, where the motor of one turned.
 #[track_caller]
 fn ended_safe(output: &Output) {
@@ -35,7 +27,7 @@ fn ended_safe(output: &Output) {
 fn lines_of_nonsense() {
     let desk = desk();
     let mut session = Session::open(&desk, &["--rig", "sim:3"]);
-    let before = peak(&session).expect("a process");
+    let before = session.peak().expect("a process");
     let mut random = 1_u32;
     let noise = std::iter::repeat_with(|| {
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -74,7 +66,7 @@ fn lines_of_nonsense() {
         let info = session.ask(&json!({"id": "next", "do": "info"}));
         assert_eq!(info["id"], "next", "{start}: {info}");
     }
-    let more = peak(&session).expect("a process") - before;
+    let more = session.peak().expect("a process") - before;
     assert!(more < MORE, "{more} KiB more");
     let (last, output) = session.end();
     assert_eq!(last["code"], 0, "{last}");
@@ -110,12 +102,12 @@ fn a_client_that_reads_nothing() {
     for line in [short, long] {
         let desk = desk();
         let mut session = Session::open(&desk, &["--rig", "sim:3"]);
-        let before = peak(&session).expect("a process");
+        let before = session.peak().expect("a process");
         let mut last = before;
         let mut input = session.input.take().expect("open");
         for sent in 0.. {
             assert!(sent < 1_000_000, "the session never ends");
-            last = peak(&session).unwrap_or(last);
+            last = session.peak().unwrap_or(last);
             if writeln!(input, "{line}").is_err() {
                 break;
             }

@@ -134,7 +134,7 @@ impl Group {
     }
 
     /// How many bytes have reached the end of link `place` up to `now`.
-    fn arrived(&self, place: usize, now: Instant) -> usize {
+    pub(crate) fn arrived(&self, place: usize, now: Instant) -> usize {
         let home = now + self.way_home(place);
         // Most often all of them or those of the last byte times.
         self.dropped + self.entries.partition_point(|entry| entry.home <= home)

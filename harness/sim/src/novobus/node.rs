@@ -71,7 +71,14 @@ impl<D: Device> Node<D> {
     }
 
     pub(crate) fn stop_recording(&mut self) {
+        self.remarks = Vec::new();
         self.recording = false;
+    }
+
+    /// Forgets its remarks, and records those that come.
+    pub(crate) fn record_anew(&mut self) {
+        self.remarks.clear();
+        self.recording = true;
     }
 
     /// Resets the node around a reset device, but keeps whether it records.

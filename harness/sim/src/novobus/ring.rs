@@ -194,6 +194,13 @@ impl<D: Device> Ring<D> {
         self.nodes.iter_mut().for_each(Node::stop_recording);
     }
 
+    /// Forgets what was recorded, and records bytes and marks from now on.
+    pub fn record_anew(&mut self) {
+        self.end_groups(|_| true);
+        self.links.iter_mut().for_each(Link::record_anew);
+        self.nodes.iter_mut().for_each(Node::record_anew);
+    }
+
     /// Records what link `link` carries from now on, for [`Self::take_record`]: a tap.
     pub fn record_link(&mut self, link: usize) {
         self.free_link(link);
@@ -511,6 +518,15 @@ impl<D: Device> Ring<D> {
             self.links[0].transmit(start, byte, true);
             self.outbox.pop_front();
         }
+    }
+
+    /// How many bytes have come to the end of link `link` since the conversation began; 0 where the ring has no such link.
+    #[must_use]
+    pub fn arrived(&self, link: usize) -> u64 {
+        let inside = |group: &&Group| group.places().skip(1).any(|place| place == link);
+        let group = self.groups.iter().find(inside);
+        let grouped = group.map_or(0, |group| group.arrived(link, self.now) as u64);
+        self.links.get(link).map_or(0, Link::arrived) + grouped
     }
 
     /// How many bytes all links together have carried.

@@ -419,6 +419,13 @@ impl Link for Bench {
         placed.chain(scheduled).collect()
     }
 
+    fn record(&mut self, on: bool) {
+        match on {
+            true => self.line.record_anew(),
+            false => self.line.keep_no_record(),
+        }
+    }
+
     fn carried(&self) -> u64 {
         self.line.octets()
     }

@@ -240,14 +240,6 @@ impl PortLink for SegmentLink {
     fn inner_links(&self) -> &[InnerLink] {
         &[]
     }
-
-    fn forget_record(&mut self) {
-        self.pump.forget_record();
-        // Who is asked now sends what still comes.
-        let last = self.asked.pop();
-        self.asked.clear();
-        self.asked.extend(last);
-    }
 }
 
 impl Link for SegmentLink {
@@ -279,6 +271,14 @@ impl Link for SegmentLink {
 
     fn unused_faults(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    fn record(&mut self, _on: bool) {
+        self.pump.forget_record();
+        // Who is asked now sends what still comes.
+        let last = self.asked.pop();
+        self.asked.clear();
+        self.asked.extend(last);
     }
 
     fn carried(&self) -> u64 {

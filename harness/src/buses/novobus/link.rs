@@ -69,11 +69,7 @@ impl SimulatedLink {
     /// Keeps no record of what the links carry from now on: for a driver, which may be at work for hours.
     /// Received bytes are received all the same, there is no trace of them.
     pub fn stop_recording(&mut self) {
-        for ring in 0..self.bench.rings().len() {
-            if let Some(ring) = self.bench.ring_mut(ring) {
-                ring.stop_recording();
-            }
-        }
+        self.record(false);
     }
 
     /// Adds a [witness](harness_sim::novobus::witness) to every drive, before anything is sent. Returns false if a drive is not a whole ND21
@@ -412,6 +408,16 @@ impl Link for SimulatedLink {
         unused
     }
 
+    fn record(&mut self, on: bool) {
+        for ring in 0..self.bench.rings().len() {
+            match self.bench.ring_mut(ring) {
+                Some(ring) if on => ring.record_anew(),
+                Some(ring) => ring.stop_recording(),
+                None => {}
+            }
+        }
+    }
+
     fn carried(&self) -> u64 {
         self.bench.rings().iter().map(Ring::carried).sum()
     }
@@ -438,6 +444,10 @@ pub trait BesideTheBus {
 
     /// A drive's cell; `None` where this cannot be seen.
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;
+
+    /// How many bytes have come to the end of a link since the conversation began, counted from the master's outgoing one; `None` where
+    /// this cannot be seen.
+    fn arrived(&self, ring: usize, link: usize) -> Option<u64>;
 }
 
 impl<L: Link + ?Sized> BesideTheBus for L {
@@ -461,6 +471,10 @@ impl<L: Link + ?Sized> BesideTheBus for L {
 
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
         Some(simulation(self)?.ring(ring)?.drive(drive)?.peek(address))
+    }
+
+    fn arrived(&self, ring: usize, link: usize) -> Option<u64> {
+        Some(simulation(self)?.ring(ring)?.arrived(link))
     }
 }
 

@@ -201,10 +201,6 @@ impl PortLink for StreamLink {
     fn inner_links(&self) -> &[InnerLink] {
         &self.pump.inner
     }
-
-    fn forget_record(&mut self) {
-        self.pump.forget_record();
-    }
 }
 
 impl Link for StreamLink {
@@ -261,6 +257,10 @@ impl Link for StreamLink {
             unused.extend(faults.map(|(byte, fault)| format!("{place} byte {byte}: {fault}")));
         }
         unused
+    }
+
+    fn record(&mut self, _on: bool) {
+        self.pump.forget_record();
     }
 
     fn carried(&self) -> u64 {

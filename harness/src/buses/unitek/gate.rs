@@ -205,6 +205,7 @@ mod tests {
     use super::*;
     use crate::buses::unitek::simulate::{Bench, Setup};
     use crate::link::Trouble;
+    use harness_proto::time::Span;
     use harness_proto::unitek::frame::Request;
     use harness_proto::unitek::properties::Dlc4;
     use proptest::prelude::*;
@@ -307,5 +308,32 @@ mod tests {
                 prop_assert_eq!((drive.register(0x31), drive.register(0x90)), (0, 0));
             }
         }
+    }
+
+    /// A record without a bound of its own ends the conversation; a new limit lets it go on.
+    #[test]
+    fn a_record_can_be_limited() {
+        let wait = |line: &mut Guarded<Bench>| {
+            let until = line.now() + Span::from_millis(5);
+            while line.now() < until {
+                line.wait(until);
+            }
+        };
+        let mut line = bench(Limits::default());
+        line.limit_record(Some(4));
+        // Two requests and their replies.
+        for _ in 0..2 {
+            assert_eq!(send(&mut line, "201#3D3000"), None);
+            wait(&mut line);
+        }
+        assert_eq!((line.carried(), line.trouble()), (4, None));
+        assert_eq!(send(&mut line, "201#3D3000"), None);
+        wait(&mut line);
+        assert!(matches!(line.trouble(), Some(Trouble::Denied(_))));
+        line.reset_after_denial();
+        line.record(true);
+        line.limit_record(Some(4));
+        wait(&mut line);
+        assert_eq!((line.carried(), line.trouble()), (0, None));
     }
 }

@@ -355,6 +355,13 @@ impl Link for Bench {
         placed.chain(scheduled).collect()
     }
 
+    fn record(&mut self, on: bool) {
+        match on {
+            true => self.segment.record_anew(),
+            false => self.segment.keep_no_record(),
+        }
+    }
+
     fn carried(&self) -> u64 {
         self.segment.record().len() as u64
     }

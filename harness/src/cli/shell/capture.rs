@@ -1,24 +1,25 @@
 //! What a session exchanges from a request on, as a capture in pcapng.
 
 use super::HeldBench;
-use crate::capture::{LiveRecorder, Piece, RecordedPlace, Tape};
+use crate::capture::{LiveRecorder, Piece, Tape};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::guard::Guarded;
 use crate::link::{Line, Link};
 use crate::medium::Medium;
-use crate::regular;
+use crate::regular::is_wrong_path;
 use crate::rig::Ends;
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use serde_json::{Value, json};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// What a held bench has recorded of its bus.
 pub(crate) struct HeldRecord {
-    /// Everything since its link began, or since it was told to forget.
+    /// Everything since its link began, or since it was told to record anew.
     pub(crate) traces: Vec<Trace>,
     /// What its ports carry.
     pub(crate) medium: Medium,
@@ -40,19 +41,28 @@ impl HeldRecord {
     }
 }
 
-/// A capture that is under way.
+/// How many bytes or frames of simulated drives a capture holds of one request at most: about as many as the record of a port.
+const MOST: u64 = 4_000_000;
+
+/// How many packets are written at a time.
+const AT_ONCE: usize = 10_000;
+
+/// A capture that is under way. Its file grows with it.
 pub(super) struct SessionCapture {
     path: PathBuf,
-    places: Vec<RecordedPlace>,
-    /// What was taken from the bench so far, each piece with the number of its place.
-    pieces: Vec<(usize, Piece)>,
+    file: File,
+    recorder: LiveRecorder<File>,
+    /// How many packets the file holds.
+    packets: u64,
+    /// Why nothing more is written.
+    broken: Option<String>,
     /// The link's time up to which its record was taken, and how much it had carried then.
     taken: (Instant, u64),
     /// How long the capture lasts until then.
     lasted: Span,
     /// When it began, since 1970; the time of simulated drives counts from 0.
     began: Span,
-    /// How many bytes, telegrams or frames a full record of the link has not kept; `None` in virtual time, whose record has no bound.
+    /// How many bytes, telegrams or frames a full record of the link has not kept; `None` in virtual time, where a request ends before.
     lost: Option<u64>,
 }
 
@@ -60,7 +70,7 @@ impl SessionCapture {
     /// Begins a capture.
     ///
     /// # Errors
-    /// The file is there already, or its folder is not.
+    /// The file is there already, its folder is not, or it cannot be written.
     pub(super) fn begin(
         path: &str,
         bench: &mut dyn HeldBench,
@@ -75,14 +85,22 @@ impl SessionCapture {
                 path.display()
             )));
         }
+        bench.record_anew(Some(MOST));
         let record = bench.record()?;
-        bench.forget();
+        let places = Tape::of_ports(&record.traces, record.medium, record.now).places;
+        let opened = File::create_new(&path).and_then(|file| {
+            let recorder = LiveRecorder::start(file.try_clone()?, &places)?;
+            Ok((file, recorder))
+        });
+        let (file, recorder) = opened.map_err(|error| unwritten(&path, &error))?;
         let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let wall = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or_default();
         let mut own = Self {
             path,
-            places: Vec::new(),
-            pieces: Vec::new(),
+            file,
+            recorder,
+            packets: 0,
+            broken: None,
             taken: (record.now, record.carried),
             lasted: Span::ZERO,
             began: match simulated {
@@ -95,18 +113,18 @@ impl SessionCapture {
             // A computer that stands still reads late and repeats requests, which no line would show.
             own.note_loss(
                 "the line's own times are lost: these are of the bench, which sends and reads; a tap accuses drives",
-            );
+            )?;
         }
         Ok(own)
     }
 
-    /// Takes what the bench has recorded since the last call. Afterwards its link may begin again.
+    /// Writes what the bench has recorded since the last call. Afterwards its link may begin again.
     ///
     /// # Errors
-    /// [`Failure`]: the bench has been given back.
+    /// [`Failure`]: the bench has been given back, or the file cannot be written; it stays as it is then.
     pub(super) fn collect(&mut self, bench: &mut dyn HeldBench) -> Result<(), Failure> {
         let mut record = bench.record()?;
-        bench.forget();
+        bench.record_anew(Some(MOST));
         let (from, carried) = self.taken;
         for trace in &mut record.traces {
             trace.count_from(from.since_start());
@@ -120,10 +138,6 @@ impl SessionCapture {
                 Tape::of(&record.traces, rate)
             }
         };
-        let behind = self.began + self.lasted;
-        let new = tape.pieces.iter().filter(|own| own.0 > Instant::START);
-        self.pieces
-            .extend(new.map(|(_, place, piece)| (*place, piece.later(behind))));
         let mut missing = 0;
         if let Some(lost) = &mut self.lost {
             missing = record
@@ -131,16 +145,24 @@ impl SessionCapture {
                 .saturating_sub(carried + recorded(&record.traces));
             *lost += missing;
         }
-        // The bit rate of a bus shows in what it carries.
-        self.places = tape.places;
+        drop(record.traces);
+        let behind = self.began + self.lasted;
+        let new = tape.pieces.iter().filter(|own| own.0 > Instant::START);
+        let written = self.write(new.map(|(_, place, piece)| (*place, piece.later(behind))));
         self.lasted = self.lasted + lasts;
-        self.taken = (record.now, record.carried);
+        self.taken = (record.now, bench.record()?.carried);
+        written?;
         if missing > 0 {
             self.note_loss(&format!(
                 "{missing} bytes or frames lost: the record was full"
-            ));
+            ))?;
         }
         Ok(())
+    }
+
+    /// Whether the file takes nothing more.
+    pub(super) const fn is_broken(&self) -> bool {
+        self.broken.is_some()
     }
 
     /// Takes notice that the bench's link has perhaps restarted since [`collect`](Self::collect): its time is `now`.
@@ -153,48 +175,72 @@ impl SessionCapture {
     /// Leaves out what the bench has exchanged since [`collect`](Self::collect), and marks the place.
     ///
     /// # Errors
-    /// [`Failure`]: the bench has been given back.
+    /// As of [`collect`](Self::collect).
     pub(super) fn leave_out(
         &mut self,
         what: &str,
         bench: &mut dyn HeldBench,
     ) -> Result<(), Failure> {
+        bench.record_anew(Some(MOST));
         let record = bench.record()?;
-        bench.forget();
         self.taken = (record.now, record.carried);
-        self.note_loss(&format!("{what} is lost: a session captures no scenario"));
-        Ok(())
+        self.note_loss(&format!("{what} is lost: a session captures no scenario"))
     }
 
     /// Marks that something is missing here. Words with `lost: ` keep `import` from blaming a drive.
-    fn note_loss(&mut self, words: &str) {
+    fn note_loss(&mut self, words: &str) -> Result<(), Failure> {
         let at = (self.began + self.lasted).as_nanos();
-        self.pieces.push((0, Piece::Event(at, words.to_owned())));
+        self.write(std::iter::once((0, Piece::Event(at, words.to_owned()))))
     }
 
-    /// Writes the file; returns what it holds.
+    /// Writes pieces. After the first failure nothing more is written: what stands in the file is whole.
+    fn write(&mut self, pieces: impl Iterator<Item = (usize, Piece)>) -> Result<(), Failure> {
+        if let Some(why) = &self.broken {
+            return Err(Failure::Said(Exit::RigError, why.clone()));
+        }
+        let recorder = &mut self.recorder;
+        let mut count = 0;
+        let mut put = |(place, piece): (usize, Piece)| {
+            recorder.piece(place, &piece)?;
+            count += 1;
+            match count % AT_ONCE {
+                0 => recorder.flush(),
+                _ => Ok(()),
+            }
+        };
+        let mut pieces = pieces;
+        let written = pieces.try_for_each(&mut put);
+        let written = written.and_then(|()| recorder.flush());
+        if let Err(error) = written {
+            let _as_it_is = self.file.set_len(recorder.written());
+            let failure = unwritten(&self.path, &error);
+            self.broken = Some(format!("failed to write {}: {error}", self.path.display()));
+            return Err(failure);
+        }
+        self.packets += count as u64;
+        Ok(())
+    }
+
+    /// What the file holds.
     ///
     /// # Errors
-    /// It cannot be written, or another program has written it meanwhile.
-    pub(super) fn write(&self) -> Result<Value, Failure> {
-        refuse_existing(&self.path)?;
-        let written = regular::write(&self.path, |out| {
-            let mut recorder = LiveRecorder::start(out, &self.places)?;
-            for (place, piece) in &self.pieces {
-                recorder.piece(*place, piece)?;
-            }
-            recorder.flush()
-        });
-        written.map_err(|error| {
-            Failure::Said(
-                Exit::RigError,
-                format!("failed to write {}: {error}", self.path.display()),
-            )
-        })?;
-        Ok(json!({
-            "path": self.path, "packets": self.pieces.len(), "took_ms": self.lasted.as_millis_f64(), "lost": self.lost.unwrap_or_default(),
-        }))
+    /// Something could not be written.
+    pub(super) fn end(self) -> Result<Value, Failure> {
+        match self.broken {
+            Some(why) => Err(Failure::Said(Exit::RigError, why)),
+            None => Ok(json!({
+                "path": self.path, "packets": self.packets, "took_ms": self.lasted.as_millis_f64(), "lost": self.lost.unwrap_or_default(),
+            })),
+        }
     }
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
+    let exit = match is_wrong_path(error) {
+        true => Exit::Usage,
+        false => Exit::RigError,
+    };
+    Failure::Said(exit, format!("failed to write {}: {error}", path.display()))
 }
 
 /// How many octets or frames these are.

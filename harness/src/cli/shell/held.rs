@@ -5,12 +5,14 @@ use crate::buses::commands::DriveCommand;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::guard::Guarded;
 use crate::library::Entry;
-use crate::link::{Line, Trouble};
+use crate::link::{Line, Link, Trouble};
+use crate::medium::Medium;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::segment::SegmentRun;
 use crate::rig::segment::run::{PortPlayer, PortRun};
-use crate::rig::{End, Options, Played, Rig, SessionError};
+use crate::rig::{End, Ends, Options, Played, Rig, SessionError};
 use harness_proto::time::Span;
 
 /// A bench that stays open between requests.
@@ -57,8 +59,12 @@ pub(crate) trait HeldBench {
     /// [`Failure`]: the bench has been given back.
     fn record(&mut self) -> Result<HeldRecord, Failure>;
 
-    /// Forgets the record at ports, which has a bound. Simulated drives keep theirs.
-    fn forget(&mut self);
+    /// Forgets what is recorded of the bus. Simulated drives record what comes if `most` says how many pieces at most, or nothing where it is
+    /// `None`; ports always record, within their bound.
+    fn record_anew(&mut self, most: Option<u64>);
+
+    /// Whether no telegram is under way on a shared line, so that its record does not end in the middle of one.
+    fn is_between_telegrams(&self) -> bool;
 
     /// What happened on the bus that no answer reports, since the last call.
     fn events(&mut self) -> Vec<String>;
@@ -77,6 +83,13 @@ pub(crate) trait HeldBench {
 
     /// Takes the drives to their safe state and gives the bench back.
     fn end(self: Box<Self>, error: bool) -> End;
+}
+
+/// As [`HeldBench::record_anew`].
+pub(crate) fn record_anew(link: &mut Guarded<Ends>, most: Option<u64>) {
+    let simulated = link.inner().ports().is_none();
+    link.record(most.is_some());
+    link.limit_record(most.filter(|_| simulated));
 }
 
 /// What a session asks of the drives of a port.
@@ -184,10 +197,13 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         Ok(HeldRecord::of(self.0.session().guarded(), 1))
     }
 
-    fn forget(&mut self) {
-        if let Some(ports) = self.session().link().inner_mut().ports_mut() {
-            ports.forget_record();
-        }
+    fn record_anew(&mut self, most: Option<u64>) {
+        record_anew(self.session().link(), most);
+    }
+
+    fn is_between_telegrams(&self) -> bool {
+        let link = self.0.session().guarded();
+        matches!(link.medium(0), Medium::Frames(_)) || !link.busy()
     }
 
     fn events(&mut self) -> Vec<String> {

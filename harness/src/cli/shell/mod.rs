@@ -9,7 +9,7 @@ mod request;
 mod session;
 
 pub(crate) use capture::HeldRecord;
-pub(crate) use held::{HeldBench, HeldDrives, HeldPort};
+pub(crate) use held::{HeldBench, HeldDrives, HeldPort, record_anew};
 pub(crate) use request::schema;
 
 use super::args::{ColourWhen, ShowProgress};
@@ -206,6 +206,7 @@ fn serve(
         ended,
         interrupt,
     };
+    session.bench.record_anew(None);
     session.happened(ready);
     let exit = match opened {
         true => session.work(told),

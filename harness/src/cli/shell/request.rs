@@ -97,12 +97,12 @@ pub(crate) enum SessionRequest {
         /// The line.
         line: String,
     },
-    /// Captures what is exchanged from now on.
+    /// Captures what is exchanged from now on. The file grows with it.
     Capture {
         /// The file in pcapng; it must not be there yet.
         path: String,
     },
-    /// Ends the capture and writes its file; so does the end of the session.
+    /// Ends the capture; so does the end of the session.
     CaptureEnd {},
     /// Ends the request under way, and takes those back that wait; with `of` only that one. Overtakes.
     Cancel {

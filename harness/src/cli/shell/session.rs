@@ -62,7 +62,10 @@ const MOST_IN_PROMPT: usize = 8;
 /// A drive that turns no faster than this stands, in the unit of its speed.
 const STANDS: f64 = 0.5;
 
-/// The longest wait that a request may ask for.
+/// The longest part of a wait that is captured on simulated drives, in milliseconds.
+const PART: u32 = 1_000;
+
+/// The longest wait that a request may ask for, in milliseconds.
 const LONGEST_WAIT: u32 = 60_000;
 
 /// Who asks, and how answers are written.
@@ -150,6 +153,7 @@ impl HeldSession {
                     }
                 }
             }
+            self.write_capture();
             for what in self.bench.events() {
                 self.happened(SessionEvent::Bus { what });
             }
@@ -192,11 +196,47 @@ impl HeldSession {
         Ok(())
     }
 
-    /// Ends the capture, if there is one, and writes its file.
+    /// Writes what a capture of simulated drives has recorded: their record grows fast. That of a port has a bound, and can end in the
+    /// middle of a telegram.
+    fn write_capture(&mut self) {
+        let Some(capture) = self.capture.as_mut().filter(|own| !own.is_broken()) else {
+            return;
+        };
+        if !self.rig.is_simulated() || !self.bench.is_between_telegrams() {
+            return;
+        }
+        if let Err(failure) = capture.collect(&mut *self.bench) {
+            let mut own = Output::collecting();
+            failure.tell(&mut own);
+            let [_, what] = own.take_collected();
+            self.bench.record_anew(None);
+            let what = format!("the capture takes nothing more: {}", what.trim_end());
+            self.happened(SessionEvent::Bus { what });
+        }
+    }
+
+    /// Ends the capture, if there is one.
     pub(super) fn end_capture(&mut self) -> Option<Result<Value, Failure>> {
         let mut capture = self.capture.take()?;
         let collected = capture.collect(&mut *self.bench);
-        Some(collected.and_then(|()| capture.write()))
+        self.bench.record_anew(None);
+        Some(collected.and_then(|()| capture.end()))
+    }
+
+    /// Lets time pass. While simulated drives are captured it passes in parts, which are written one by one.
+    fn pass(&mut self, ms: u32) -> Result<(), Failure> {
+        let part = match self.capture.is_some() && self.rig.is_simulated() {
+            true => PART,
+            false => LONGEST_WAIT,
+        };
+        let mut left = ms;
+        while left > 0 {
+            let now = left.min(part);
+            self.bench.pass(Span::from_millis(u64::from(now)))?;
+            self.write_capture();
+            left -= now;
+        }
+        Ok(())
     }
 
     /// Reports what no request asked for.
@@ -369,7 +409,7 @@ impl HeldSession {
                 )));
             }
             SessionRequest::Wait { ms } => {
-                self.bench.pass(Span::from_millis(u64::from(*ms)))?;
+                self.pass(*ms)?;
                 json!({})
             }
             SessionRequest::Fault { line } => {
@@ -543,10 +583,15 @@ impl HeldSession {
             // Drives of its own.
             return Ok(play_entry(entry, AtMismatch::Stop).outcome);
         }
+        // What is judged is recorded whole.
         let Some(capture) = &mut self.capture else {
-            return Ok(self.bench.play(entry)?.outcome);
+            self.bench.record_anew(Some(u64::MAX));
+            let played = self.bench.play(entry);
+            self.bench.record_anew(None);
+            return Ok(played?.outcome);
         };
         capture.collect(&mut *self.bench)?;
+        self.bench.record_anew(Some(u64::MAX));
         let played = self.bench.play(entry);
         // The link begins anew, perhaps several times.
         capture.leave_out(

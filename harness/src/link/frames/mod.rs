@@ -375,6 +375,10 @@ impl Link for FrameLink {
         Vec::new()
     }
 
+    fn record(&mut self, _on: bool) {
+        self.log.clear();
+    }
+
     fn carried(&self) -> u64 {
         self.carried
     }
@@ -417,10 +421,6 @@ impl PortLink for FrameLink {
 
     fn inner_links(&self) -> &[InnerLink] {
         &[]
-    }
-
-    fn forget_record(&mut self) {
-        self.log.clear();
     }
 }
 

@@ -315,6 +315,10 @@ impl<N: LinkNotes> Link for Observed<'_, N> {
         self.link.unused_faults()
     }
 
+    fn record(&mut self, on: bool) {
+        self.link.record(on);
+    }
+
     fn carried(&self) -> u64 {
         self.link.carried()
     }

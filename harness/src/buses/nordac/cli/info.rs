@@ -13,7 +13,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_page::{TopPage, heard};
+use crate::cli::top_line::{LineTop, needs_terminal};
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
 
@@ -140,57 +140,34 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    if !arguments.once && arguments.web.is_none() && !output.full_screen {
-        return Err(Failure::refused(
-            "top needs a terminal; --once prints one page without one",
-        ));
-    }
+    needs_terminal(arguments, output)?;
     let as_what = Use::look("top");
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
         let title = format!("{}: inverters on PROFIBUS", session.rig().id());
-        // The record of simulated drives has no bound.
-        let is_heard = !session.rig().is_simulated();
-        let picture = is_heard.then(|| live::picture_of_port(&slaves));
-        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), picture)?;
-        if let Some(page) = &page {
-            output.result(&page.line())?;
-        }
         let mut reader = Reader::default();
-        loop {
-            if page.as_mut().is_none_or(TopPage::is_wanted) {
-                let mut rows = Vec::new();
+        let view = LineTop {
+            title,
+            heading: HEADING,
+            carried: ["telegrams", "telegrams/s"],
+            picture: live::picture_of_port(&slaves),
+            read: &mut |session| {
                 let mut driver = driver(session);
-                for slave in &slaves {
+                let row = |slave: &u8| {
                     let ppo = driver.join(*slave)?;
-                    rows.push(row(&look(&mut driver, *slave, ppo)?));
+                    Ok(row(&look(&mut driver, *slave, ppo)?))
+                };
+                slaves.iter().map(row).collect()
+            },
+            row: &mut |piece| match piece {
+                Piece::Telegram(from, octets) => {
+                    let run = TelegramRun { from, octets };
+                    Some(live::at_port(&run, &slaves, &mut reader))
                 }
-                drop(driver);
-                match &mut page {
-                    Some(page) => {
-                        let heard = if is_heard { heard(session) } else { Vec::new() };
-                        let row = |own| match own {
-                            Piece::Telegram(from, octets) => {
-                                let run = TelegramRun { from, octets };
-                                Some(live::at_port(&run, &slaves, &mut reader))
-                            }
-                            _ => None,
-                        };
-                        page.show_port(&rows, heard.into_iter().filter_map(row).collect());
-                    }
-                    None => {
-                        let page = output.fitted(&columns(&HEADING, &rows));
-                        if arguments.once {
-                            output.result(&page)?;
-                            return Ok(Exit::Passed);
-                        }
-                        // Clears the screen, and begins in its upper left corner.
-                        output.result(&format!("\x1b[2J\x1b[H{page}"))?;
-                    }
-                }
-            }
-            driver(session).run(arguments.every)?;
-        }
+                _ => None,
+            },
+        };
+        view.show(session, arguments, output)
     })
 }
 

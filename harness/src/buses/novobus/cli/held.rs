@@ -3,10 +3,11 @@
 use super::args::DriveCommand;
 use super::rig::{OpenBench, Use};
 use crate::buses::novobus::language::plan::RingAct;
+use crate::buses::novobus::link::BesideTheBus;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::shell::{HeldBench, HeldRecord};
+use crate::cli::shell::{HeldBench, HeldRecord, record_anew};
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
@@ -102,15 +103,17 @@ fn from_now_on(step: &mut PlannedStep, link: &dyn Link) -> bool {
         Moment::Now => true,
         Moment::At(_) => false,
         Moment::Byte(byte) => {
-            let trace = link.trace(*ring);
-            let channel = match fault {
-                PlacedFault::Link(place, _) => trace.channels.get(*place),
+            let place = match fault {
+                PlacedFault::Link(place, _) => Some(*place),
+                // The link that ends at the drive.
                 PlacedFault::Drive(drive, _) => {
-                    trace.channels.iter().find(|own| own.to == Some(*drive))
+                    let before = link.drives(*ring).checked_sub(*drive + 1);
+                    before.map(usize::from)
                 }
                 _ => None,
             };
-            *byte += channel.map_or(0, |own| own.octets().len() as u64);
+            let arrived = place.and_then(|place| link.arrived(*ring, place));
+            *byte += arrived.unwrap_or(0);
             true
         }
     }
@@ -215,12 +218,12 @@ impl HeldBench for HeldRings {
         record.ok_or_else(given_back)
     }
 
-    fn forget(&mut self) {
-        self.rig.with(|session| {
-            if let Some(ports) = session.ports() {
-                ports.forget_record();
-            }
-        });
+    fn record_anew(&mut self, most: Option<u64>) {
+        self.rig.with(|session| record_anew(session.link(), most));
+    }
+
+    fn is_between_telegrams(&self) -> bool {
+        true
     }
 
     fn events(&mut self) -> Vec<String> {

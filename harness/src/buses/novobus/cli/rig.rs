@@ -12,7 +12,8 @@ use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::counted::counted;
-use crate::link::{Line, Trouble};
+use crate::link::{Line, Link, Trouble};
+use crate::medium::{Heard, Medium, Out};
 use crate::rig::find::{or_meant, simulated_port};
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
@@ -23,11 +24,12 @@ use crate::signals::interrupt_flag;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::error::BusError;
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How long a simulated bench has been on when a command starts: the self-tests are over (11.8).
@@ -94,14 +96,53 @@ impl Use {
 pub(crate) struct OpenBench {
     pub(crate) bus: OpenRings<'static>,
     plan: Plan,
-    /// The rig in use; `None` for a simulated bench created for this command.
-    rig: Option<Shared>,
+    place: BenchPlace,
+}
+
+/// Where the drives of a bench are.
+enum BenchPlace {
+    /// On a rig in use.
+    Rig(Shared),
+    /// In simulated rings that were created for this command.
+    Created(CreatedRings),
+}
+
+/// Simulated rings of a command. Its driver uses them as a line, and a page looks at them.
+#[derive(Clone)]
+struct CreatedRings(Arc<Mutex<SimulatedLink>>);
+
+impl CreatedRings {
+    fn link(&self) -> MutexGuard<'_, SimulatedLink> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Line for CreatedRings {
+    fn medium(&self, port: usize) -> Medium {
+        self.link().medium(port)
+    }
+
+    fn now(&self) -> Instant {
+        self.link().now()
+    }
+
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        self.link().send(port, what)
+    }
+
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+        self.link().receive(port)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.link().wait(until)
+    }
 }
 
 impl fmt::Debug for OpenBench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("OpenBench")
-            .field("rig", &self.rig)
+            .field("rig", &self.rig())
             .finish_non_exhaustive()
     }
 }
@@ -118,8 +159,20 @@ impl OpenBench {
         Ok(Self {
             bus,
             plan,
-            rig: Some(rig),
+            place: BenchPlace::Rig(rig),
         })
+    }
+
+    const fn rig(&self) -> Option<&Shared> {
+        match &self.place {
+            BenchPlace::Rig(rig) => Some(rig),
+            BenchPlace::Created(_) => None,
+        }
+    }
+
+    /// How many rings it has.
+    pub(crate) fn rings(&self) -> usize {
+        self.plan.rings.len()
     }
 
     /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from
@@ -144,7 +197,15 @@ impl OpenBench {
 
     /// Runs `act` on the rig in use, if there is one. The bus carries nothing meanwhile.
     pub(crate) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
-        self.rig.as_ref()?.with(act)
+        self.rig()?.with(act)
+    }
+
+    /// Runs `act` on the link to the drives; `None` where the rig has been given back. The bus carries nothing meanwhile.
+    pub(crate) fn with_link<T>(&self, act: impl FnOnce(&mut dyn Link) -> T) -> Option<T> {
+        match &self.place {
+            BenchPlace::Rig(rig) => rig.with(|session| act(session.link())),
+            BenchPlace::Created(rings) => Some(act(&mut *rings.link())),
+        }
     }
 
     /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error, and so does a silence where time-outs are
@@ -215,10 +276,12 @@ pub(crate) fn on_after(
     }
     let Some(RigName::Named(name)) = &arguments.rig else {
         let (plan, link) = link(arguments, output)?;
-        let bus = OpenRings::open(Box::new(link), &plan.rings, Options::default())?;
+        let created = CreatedRings(Arc::new(Mutex::new(link)));
+        let line = Box::new(created.clone());
+        let bus = OpenRings::open(line, &plan.rings, Options::default())?;
         bus.run(WARM);
-        let rig = None;
-        return act(&OpenBench { bus, plan, rig }, output);
+        let place = BenchPlace::Created(created);
+        return act(&OpenBench { bus, plan, place }, output);
     };
     let rig = named(name, arguments, output)?;
     let plan = rig.plan()?;
@@ -231,7 +294,7 @@ pub(crate) fn on_after(
         let bench = OpenBench {
             bus,
             plan,
-            rig: Some(shared.clone()),
+            place: BenchPlace::Rig(shared.clone()),
         };
         let ready = bench.confirm_bus_errors(as_what, output);
         let result = ready.and_then(|()| act(&bench, output));

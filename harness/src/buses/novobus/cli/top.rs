@@ -80,7 +80,8 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
         let mut reader = Reader::new(bench);
         let title = format!("{}: {}", heading.rig, heading.rings.join("; "));
         let heard = HeardLinks::of(bench);
-        let picture = heard.as_ref().map(HeardLinks::picture);
+        let heard = heard.ok_or_else(|| Failure::refused("the rig has been given back"))?;
+        let picture = heard.picture();
         match TopPage::open(arguments, title, (&view::COLUMNS, &TRAFFIC), picture)? {
             Some(page) => {
                 let page = RingPage::new(page, heading, heard);
@@ -254,7 +255,7 @@ fn on_page(
     output.result(&page.page.line())?;
     let bench = reader.bench;
     let page = RefCell::new(page);
-    let wanted = || page.borrow_mut().page.is_wanted();
+    let wanted = || page.borrow_mut().is_wanted(bench);
     let mut show = |reading| page.borrow_mut().show(bench, reading);
     let mut wait = |time| {
         std::thread::sleep(time);

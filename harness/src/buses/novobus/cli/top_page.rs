@@ -3,7 +3,6 @@
 use super::rig::OpenBench;
 use crate::buses::novobus::serve::recorder::{Recorder, Rows, links, picture};
 use crate::cli::top_page::TopPage;
-use crate::link::{Line, Link};
 use crate::top::{Disturbance, Heading, Snapshot, Top, TopRow};
 use crate::web::{LiveNews, LivePicture};
 
@@ -24,11 +23,10 @@ pub(super) struct RingPage {
     top: Top,
     /// The disturbances that it has told, with how often each had been then.
     told: Vec<Disturbance>,
-    /// What the ports hear; `None` for simulated drives, whose record has no bound.
-    heard: Option<HeardLinks>,
+    heard: HeardLinks,
 }
 
-/// What the ports of a bench hear, as a picture that grows.
+/// What is heard of the links of a bench, as a picture that grows: all of simulated rings, and those with a port.
 pub(super) struct HeardLinks {
     sizes: Vec<u8>,
     /// The links that are heard, by their place among all.
@@ -37,13 +35,10 @@ pub(super) struct HeardLinks {
 }
 
 impl HeardLinks {
-    /// The links that the ports of a bench hear; `None` where it has none.
+    /// The links of a bench that are heard; `None` where it has been given back.
     pub(super) fn of(bench: &OpenBench) -> Option<Self> {
-        bench.with_rig(|session| {
-            session.ports()?;
-            let rings = session.rig().rings().count();
-            let link = session.link();
-            let sizes: Vec<u8> = (0..rings).map(|ring| link.drives(ring)).collect();
+        bench.with_link(|link| {
+            let sizes: Vec<u8> = (0..bench.rings()).map(|ring| link.drives(ring)).collect();
             let all = sizes.iter().enumerate();
             let all = all.flat_map(|(ring, drives)| {
                 (0..=usize::from(*drives)).map(move |place| (ring, place))
@@ -51,12 +46,12 @@ impl HeardLinks {
             let heard = all
                 .enumerate()
                 .filter(|(_, own)| link.listens(own.0, own.1));
-            Some(Self {
+            Self {
                 columns: heard.map(|(column, _)| column).collect(),
                 recorder: Recorder::new(&sizes, link.medium(0).octet_time()),
                 sizes,
-            })
-        })?
+            }
+        })
     }
 
     /// The picture without a row.
@@ -68,19 +63,15 @@ impl HeardLinks {
 
     /// What was heard since the last call; nothing where the page was just opened.
     fn rows(&mut self, bench: &OpenBench, just_opened: bool) -> Rows {
-        let now = bench.with_rig(|session| {
-            let link = session.link();
+        let now = bench.with_link(|link| {
             let rings = if just_opened { 0 } else { self.sizes.len() };
             for ring in 0..rings {
                 for (place, own) in link.trace(ring).channels.iter().enumerate() {
                     self.recorder.carry(ring, place, own.octets());
                 }
             }
-            let now = link.now();
-            if let Some(ports) = session.ports() {
-                ports.forget_record();
-            }
-            now
+            link.record(true);
+            link.now()
         });
         let mut rows = now.map_or_else(Rows::default, |now| self.recorder.rows(now));
         for cell in rows.rows.iter_mut().flat_map(|row| &mut row.cells) {
@@ -93,13 +84,22 @@ impl HeardLinks {
 
 impl RingPage {
     /// The page of rings.
-    pub(super) fn new(page: TopPage, heading: Heading, heard: Option<HeardLinks>) -> Self {
+    pub(super) fn new(page: TopPage, heading: Heading, heard: HeardLinks) -> Self {
         Self {
             page,
             top: Top::new(heading),
             told: Vec::new(),
             heard,
         }
+    }
+
+    /// Whether a page is open: drives are read, and what links carry is recorded, only then.
+    pub(super) fn is_wanted(&mut self, bench: &OpenBench) -> bool {
+        let wanted = self.page.is_wanted();
+        if !wanted {
+            bench.with_link(|link| link.record(false));
+        }
+        wanted
     }
 
     /// Shows what was read.
@@ -109,9 +109,7 @@ impl RingPage {
         }
         let mut notes = self.notes(&reading);
         let just_opened = self.page.just_opened();
-        let heard = self.heard.as_mut();
-        let heard = heard.map(|own| own.rows(bench, just_opened));
-        let heard = heard.unwrap_or_default();
+        let heard = self.heard.rows(bench, just_opened);
         notes.extend(heard.notes);
         self.top.take(reading);
         let rows = self.top.rows().into_iter();

@@ -10,7 +10,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_page::{TopPage, heard};
+use crate::cli::top_line::{LineTop, needs_terminal};
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
 
@@ -69,49 +69,25 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    if !arguments.once && arguments.web.is_none() && !output.full_screen {
-        return Err(Failure::refused(
-            "top needs a terminal; --once prints one page without one",
-        ));
-    }
+    needs_terminal(arguments, output)?;
     let look = Use::look("top");
     on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
         let title = format!("{}: drives on CAN", session.rig().id());
         let drives = session.axes().to_vec();
-        // The record of simulated drives has no bound.
-        let is_heard = !session.rig().is_simulated();
         let names = drives.iter().map(|own| format!("drive {}", own.node));
-        let picture = is_heard.then(|| live::picture("bench", names));
-        let mut page = TopPage::open(arguments, title, (&HEADING, &[]), picture)?;
-        if let Some(page) = &page {
-            output.result(&page.line())?;
-        }
-        loop {
-            if page.as_mut().is_none_or(TopPage::is_wanted) {
-                let rows = rows(&find(session, &drives, &registers)?);
-                match &mut page {
-                    Some(page) => {
-                        let heard = if is_heard { heard(session) } else { Vec::new() };
-                        let row = |own: &Piece| match own {
-                            Piece::Frame(own) => Some(live::at_port(own, &drives)),
-                            _ => None,
-                        };
-                        page.show_port(&rows, heard.iter().filter_map(row).collect());
-                    }
-                    None => {
-                        let page = output.fitted(&columns(&HEADING, &rows));
-                        if arguments.once {
-                            output.result(&page)?;
-                            return Ok(Exit::Passed);
-                        }
-                        // Clears the screen, and begins in its upper left corner.
-                        output.result(&format!("\x1b[2J\x1b[H{page}"))?;
-                    }
-                }
-            }
-            session.driver().run(arguments.every)?;
-        }
+        let view = LineTop {
+            title,
+            heading: HEADING,
+            carried: ["frames", "frames/s"],
+            picture: live::picture("bench", names),
+            read: &mut |session| Ok(rows(&find(session, &drives, &registers)?)),
+            row: &mut |piece| match piece {
+                Piece::Frame(own) => Some(live::at_port(&own, &drives)),
+                _ => None,
+            },
+        };
+        view.show(session, arguments, output)
     })
 }
 

@@ -287,8 +287,4 @@ impl PortLink for BusyLine {
     fn inner_links(&self) -> &[InnerLink] {
         &[]
     }
-
-    fn forget_record(&mut self) {
-        // That of the simulated ring has no bound.
-    }
 }
