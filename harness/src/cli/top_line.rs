@@ -37,8 +37,8 @@ pub(crate) struct LineTop<'v, D: HeldDrives, const N: usize> {
     pub(crate) picture: LivePicture,
     /// Reads the rows of the table.
     pub(crate) read: &'v mut TableReader<'v, D, N>,
-    /// The row of the picture for a piece that was heard.
-    pub(crate) row: &'v mut dyn FnMut(Piece) -> Option<LiveRow>,
+    /// The rows of the picture for what was heard.
+    pub(crate) rows: &'v mut dyn FnMut(Vec<Piece>) -> Vec<LiveRow>,
 }
 
 /// Whether there is something to show drives in: a terminal, one page, or a browser.
@@ -87,8 +87,7 @@ impl<D: HeldDrives, const N: usize> LineTop<'_, D, N> {
                         traffic = LineTraffic::of(&traffic.names);
                     }
                     let stations = (self.read)(session)?;
-                    let heard = heard(session).into_iter();
-                    let rows: Vec<_> = heard.filter_map(&mut *self.row).collect();
+                    let rows = (self.rows)(heard(session));
                     page.show(LiveNews {
                         stations: stations.iter().map(|row| row.to_vec()).collect(),
                         traffic: traffic.take(&rows, Moment::now()),
@@ -174,8 +173,9 @@ impl LineTraffic {
         }
         for row in rows {
             if let Some(count) = row.sender().and_then(|own| self.counts.get_mut(own)) {
-                count[0] += 1;
-                count[1] += u64::from(row.is_damaged());
+                let rows = row.fold.max(1);
+                count[0] += rows;
+                count[1] += if row.is_damaged() { rows } else { 0 };
             }
         }
         while self.marks.len() > 1 && now - self.marks[1].0 >= WINDOW {
@@ -213,13 +213,17 @@ mod tests {
             arrow((1, Some(0)), true),
             arrow((0, None), true),
             arrow((0, Some(2)), false),
+            LiveRow {
+                fold: 6,
+                ..arrow((2, Some(0)), true)
+            },
         ];
         assert_eq!(traffic.take(&[], begun)[0], ["bench", "0", "0.0", "0"]);
         let table = traffic.take(&rows, begun + WINDOW);
         let expected = [
             ["bench", "3", "1.5", "1"],
             ["1", "1", "0.5", "0"],
-            ["2", "0", "0.0", "0"],
+            ["2", "6", "3.0", "0"],
         ];
         assert_eq!(table, expected);
         // A rate is that of the last two seconds.

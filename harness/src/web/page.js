@@ -137,11 +137,12 @@
     const body = by("rows").tBodies[0];
     if (own.fold > 0) {
       const before = body.lastElementChild;
-      const folded = before && before.dataset.fold ? Number(before.dataset.fold) : 0;
-      const row = folded ? before : line("");
-      row.dataset.fold = folded + own.fold;
-      const noun = row.dataset.fold === "1" ? " byte time: " : " byte times: ";
-      row.firstChild.textContent = "... " + row.dataset.fold + noun + own.words;
+      const same = before && before.dataset.words === own.words;
+      const folded = own.fold + (same ? Number(before.dataset.fold) : 0);
+      const row = same ? before : line("");
+      row.dataset.fold = folded;
+      row.dataset.words = own.words;
+      row.firstChild.textContent = "... " + folded + " " + scene.picture.folded[folded === 1 ? 0 : 1] + ": " + own.words;
       return;
     }
     const row = make("tr", body);

@@ -38,6 +38,8 @@ pub struct LivePicture {
     pub note: &'static str,
     /// The columns.
     pub columns: Vec<String>,
+    /// What a row of its own would stand for, where rows are [folded](LiveRow::fold): one, and many.
+    pub folded: [&'static str; 2],
     /// The classes of cells and what they mean.
     pub legend: Vec<(char, &'static str)>,
 }
@@ -86,7 +88,7 @@ pub struct LiveRow {
     pub cells: Vec<LiveCell>,
     /// What it means; may be empty.
     pub words: String,
-    /// How many rows in which nothing happens it stands for; 0 for a row of its own.
+    /// How many rows it stands for in which always the same happens, said by `words`; 0 for a row of its own. Their cells are not drawn.
     pub fold: u64,
 }
 

@@ -253,7 +253,7 @@ fn the_page_of_a_bench_in_use_only_looks_on() {
     let ring = [
         "\"stations\":[[\"0\",",
         "\"traffic\":[[\"ring 1\",",
-        "[0,\"FD\",\"d\"],[1,\"C1\",\"d\"]",
+        "[0,\"FE\",\"d\"]",
     ];
     for (rig, columns, shown) in [
         ("sim:2", r#"["master->1","1->0","0->master"]"#, ring),
@@ -263,7 +263,7 @@ fn the_page_of_a_bench_in_use_only_looks_on() {
             r#"["bench","drive 1","drive 2"]"#,
             [
                 "\"stations\":[[\"1\",",
-                "\"traffic\":[[\"bench\",\"22\",",
+                "\"traffic\":[[\"bench\",",
                 "30 SPEED_ACTUAL = ",
             ],
         ),

@@ -62,7 +62,7 @@ fn a_capture_on_a_full_disk() {
     let desk = desk();
     let own = desk.command(&["shell", "--json", "--rig", "sim:3"]);
     let mut command = std::process::Command::new("sh");
-    command.args(["-c", "ulimit -f 64; exec \"$@\"", "sh"]);
+    command.args(["-c", "ulimit -f 1000; exec \"$@\"", "sh"]);
     command.arg(own.get_program()).args(own.get_args());
     command.current_dir(desk.path(""));
     let mut child = command
@@ -81,7 +81,7 @@ fn a_capture_on_a_full_disk() {
         &mut session,
         &json!({"id": 1, "do": "capture", "path": "full.pcapng"}),
     );
-    session.send(br#"{"id":2,"do":"wait","ms":3000}"#);
+    session.send(br#"{"id":2,"do":"wait","ms":6000}"#);
     let event = session.next();
     assert_eq!(event["event"], "bus", "{event}");
     let what = event["what"].as_str().expect("a sentence");
@@ -97,6 +97,6 @@ fn a_capture_on_a_full_disk() {
     let length = std::fs::metadata(desk.path("full.pcapng"))
         .expect("a file")
         .len();
-    assert!(length > 0);
+    assert!((400_000..=512_000).contains(&length), "{length}");
     ended(&desk.run(&["import", "full.pcapng"]), 5, "bytes on 4 links");
 }

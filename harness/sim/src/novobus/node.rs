@@ -75,6 +75,11 @@ impl<D: Device> Node<D> {
         self.recording = false;
     }
 
+    /// Takes its remarks since the last call.
+    pub(crate) fn take_remarks(&mut self) -> Vec<Remark> {
+        std::mem::take(&mut self.remarks)
+    }
+
     /// Forgets its remarks, and records those that come.
     pub(crate) fn record_anew(&mut self) {
         self.remarks.clear();

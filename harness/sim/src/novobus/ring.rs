@@ -10,7 +10,7 @@ use crate::novobus::device::Device;
 use crate::novobus::group::Group;
 use crate::novobus::link::Link;
 use crate::novobus::node::Node;
-use crate::record::{Channel, LineByte, Trace};
+use crate::record::{Channel, LineByte, Remark, Trace};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
@@ -216,6 +216,25 @@ impl<D: Device> Ring<D> {
             .get_mut(link)
             .map(Link::take_log)
             .unwrap_or_default()
+    }
+
+    /// Records what drives remark from now on, for [`Self::take_remarks`].
+    pub fn record_remarks(&mut self) {
+        self.nodes.iter_mut().for_each(Node::record_anew);
+    }
+
+    /// What drives have remarked since the last call, as far as it was recorded, in order of time.
+    pub fn take_remarks(&mut self) -> Vec<Remark> {
+        let mut remarks: Vec<_> = self.nodes.iter_mut().flat_map(Node::take_remarks).collect();
+        remarks.sort_by_key(|remark| remark.at);
+        remarks
+    }
+
+    /// How many of the bytes that were sent on link `link` since the conversation began have come to its end, or were lost on it: by this
+    /// number a remark names its answer. It is right when recording has just begun.
+    #[must_use]
+    pub fn delivered(&self, link: usize) -> u64 {
+        self.links.get(link).map_or(0, Link::delivered)
     }
 
     /// Cuts link `link` open: what its transmitter sends is to be fetched, and its receiver hears what is fed. Faults

@@ -81,6 +81,11 @@ impl UnderWay {
         self.word.to_le_bytes()[0]
     }
 
+    /// Whether a transmitter has sent it.
+    pub(crate) fn is_sent(self) -> bool {
+        self.word & Self::SENT != 0
+    }
+
     #[inline]
     pub(crate) fn solicited(self) -> bool {
         self.word & Self::SOLICITED != 0

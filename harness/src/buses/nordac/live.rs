@@ -9,8 +9,10 @@ use crate::web::{
 };
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::pkw::Index;
+use harness_proto::profibus::Telegram;
 use harness_proto::profibus::rate::SYN_BITS;
 use harness_sim::record::{Channel, Trace};
+use std::collections::BTreeMap;
 
 /// The faults of a telegram: as the language of scenarios writes them, and in words.
 const FAULTS: [(&str, &str); 4] = [
@@ -76,8 +78,10 @@ fn telegram(slave: u8, octets: &[u8]) -> Vec<u8> {
 fn picture(columns: Vec<String>) -> LivePicture {
     LivePicture {
         heading: "Telegrams",
-        note: "A column is a station, a row is a telegram, and time goes down.",
+        note: "A column is a station, a row is a telegram, and time goes down. A token that a master gives to itself has no row; such tokens \
+               are counted in a row below those of the other telegrams.",
         columns,
+        folded: ["time", "times"],
         legend: ARROWS.to_vec(),
     }
 }
@@ -255,6 +259,33 @@ impl SegmentServer {
     }
 }
 
+/// The master that gives a token to itself: the only one on its line.
+fn own_token(run: &TelegramRun) -> Option<u8> {
+    match run.said()?.telegram()? {
+        Telegram::Token { da, sa } if da == sa => Some(sa),
+        _ => None,
+    }
+}
+
+/// The rows of telegrams, with a row behind them that counts the tokens which a master gave to itself.
+pub(super) fn without_tokens<'r>(
+    rows: impl Iterator<Item = (LiveRow, &'r TelegramRun)>,
+) -> Vec<LiveRow> {
+    let mut shown = Vec::new();
+    let mut tokens = BTreeMap::<u8, LiveRow>::new();
+    for (row, run) in rows {
+        let Some(master) = own_token(run).filter(|_| !row.is_damaged()) else {
+            shown.push(row);
+            continue;
+        };
+        let fold = tokens.get(&master).map_or(0, |own| own.fold) + 1;
+        let words = format!("token {master}\u{2192}{master}");
+        tokens.insert(master, LiveRow { fold, words, ..row });
+    }
+    shown.extend(tokens.into_values());
+    shown
+}
+
 fn hex(octets: &[u8]) -> String {
     let octets: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
     octets.join(" ")
@@ -329,8 +360,8 @@ impl LiveView for SegmentServer {
         if let Some(mut recorder) = self.recorder.take() {
             let runs = self.runs(&mut recorder);
             // The meaning of a telegram depends on those before it, also on those that are not shown.
-            let rows = runs.iter().map(|run| self.row(&mut recorder, run));
-            news.rows = rows.collect();
+            let rows = runs.iter().map(|run| (self.row(&mut recorder, run), run));
+            news.rows = without_tokens(rows);
             let hidden = news.rows.len().saturating_sub(MAX_ROWS);
             news.rows.drain(..hidden);
             news.left_out = hidden as u64;

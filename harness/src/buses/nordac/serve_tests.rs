@@ -2,6 +2,7 @@
 
 use super::serve::{SegmentServer, bench};
 use crate::serve::{Marks, ServedBus};
+use crate::web::LiveView;
 use harness_proto::time::{Instant, Span};
 
 const STATUS: [u8; 6] = [0x10, 0x08, 0x02, 0x49, 0x53, 0x16];
@@ -151,6 +152,28 @@ fn memory_is_bounded() {
     }
     assert!(clients.server.lost(0) > 0);
     assert!(clients.server.transmit(0).len() <= 64 << 10);
+}
+
+/// Tokens that a master gives to itself are counted in a row below the others; one to another station has a row of its own.
+#[test]
+fn a_page_counts_tokens_of_a_lone_master() {
+    let mut clients = Clients::new(1, Marks::None);
+    clients.server.watch(true);
+    let own = [0xDC, 2, 2];
+    let other = [0xDC, 3, 2];
+    for telegram in [&own[..], &STATUS, &own, &own, &other] {
+        clients.send(0, telegram);
+        clients.pass(Span::from_millis(10));
+    }
+    let rows = clients.server.news().rows;
+    let said: Vec<_> = rows
+        .iter()
+        .map(|row| (row.fold, row.words.as_str()))
+        .collect();
+    assert_eq!(said.len(), 4, "{said:?}");
+    assert!(said[..3].iter().all(|own| own.0 == 0), "{said:?}");
+    assert!(said[2].1.starts_with("token  2 gives it to 3"), "{said:?}");
+    assert_eq!(said[3], (3, "token 2\u{2192}2"));
 }
 
 /// The header's slaves are there beside those of the command line; without either there is slave 8.

@@ -12,8 +12,8 @@ use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::ring::Ring;
 use harness_sim::novobus::witness::Complaint;
-use harness_sim::record::LineByte;
 use harness_sim::record::Trace;
+use harness_sim::record::{LineByte, Remark};
 use std::any::Any;
 use std::collections::VecDeque;
 
@@ -161,6 +161,25 @@ impl SimulatedLink {
             byte.at = self.since_origin(byte.at);
         }
         record
+    }
+
+    /// Records what the drives of all rings remark from now on.
+    pub(crate) fn record_remarks(&mut self) {
+        for ring in 0..self.bench.rings().len() {
+            if let Some(ring) = self.bench.ring_mut(ring) {
+                ring.record_remarks();
+            }
+        }
+    }
+
+    /// What the drives of a ring have remarked since the last call, with times of the conversation.
+    pub(crate) fn take_remarks(&mut self, ring: usize) -> Vec<Remark> {
+        let own = self.bench.ring_mut(ring);
+        let mut remarks = own.map_or_else(Vec::new, Ring::take_remarks);
+        for remark in &mut remarks {
+            remark.at = self.since_origin(remark.at);
+        }
+        remarks
     }
 
     /// Feeds a byte to the drive behind an open link and returns when the line will have carried it.
@@ -448,6 +467,9 @@ pub trait BesideTheBus {
     /// How many bytes have come to the end of a link since the conversation began, counted from the master's outgoing one; `None` where
     /// this cannot be seen.
     fn arrived(&self, ring: usize, link: usize) -> Option<u64>;
+
+    /// See [`Ring::delivered`]; `None` where this cannot be seen.
+    fn delivered(&self, ring: usize, link: usize) -> Option<u64>;
 }
 
 impl<L: Link + ?Sized> BesideTheBus for L {
@@ -475,6 +497,10 @@ impl<L: Link + ?Sized> BesideTheBus for L {
 
     fn arrived(&self, ring: usize, link: usize) -> Option<u64> {
         Some(simulation(self)?.ring(ring)?.arrived(link))
+    }
+
+    fn delivered(&self, ring: usize, link: usize) -> Option<u64> {
+        Some(simulation(self)?.ring(ring)?.delivered(link))
     }
 }
 

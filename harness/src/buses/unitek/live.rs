@@ -60,6 +60,7 @@ pub(super) fn picture(masters: &str, drives: impl Iterator<Item = String>) -> Li
         heading: "Frames",
         note: "A column is a station, a row is a frame, and time goes down.",
         columns: std::iter::once(masters.to_owned()).chain(drives).collect(),
+        folded: ["frame", "frames"],
         legend: ARROWS.to_vec(),
     }
 }

@@ -45,7 +45,7 @@ impl HeldRecord {
 const MOST: u64 = 4_000_000;
 
 /// How many packets are written at a time.
-const AT_ONCE: usize = 10_000;
+const AT_ONCE: usize = 1_000;
 
 /// A capture that is under way. Its file grows with it.
 pub(super) struct SessionCapture {

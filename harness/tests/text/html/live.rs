@@ -56,8 +56,14 @@ fn a_fault_is_injected_by_keys_and_its_address_arrives() {
     // The last byte of the picture is the master's: address 01, and the zeros stand above it.
     let cells = "[...document.querySelectorAll('#rows tbody tr')].map((row) => row.cells.length > 4 ? row.cells[4].textContent : '')";
     browser.until(&format!("{cells}.at(-1) === '01'"));
-    let zeros = browser.value(&format!("{cells}.filter((text) => text === '00').length"));
+    let zeros = browser.value(&format!(
+        "{cells}.filter((text) => /^[!*#]?00$/.test(text)).length"
+    ));
     assert_eq!(zeros, 17);
+    let marked = browser.text(&format!(
+        "{cells}.filter((text) => text.length === 3).join(' ')"
+    ));
+    assert_eq!(marked, "!00 *00 #00");
     assert_eq!(
         browser.text("document.querySelector('#stations tbody').rows[1].cells[1].textContent"),
         "error 0502 SCIparity"

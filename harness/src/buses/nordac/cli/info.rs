@@ -159,12 +159,14 @@ pub(super) fn top(
                 };
                 slaves.iter().map(row).collect()
             },
-            row: &mut |piece| match piece {
-                Piece::Telegram(from, octets) => {
-                    let run = TelegramRun { from, octets };
-                    Some(live::at_port(&run, &slaves, &mut reader))
-                }
-                _ => None,
+            rows: &mut |heard| {
+                let run = |piece| match piece {
+                    Piece::Telegram(from, octets) => Some(TelegramRun { from, octets }),
+                    _ => None,
+                };
+                let runs: Vec<_> = heard.into_iter().filter_map(run).collect();
+                let row = |run| (live::at_port(run, &slaves, &mut reader), run);
+                live::without_tokens(runs.iter().map(row))
             },
         };
         view.show(session, arguments, output)

@@ -66,11 +66,16 @@ impl HeardLinks {
         let now = bench.with_link(|link| {
             let rings = if just_opened { 0 } else { self.sizes.len() };
             for ring in 0..rings {
-                for (place, own) in link.trace(ring).channels.iter().enumerate() {
+                let trace = link.trace(ring);
+                self.recorder.remark(ring, &trace.remarks);
+                for (place, own) in trace.channels.iter().enumerate() {
                     self.recorder.carry(ring, place, own.octets());
                 }
             }
             link.record(true);
+            if just_opened {
+                self.recorder.count_from(link);
+            }
             link.now()
         });
         let mut rows = now.map_or_else(Rows::default, |now| self.recorder.rows(now));

@@ -204,6 +204,12 @@ fn arrived(byte: &LineByte) -> Cell {
     }
 }
 
+/// Marks as they are printed.
+pub(in crate::buses::novobus) fn signs(marks: Marks) -> String {
+    let signs = SIGNS.into_iter().filter(|(own, _)| marks.contains(*own));
+    signs.map(|(_, sign)| sign).collect()
+}
+
 /// Puts a drive's marks in front of the bytes that it sent at them. A mark at which nothing went out (a
 /// time-out) stands at the next byte.
 fn sign(cells: &mut [Cell], rows: &[Option<usize>], trace: &Trace, drive: u8, bytes: &[LineByte]) {
@@ -222,8 +228,8 @@ fn sign(cells: &mut [Cell], rows: &[Option<usize>], trace: &Trace, drive: u8, by
         let Some(place) = rows.iter().position(|shown| shown.as_ref() == Some(row)) else {
             continue;
         };
-        for (marks, sign) in SIGNS {
-            if mark.marks().contains(marks) && !cells[place].signs.contains(sign) {
+        for sign in signs(mark.marks()).chars() {
+            if !cells[place].signs.contains(sign) {
                 cells[place].signs.push(sign);
             }
         }

@@ -6,7 +6,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::counted::counted;
 use crate::link::Line;
 use crate::serve::{Answer, ServedBus};
-use crate::web::{FaultPlace, LiveNews, LiveOrder, LiveScene, LiveView};
+use crate::web::{FaultPlace, LiveCell, LiveNews, LiveOrder, LiveScene, LiveView};
 use harness_proto::nd21::cells::cell;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange, Value};
@@ -72,6 +72,17 @@ impl Server {
         (0..self.rings()).map(|ring| self.drives(ring)).collect()
     }
 
+    /// The columns of links that are cut open.
+    fn open_columns(&self) -> Vec<usize> {
+        let sizes = self.sizes().into_iter().enumerate();
+        let all = sizes
+            .flat_map(|(ring, drives)| (0..=usize::from(drives)).map(move |link| (ring, link)));
+        let open = all
+            .enumerate()
+            .filter(|(_, own)| self.is_open(own.0, own.1));
+        open.map(|(column, _)| column).collect()
+    }
+
     /// A row of the table of drives.
     fn station(&self, ring: usize, drive: u8) -> Vec<String> {
         let prefix = if ring == 0 { "" } else { "2:" };
@@ -132,6 +143,10 @@ impl LiveView for Server {
         let sizes = self.sizes();
         let drives = sizes.iter().map(|drives| counted(*drives, "drive"));
         let columns = links(&sizes);
+        let mut shown = columns.clone();
+        for column in self.open_columns() {
+            shown[column].push_str(" (cut)");
+        }
         let place = |(column, name): (usize, &String)| FaultPlace {
             name: name.clone(),
             column: Some(column),
@@ -145,7 +160,7 @@ impl LiveView for Server {
             stations: vec!["drive", "bus", "mode", "display", "speed rpm", "BusAddr"],
             traffic: vec!["link", "bytes", "not SYNCO", "damaged"],
             places: columns.iter().enumerate().map(place).collect(),
-            picture: Some(picture(columns)),
+            picture: Some(picture(shown)),
             faults: FAULTS.map(|(_, words)| words).to_vec(),
             scripts: scripts(sizes.first().copied().unwrap_or(1))
                 .into_iter()
@@ -171,11 +186,16 @@ impl LiveView for Server {
             news.stations
                 .extend((0..*drives).map(|drive| self.station(ring, drive)));
         }
+        let open = self.open_columns();
         let Some(recorder) = &mut self.recorder else {
             return news;
         };
         let rows = recorder.rows(now);
         (news.rows, news.left_out, news.notes) = (rows.rows, rows.left_out, rows.notes);
+        for row in news.rows.iter_mut().filter(|row| row.fold == 0) {
+            let cuts = open.iter().map(|own| LiveCell(*own, "//".to_owned(), 'c'));
+            row.cells.extend(cuts);
+        }
         let counts = recorder.counts().iter().zip(links(&sizes));
         news.traffic = counts
             .map(|(count, link)| {

@@ -1,14 +1,18 @@
 //! What the links of served rings have carried, as rows of a space-time picture: a column a link, a row a byte time.
 
+use crate::buses::novobus::link::BesideTheBus as _;
 use crate::buses::novobus::locate::{Location, MAX_ZEROS, locate};
+use crate::buses::novobus::report::table::signs;
 use crate::counted::counted;
-use crate::link::link_name;
+use crate::link::{Link, link_name};
 use crate::web::{LiveCell, LivePicture, LiveRow, MAX_CELLS, MAX_ROWS};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
+use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use harness_sim::record::LineByte;
+use harness_sim::novobus::mark::Mark as _;
+use harness_sim::record::{LineByte, Remark};
 use std::collections::BTreeMap;
 
 /// Byte times for which rows are kept until they are fetched, at most: more than a second of them.
@@ -33,12 +37,25 @@ pub(in crate::buses::novobus) struct Recorder {
     byte: Span,
     /// The drives of each ring, and its first column.
     rings: Vec<(u8, usize)>,
-    /// By the number of the byte time in which a byte arrived: columns and bytes.
-    slots: BTreeMap<u64, Vec<(usize, LineByte)>>,
+    /// By the number of the byte time in which a byte arrived.
+    slots: BTreeMap<u64, Vec<Seen>>,
     counts: Vec<LinkCount>,
+    /// How many of the bytes that were sent on each link have been taken, as remarks count them.
+    delivered: Vec<u64>,
+    /// Remarks whose byte has not been taken yet.
+    remarks: Vec<(usize, Remark)>,
     masters: Vec<MasterEar>,
     notes: Vec<String>,
     left_out: u64,
+}
+
+/// A byte of a link.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    column: usize,
+    byte: LineByte,
+    /// What its sender remarked.
+    marks: Marks,
 }
 
 /// Rows that are complete.
@@ -64,8 +81,11 @@ pub(in crate::buses::novobus) fn picture(columns: Vec<String>) -> LivePicture {
     LivePicture {
         heading: "Bytes in space and time",
         note: "A column is a link, a row is one byte time, and time goes down: a byte moves one link to the right with each row. \
-               The master sends on the first link and receives from the last one.",
+               The master sends on the first link and receives from the last one. Marks in front of a byte are those of the print: ! its sender \
+               detects an error, * it has seen that the drive before it is in the error mode, # this is its 17th zero, @ the first byte of the \
+               check sequence, > an answer byte, + a new checking byte. Only simulated drives show them.",
         columns,
+        folded: ["byte time", "byte times"],
         legend: vec![
             ('d', "a byte"),
             ('s', "SYNCO (80)"),
@@ -73,6 +93,10 @@ pub(in crate::buses::novobus) fn picture(columns: Vec<String>) -> LivePicture {
             (
                 'x',
                 "damaged: sent \u{2192} arrived; ~ marked bad, -- nothing",
+            ),
+            (
+                'c',
+                "cut open by --cut: its client hears and feeds it, which is not shown",
             ),
         ],
     }
@@ -91,12 +115,66 @@ impl Recorder {
         Self {
             byte,
             counts: vec![LinkCount::default(); columns],
+            delivered: vec![0; columns],
+            remarks: Vec::new(),
             masters: vec![MasterEar::default(); rings.len()],
             notes: Vec::new(),
             rings,
             slots: BTreeMap::new(),
             left_out: 0,
         }
+    }
+
+    /// Counts bytes as the remarks of simulated drives do. Recording has just begun.
+    pub(in crate::buses::novobus) fn count_from(&mut self, link: &(impl Link + ?Sized)) {
+        for (ring, (drives, first)) in self.rings.iter().enumerate() {
+            for place in 0..=usize::from(*drives) {
+                let delivered = link.delivered(ring, place);
+                self.delivered[first + place] = delivered.unwrap_or(0);
+            }
+        }
+    }
+
+    /// Takes what the drives of a ring have remarked, before the bytes at which it stands.
+    pub(in crate::buses::novobus) fn remark(&mut self, ring: usize, remarks: &[Remark]) {
+        let Some(&(drives, first)) = self.rings.get(ring) else {
+            return;
+        };
+        if self.remarks.len() + remarks.len() > MAX_SLOTS {
+            // Of links that carry nothing, or are not heard.
+            self.remarks.clear();
+        }
+        for remark in remarks {
+            // The link behind the drive.
+            let link = usize::from(drives.saturating_sub(remark.station));
+            self.remarks.push((first + link, *remark));
+        }
+    }
+
+    /// What the sender of a byte remarked at it. A remark without an answer stands at the next byte.
+    fn marks(&mut self, column: usize, byte: &LineByte) -> Marks {
+        let Some(number) = self
+            .delivered
+            .get_mut(column)
+            .filter(|_| byte.sent.is_some())
+        else {
+            return Marks::NONE;
+        };
+        *number += 1;
+        let number = *number;
+        let mut marks = Marks::NONE;
+        self.remarks.retain(|(own, remark)| {
+            let meant = *own == column
+                && match remark.answered_as {
+                    Some(answer) => answer == number,
+                    None => remark.at < byte.at,
+                };
+            if meant {
+                marks = marks.and(remark.marks());
+            }
+            !meant
+        });
+        marks
     }
 
     /// Takes what a link has carried.
@@ -117,7 +195,13 @@ impl Recorder {
                 count.damaged += u64::from(is_damaged(byte));
             }
             let slot = byte.at.since_start().units() / self.byte.units().max(1);
-            self.slots.entry(slot).or_default().push((column, *byte));
+            let marks = self.marks(column, byte);
+            let seen = Seen {
+                column,
+                byte: *byte,
+                marks,
+            };
+            self.slots.entry(slot).or_default().push(seen);
             if self.slots.len() > MAX_SLOTS {
                 self.slots.pop_first();
                 self.left_out += 1;
@@ -164,10 +248,7 @@ impl Recorder {
                 }),
                 _ => rows.push(LiveRow {
                     at,
-                    cells: own
-                        .iter()
-                        .map(|(column, byte)| cell(*column, byte))
-                        .collect(),
+                    cells: own.iter().map(cell).collect(),
                     ..LiveRow::default()
                 }),
             }
@@ -226,19 +307,23 @@ fn note(ring: usize, drives: u8, location: Location) -> String {
 }
 
 /// Whether links carried nothing but whole SYNCO.
-fn is_idle(cells: &[(usize, LineByte)]) -> bool {
+fn is_idle(cells: &[Seen]) -> bool {
     let mut cells = cells.iter();
-    cells.all(|(_, byte)| byte.sent == Some(SYNCO) && !is_damaged(byte))
+    cells.all(|own| {
+        let plain = own.byte.sent == Some(SYNCO) && !is_damaged(&own.byte);
+        plain && own.marks == Marks::NONE
+    })
 }
 
 fn is_damaged(byte: &LineByte) -> bool {
     byte.sent != byte.received || byte.error.is_some()
 }
 
-/// A byte as the picture shows it: what was sent, and what arrived where that differs.
-fn cell(column: usize, byte: &LineByte) -> LiveCell {
+/// A byte as the picture shows it: its marks, what was sent, and what arrived where that differs.
+fn cell(own: &Seen) -> LiveCell {
+    let (column, byte) = (own.column, &own.byte);
     let digits = |byte: Option<u8>| byte.map_or("--".to_owned(), |byte| format!("{byte:02X}"));
-    let sent = digits(byte.sent);
+    let sent = signs(own.marks) + &digits(byte.sent);
     if is_damaged(byte) {
         let mark = if byte.error.is_some() { "~" } else { "" };
         let text = format!("{sent}\u{2192}{}{mark}", digits(byte.received));

@@ -221,7 +221,10 @@ impl Server {
                     }
                 }
             }
-            self.recorder = Some(Recorder::new(&sizes, self.link.byte_time()));
+            let mut recorder = Recorder::new(&sizes, self.link.byte_time());
+            self.link.record_remarks();
+            recorder.count_from(&self.link);
+            self.recorder = Some(recorder);
         }
     }
 
@@ -231,6 +234,7 @@ impl Server {
             return;
         };
         for ring in 0..self.rings() {
+            recorder.remark(ring, &self.link.take_remarks(ring));
             for link in 0..=usize::from(self.drives(ring)) {
                 if self.is_open(ring, link) {
                     continue;

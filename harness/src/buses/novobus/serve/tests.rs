@@ -383,7 +383,7 @@ fn a_page_shows_each_byte_on_each_link() {
     // The first byte reaches the master three byte times behind the first drive.
     let last = news.rows.last().expect("rows");
     assert_eq!((news.rows.len(), last.cells.len()), (9, 1));
-    assert_eq!(last.cells[0], LiveCell(3, "2D".to_owned(), 'd'));
+    assert_eq!(last.cells[0], LiveCell(3, "+2D".to_owned(), 'd'));
     assert_eq!(news.traffic[3], ["0->master", "6", "6", "0"]);
     assert_eq!(shown(&server.news()), (0, 0));
     server.receive(0, &[0x80; 10]).expect("no marks");
@@ -418,6 +418,71 @@ fn a_page_tells_which_drive_saw_the_fault() {
         assert!(
             stations.iter().all(|row| row[1] == "normal"),
             "{stations:?}"
+        );
+    }
+}
+
+/// ND21 9.7: the marks of the print stand in front of the bytes of the drive that makes them, also on a page that was opened later.
+#[test]
+fn a_page_shows_the_marks_of_the_print() {
+    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    server.go(0);
+    server.receive(0, &[0x80; 7]).expect("no marks");
+    run(&mut server, at(20));
+    server.watch(true);
+    let fault = LiveOrder::Fault { place: 1, fault: 0 };
+    server.order(fault).expect("a fault");
+    run(&mut server, at(60));
+    let rows = server.news().rows;
+    // Behind drive 1, which detects the fault, and behind drive 0, which sees its zeros.
+    let column = |wanted: usize| {
+        let cells = rows.iter().flat_map(|row| &row.cells);
+        let of = cells
+            .filter(|own| own.0 == wanted)
+            .map(|own| own.1.as_str());
+        of.collect::<Vec<_>>()
+    };
+    let marked = |column: &[&str]| {
+        let own = column.iter().filter(|text| text.len() > 2);
+        own.map(|text| (*text).to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(marked(&column(2)), ["!00", "#00"]);
+    assert_eq!(marked(&column(3)), ["!00", "*00", "#00"]);
+    // The 17th zero of drive 0 is marked, and the bytes behind it are numbers.
+    let master = column(3);
+    let seventeenth = master
+        .iter()
+        .position(|text| *text == "#00")
+        .expect("a mark");
+    let zeros = master[..=seventeenth]
+        .iter()
+        .filter(|text| text.ends_with("00"));
+    assert_eq!(zeros.count(), 17);
+    assert_eq!(master[seventeenth + 1], "01");
+}
+
+/// A link that is cut open is shown as such, with nothing in it.
+#[test]
+fn a_page_shows_where_a_ring_is_cut() {
+    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    server.add(Inner {
+        ring: 0,
+        link: 1,
+        role: ClientRole::Cut,
+    });
+    let columns = server.scene().picture.expect("a picture").columns;
+    assert_eq!(columns, ["master->2", "2->1 (cut)", "1->0", "0->master"]);
+    assert_eq!(server.scene().places[1].name, "2->1");
+    server.watch(true);
+    server.receive(0, &READ).expect("no marks");
+    run(&mut server, at(20));
+    let rows = server.news().rows;
+    assert!(!rows.is_empty());
+    for row in rows {
+        let cut = row.cells.iter().filter(|own| own.0 == 1);
+        assert_eq!(
+            cut.collect::<Vec<_>>(),
+            [&LiveCell(1, "//".to_owned(), 'c')]
         );
     }
 }

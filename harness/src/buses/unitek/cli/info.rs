@@ -82,9 +82,12 @@ pub(super) fn top(
             carried: ["frames", "frames/s"],
             picture: live::picture("bench", names),
             read: &mut |session| Ok(rows(&find(session, &drives, &registers)?)),
-            row: &mut |piece| match piece {
-                Piece::Frame(own) => Some(live::at_port(&own, &drives)),
-                _ => None,
+            rows: &mut |heard| {
+                let row = |piece: &Piece| match piece {
+                    Piece::Frame(own) => Some(live::at_port(own, &drives)),
+                    _ => None,
+                };
+                heard.iter().filter_map(row).collect()
             },
         };
         view.show(session, arguments, output)
