@@ -19,6 +19,9 @@ const KEPT: Span = Span::from_millis(40);
 /// Why a conversation on simulated drives ends that is recorded.
 const RECORD_FULL: &str = "it exchanges more than a capture can hold of one request: ask for less at a time, or end the capture first";
 
+/// Counts what a link has carried.
+type Carried<L> = fn(&L) -> u64;
+
 /// A line or a link that sends nothing that the [gates](Gate) of its ports deny. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
 #[derive(Debug)]
@@ -43,7 +46,7 @@ pub struct Guarded<L> {
     /// Whether the lines are [kept](Line::keep).
     keeps: bool,
     /// How much the link behind the guard may have carried, and how that is counted; `None` where its record needs no limit.
-    most_carried: Option<(u64, fn(&L) -> u64)>,
+    most_carried: Option<(u64, Carried<L>)>,
 }
 
 impl<L: Line> Guarded<L> {
@@ -368,8 +371,7 @@ impl<L: Link> Guarded<L> {
     /// own.
     pub(crate) fn limit_record(&mut self, most: Option<u64>) {
         let now = self.inner.carried();
-        self.most_carried =
-            most.map(|most| (now.saturating_add(most), L::carried as fn(&L) -> u64));
+        self.most_carried = most.map(|most| (now.saturating_add(most), L::carried as Carried<L>));
     }
 }
 

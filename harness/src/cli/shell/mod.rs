@@ -1,6 +1,7 @@
 //! `drivebench shell`: a session that holds a bench. People type commands with an editor, or write them into a pipe; with `--json` programs
 //! send one request a line on standard input and get one answer a line on standard output.
 
+mod answer;
 mod capture;
 mod held;
 mod inbox;
