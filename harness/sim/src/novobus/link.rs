@@ -151,10 +151,12 @@ impl Link {
         self.line_free
     }
 
-    /// How many of the bytes that were transmitted have come to the end of the link, or were lost on it.
+    /// How many of the bytes that were transmitted have come to the end of the link, or were lost on it. Of an open link it says nothing:
+    /// what arrives there was fed.
     pub(crate) fn delivered(&self) -> u64 {
         let under_way = self.bytes.under_way().iter();
-        self.transmitted - under_way.filter(|own| own.is_sent()).count() as u64
+        let sent = under_way.filter(|own| own.is_sent()).count() as u64;
+        self.transmitted.saturating_sub(sent)
     }
 
     /// How many bytes have been transmitted, begun ones included.

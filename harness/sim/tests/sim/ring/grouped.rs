@@ -134,6 +134,11 @@ impl Pair {
             22 => self.look(k),
             23 => self.both(|ring| ring.record_link(link)),
             24 if random.below(4) == 0 => self.same(),
+            27 if random.below(4) == 0 => {
+                self.both(Ring::record_anew);
+                let delivered = |ring: &Ring<PlainDrive>| ring.delivered(link);
+                assert_eq!(delivered(&self.grouped), delivered(&self.each));
+            }
             25 if random.below(4) == 0 => {
                 let delay = LinkFault::Delay(Span::from_micros(random.below(2_000)));
                 self.both(|ring| ring.arm_link(link, byte, delay));
@@ -169,6 +174,12 @@ impl Pair {
         assert_eq!(self.grouped.next_home(), self.each.next_home());
         assert_eq!(self.grouped.busy(), self.each.busy());
         assert_eq!(self.grouped.carried(), self.each.carried());
+        let arrived = |ring: &Ring<PlainDrive>| {
+            let links = 0..=usize::from(self.drives);
+            links.map(|link| ring.arrived(link)).collect::<Vec<_>>()
+        };
+        assert_eq!(arrived(&self.grouped), arrived(&self.each));
+        assert_eq!(arrived(&self.each).iter().sum::<u64>(), self.each.carried());
         loop {
             let (ours, theirs) = (self.grouped.receive(), self.each.receive());
             assert_eq!(ours, theirs);
