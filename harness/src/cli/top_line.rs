@@ -41,11 +41,14 @@ pub(crate) struct LineTop<'v, D: HeldDrives, const N: usize> {
     pub(crate) rows: &'v mut dyn FnMut(Vec<Piece>) -> Vec<LiveRow>,
 }
 
-/// Whether there is something to show drives in: a terminal, one page, or a browser.
+/// Whether drives can be shown like this: in a terminal, on one page, or in a browser, with time between two readings.
 ///
 /// # Errors
-/// There is not.
-pub(crate) fn needs_terminal(arguments: &TopArguments, output: &Output) -> Result<(), Failure> {
+/// They cannot.
+pub(crate) fn check(arguments: &TopArguments, output: &Output) -> Result<(), Failure> {
+    if arguments.every == Span::ZERO {
+        return Err(Failure::refused("--every must be longer than nothing"));
+    }
     match arguments.once || arguments.web.is_some() || output.full_screen {
         true => Ok(()),
         false => Err(Failure::refused(

@@ -316,6 +316,10 @@ fn watch_shows_values_again_and_again() {
         "{stdout}"
     );
     refused("watch 0 nist --every 0ms", 2, &["--every must be longer"]);
+    for rig in ["sim:3", "sim:unitek:1", "sim:nordac"] {
+        let line = format!("top --rig {rig} --once --every 0ms");
+        refused(&line, 2, &["--every must be longer"]);
+    }
     refused("watch 0 nist --every 1ns", 2, &["at most 1000000 times"]);
     refused(
         "watch 0 nist --every 1rpm",

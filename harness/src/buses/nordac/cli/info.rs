@@ -13,7 +13,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_line::{LineTop, needs_terminal};
+use crate::cli::top_line::{self, LineTop};
 use harness_proto::nordac::PpoType;
 use serde_json::{Map, Value, json};
 
@@ -140,7 +140,7 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    needs_terminal(arguments, output)?;
+    top_line::check(arguments, output)?;
     let as_what = Use::look("top");
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;

@@ -10,7 +10,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_line::{LineTop, needs_terminal};
+use crate::cli::top_line::{self, LineTop};
 use harness_proto::unitek::Register;
 use serde_json::{Map, Value, json};
 
@@ -69,7 +69,7 @@ pub(super) fn top(
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    needs_terminal(arguments, output)?;
+    top_line::check(arguments, output)?;
     let look = Use::look("top");
     on(bench, &arguments.rig, look, output, |session, output| {
         let registers = SHOWN.map(|(_, register)| Register::of(register));
