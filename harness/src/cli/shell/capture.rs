@@ -19,7 +19,7 @@ use std::time::SystemTime;
 
 /// What a held bench has recorded of its bus.
 pub(crate) struct HeldRecord {
-    /// Everything since its link began, or since it was told to record anew.
+    /// Everything since its link began, or since its record was last emptied.
     pub(crate) traces: Vec<Trace>,
     /// What its ports carry.
     pub(crate) medium: Medium,
@@ -85,7 +85,7 @@ impl SessionCapture {
                 path.display()
             )));
         }
-        bench.record_anew(Some(MOST));
+        bench.record_from_now(Some(MOST));
         let record = bench.record()?;
         let places = Tape::of_ports(&record.traces, record.medium, record.now).places;
         let opened = File::create_new(&path).and_then(|file| {
@@ -124,7 +124,7 @@ impl SessionCapture {
     /// [`Failure`]: the bench has been given back, or the file cannot be written; it stays as it is then.
     pub(super) fn collect(&mut self, bench: &mut dyn HeldBench) -> Result<(), Failure> {
         let mut record = bench.record()?;
-        bench.record_anew(Some(MOST));
+        bench.record_from_now(Some(MOST));
         let (from, carried) = self.taken;
         for trace in &mut record.traces {
             trace.count_from(from.since_start());
@@ -150,7 +150,7 @@ impl SessionCapture {
         let new = tape.pieces.iter().filter(|own| own.0 > Instant::START);
         let written = self.write(new.map(|(_, place, piece)| (*place, piece.later(behind))));
         self.lasted = self.lasted + lasts;
-        self.taken = (record.now, bench.record()?.carried);
+        self.taken = (record.now, record.carried);
         written?;
         if missing > 0 {
             self.note_loss(&format!(
@@ -181,7 +181,7 @@ impl SessionCapture {
         what: &str,
         bench: &mut dyn HeldBench,
     ) -> Result<(), Failure> {
-        bench.record_anew(Some(MOST));
+        bench.record_from_now(Some(MOST));
         let record = bench.record()?;
         self.taken = (record.now, record.carried);
         self.note_loss(&format!("{what} is lost: a session captures no scenario"))

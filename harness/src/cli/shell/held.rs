@@ -61,7 +61,7 @@ pub(crate) trait HeldBench {
 
     /// Forgets what is recorded of the bus. Simulated drives record what comes if `most` says how many pieces at most, or nothing where it is
     /// `None`; ports always record, within their bound.
-    fn record_anew(&mut self, most: Option<u64>);
+    fn record_from_now(&mut self, most: Option<u64>);
 
     /// Whether no telegram is under way on a shared line, so that its record does not end in the middle of one.
     fn is_between_telegrams(&self) -> bool;
@@ -85,8 +85,8 @@ pub(crate) trait HeldBench {
     fn end(self: Box<Self>, error: bool) -> End;
 }
 
-/// As [`HeldBench::record_anew`].
-pub(crate) fn record_anew(link: &mut Guarded<Ends>, most: Option<u64>) {
+/// As [`HeldBench::record_from_now`].
+pub(crate) fn record_from_now(link: &mut Guarded<Ends>, most: Option<u64>) {
     let simulated = link.inner().ports().is_none();
     link.record(most.is_some());
     link.limit_record(most.filter(|_| simulated));
@@ -197,8 +197,8 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         Ok(HeldRecord::of(self.0.session().guarded(), 1))
     }
 
-    fn record_anew(&mut self, most: Option<u64>) {
-        record_anew(self.session().link(), most);
+    fn record_from_now(&mut self, most: Option<u64>) {
+        record_from_now(self.session().link(), most);
     }
 
     fn is_between_telegrams(&self) -> bool {

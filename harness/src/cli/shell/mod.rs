@@ -10,7 +10,7 @@ mod request;
 mod session;
 
 pub(crate) use capture::HeldRecord;
-pub(crate) use held::{HeldBench, HeldDrives, HeldPort, record_anew};
+pub(crate) use held::{HeldBench, HeldDrives, HeldPort, record_from_now};
 pub(crate) use request::schema;
 
 use super::args::{ColourWhen, ShowProgress};
@@ -207,7 +207,7 @@ fn serve(
         ended,
         interrupt,
     };
-    session.bench.record_anew(None);
+    session.bench.record_from_now(None);
     session.happened(ready);
     let exit = match opened {
         true => session.work(told),

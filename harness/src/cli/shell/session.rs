@@ -210,7 +210,7 @@ impl HeldSession {
             let mut own = Output::collecting();
             failure.tell(&mut own);
             let [_, what] = own.take_collected();
-            self.bench.record_anew(None);
+            self.bench.record_from_now(None);
             let what = format!("the capture takes nothing more: {}", what.trim_end());
             self.happened(SessionEvent::Bus { what });
         }
@@ -220,7 +220,7 @@ impl HeldSession {
     pub(super) fn end_capture(&mut self) -> Option<Result<Value, Failure>> {
         let mut capture = self.capture.take()?;
         let collected = capture.collect(&mut *self.bench);
-        self.bench.record_anew(None);
+        self.bench.record_from_now(None);
         Some(collected.and_then(|()| capture.end()))
     }
 
@@ -586,13 +586,13 @@ impl HeldSession {
         }
         // What is judged is recorded whole.
         let Some(capture) = &mut self.capture else {
-            self.bench.record_anew(Some(u64::MAX));
+            self.bench.record_from_now(Some(u64::MAX));
             let played = self.bench.play(entry);
-            self.bench.record_anew(None);
+            self.bench.record_from_now(None);
             return Ok(played?.outcome);
         };
         capture.collect(&mut *self.bench)?;
-        self.bench.record_anew(Some(u64::MAX));
+        self.bench.record_from_now(Some(u64::MAX));
         let played = self.bench.play(entry);
         // The link begins anew, perhaps several times.
         capture.leave_out(

@@ -7,7 +7,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::shell::{HeldBench, HeldRecord, record_anew};
+use crate::cli::shell::{HeldBench, HeldRecord, record_from_now};
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
@@ -218,8 +218,9 @@ impl HeldBench for HeldRings {
         record.ok_or_else(given_back)
     }
 
-    fn record_anew(&mut self, most: Option<u64>) {
-        self.rig.with(|session| record_anew(session.link(), most));
+    fn record_from_now(&mut self, most: Option<u64>) {
+        self.rig
+            .with(|session| record_from_now(session.link(), most));
     }
 
     fn is_between_telegrams(&self) -> bool {
