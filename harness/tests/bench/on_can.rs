@@ -47,7 +47,7 @@ fn no_correct_drive_of_any_kind_is_accused() {
 }
 
 /// Each value of each property that is not the default.
-const VALUES: [&str; 24] = [
+const VALUES: [&str; 32] = [
     "map-reply = native",
     "event-reply = as-map-reply",
     "stuff = A5",
@@ -72,6 +72,14 @@ const VALUES: [&str; 24] = [
     "homing-time = 0ms",
     "homing-time = 700ms",
     "homing-time = 3s",
+    "wide-replies = zero",
+    "interval-accuracy = one-scan",
+    "event-edges = rising",
+    "event-edges = falling",
+    "event-at-set-up = at-once",
+    "rate-change = immediate",
+    "second-identifiers = immediate",
+    "second-identifiers = restart",
 ];
 
 fn not_accused(values: impl Iterator<Item = &'static str>) {

@@ -149,7 +149,7 @@ fn the_catalogue() {
 #[test]
 fn deviations() {
     let (code, all, _) = run(&["deviations", "--bus", "unitek"]);
-    assert_eq!((code, all.lines().count()), (0, 67 + 1 + 20), "{all}");
+    assert_eq!((code, all.lines().count()), (0, 64 + 1 + 20), "{all}");
     let (_, some, _) = run(&["deviations", "--bus", "unitek", "no-lock"]);
     assert!(
         some.starts_with("no-lock ") && some.lines().count() == 1,

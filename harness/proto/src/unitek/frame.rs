@@ -117,6 +117,8 @@ pub enum Ignored {
     TooShort,
     /// 4 bytes, and the drive takes none (`dlc4` = `ignore`).
     FourBytes,
+    /// The drive uses another bit rate than the bus (73).
+    OtherRate,
 }
 
 impl Ignored {
@@ -129,6 +131,7 @@ impl Ignored {
             Self::Remote => "it is a remote frame (4.4)",
             Self::TooShort => "it has fewer than 3 data bytes",
             Self::FourBytes => "it has 4 data bytes",
+            Self::OtherRate => "the drive uses another bit rate",
         }
     }
 }
@@ -312,8 +315,8 @@ pub enum Occasion {
 
 /// How a drive sends the contents of a register.
 ///
-/// `wide` is bit 8 of DC: all replies have 6 bytes (App 3). 16 bits are then extended by the sign of the register; 40 and 8F under
-/// `map-reply short` with zeros (our choice).
+/// `wide` is bit 8 of DC: all replies have 6 bytes (App 3). 16 bits are then extended by the sign of the register or by zeros
+/// (`wide-replies`); 40 and 8F under `map-reply short` by zeros (our choice).
 #[must_use]
 pub fn reply_data(
     register: &Register,
@@ -322,7 +325,7 @@ pub fn reply_data(
     wide: bool,
     properties: &Properties,
 ) -> Data {
-    use super::properties::{EventReply, MapReply};
+    use super::properties::{EventReply, MapReply, WideReplies};
     let short_map = match (occasion, properties.event_reply) {
         (Occasion::Event, EventReply::Native) => false,
         _ => properties.map_reply == MapReply::Short && matches!(register.number, 0x40 | 0x8F),
@@ -331,6 +334,9 @@ pub fn reply_data(
         (Width::Bits32, false, _) => Data::Long(raw),
         (Width::Bits32, true, true) => Data::Long(raw & 0xFFFF),
         (Width::Bits32, true, false) | (Width::Bits16, _, false) => Data::Short(low(raw)),
-        (Width::Bits16, _, true) => Data::Long(register.extend(low(raw))),
+        (Width::Bits16, _, true) => Data::Long(match properties.wide_replies {
+            WideReplies::Sign => register.extend(low(raw)),
+            WideReplies::Zero => low(raw).into(),
+        }),
     }
 }

@@ -121,6 +121,54 @@ words! {
         Speed "speed",
         Position "position",
     }
+    /// `wide-replies`: how 16 bits become 32 in a reply while bit 8 of DC is set (App 3).
+    WideReplies {
+        /// By the sign of the register.
+        #[default]
+        Sign "sign",
+        Zero "zero",
+    }
+    /// `interval-accuracy`: when cyclic frames are sent (5.2, ex 9).
+    IntervalAccuracy {
+        /// Each in its millisecond.
+        #[default]
+        Exact "exact",
+        /// Each second one 1 ms late, so that the mean is exact. An interval of 1 ms leaves no room for that.
+        OneScan "one-scan",
+    }
+    /// `event-edges`: which changes of STATUS are sent by event (ex 10, 10-1).
+    EventEdges {
+        #[default]
+        Both "both",
+        /// A selected bit becomes 1.
+        Rising "rising",
+        /// A selected bit becomes 0.
+        Falling "falling",
+    }
+    /// `event-at-set-up`: whether STATUS is sent when MODE bit 4 is set while a selected bit is 1 (5.2 item 3).
+    EventAtSetUp {
+        #[default]
+        None "none",
+        /// In the next millisecond.
+        AtOnce "at-once",
+    }
+    /// `rate-change`: when a new bit timing in 73 is used (3.1).
+    RateChange {
+        /// At the next power-up, if it was stored.
+        #[default]
+        Restart "restart",
+        Immediate "immediate",
+    }
+    /// `second-identifiers`: what the drive does with 88 and 89 (dump).
+    SecondIdentifiers {
+        /// It stores them.
+        #[default]
+        Stored "stored",
+        /// It also receives on 88, and sends what is asked for there once on 89, or on 69 while 89 is 0.
+        Immediate "immediate",
+        /// The same from the next power-up on, if they were stored.
+        Restart "restart",
+    }
 }
 
 /// How a drive behaves where the manual does not say.
@@ -160,6 +208,18 @@ pub struct Properties {
     pub lock_clears_command: LockClearsCommand,
     /// `power-up-mode`.
     pub power_up_mode: PowerUpMode,
+    /// `wide-replies`.
+    pub wide_replies: WideReplies,
+    /// `interval-accuracy`.
+    pub interval_accuracy: IntervalAccuracy,
+    /// `event-edges`.
+    pub event_edges: EventEdges,
+    /// `event-at-set-up`.
+    pub event_at_set_up: EventAtSetUp,
+    /// `rate-change`.
+    pub rate_change: RateChange,
+    /// `second-identifiers`.
+    pub second_identifiers: SecondIdentifiers,
     /// `reply-delay`: from the end of a request to the begin of its reply on a free bus (ex 8).
     pub reply_delay: Span,
     /// `homing-time`: how long homing stands before it ends (ex 12); whole milliseconds.
@@ -187,6 +247,12 @@ impl Default for Properties {
             lock_at_power_up: LockAtPowerUp::default(),
             lock_clears_command: LockClearsCommand::default(),
             power_up_mode: PowerUpMode::default(),
+            wide_replies: WideReplies::default(),
+            interval_accuracy: IntervalAccuracy::default(),
+            event_edges: EventEdges::default(),
+            event_at_set_up: EventAtSetUp::default(),
+            rate_change: RateChange::default(),
+            second_identifiers: SecondIdentifiers::default(),
             reply_delay: Span::ZERO,
             homing_time: Span::from_millis(500),
         }
@@ -373,4 +439,10 @@ pub const PROPERTIES: &[Description] = properties! {
     "power-up-mode" power_up_mode: PowerUpMode "ex 8" "the control mode before any command";
     "reply-delay" reply_delay: Time "ex 8" "how long after a request its reply begins";
     "homing-time" homing_time: Time "ex 12" "how long homing takes";
+    "wide-replies" wide_replies: WideReplies "App 3" "how 16 bits become 32 while bit 8 of DC is set";
+    "interval-accuracy" interval_accuracy: IntervalAccuracy "ex 9" "when cyclic frames are sent";
+    "event-edges" event_edges: EventEdges "ex 10" "which changes of STATUS are sent by event";
+    "event-at-set-up" event_at_set_up: EventAtSetUp "5.2" "whether a bit that is set when MODE bit 4 is set is an event";
+    "rate-change" rate_change: RateChange "3.1" "when a new bit timing in 73 is used";
+    "second-identifiers" second_identifiers: SecondIdentifiers "dump" "what the drive does with 88 and 89";
 };

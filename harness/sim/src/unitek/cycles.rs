@@ -1,7 +1,7 @@
 //! The table of 8 registers that are sent cyclically (5.2, ex 9, App 8).
 
 use harness_proto::unitek::frame::CYCLES;
-use harness_proto::unitek::properties::TableFull;
+use harness_proto::unitek::properties::{IntervalAccuracy, TableFull};
 
 /// A register that is sent every so often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +12,8 @@ pub struct Cycle {
     pub every: u8,
     /// The millisecond of the next frame.
     pub due: u64,
+    /// The next frame is sent 1 ms late (`interval-accuracy`).
+    late: bool,
     /// Requests are counted; the smallest number was requested longest ago.
     order: u64,
 }
@@ -36,6 +38,7 @@ impl Cycles {
             register,
             every,
             due: now + u64::from(every),
+            late: false,
             order: self.requests,
         });
         true
@@ -55,11 +58,13 @@ impl Cycles {
     }
 
     /// The register of a place, if it is due in millisecond `now`; its next frame is one interval later.
-    pub fn take_due(&mut self, place: usize, now: u64) -> Option<u8> {
+    pub fn take_due(&mut self, place: usize, now: u64, accuracy: IntervalAccuracy) -> Option<u8> {
         let cycle = self.places[place]
             .as_mut()
             .filter(|cycle| cycle.due <= now)?;
-        cycle.due = now + u64::from(cycle.every);
+        cycle.due = now + u64::from(cycle.every) - u64::from(cycle.late);
+        cycle.late = accuracy == IntervalAccuracy::OneScan && cycle.every > 1 && !cycle.late;
+        cycle.due += u64::from(cycle.late);
         Some(cycle.register)
     }
 

@@ -11,12 +11,13 @@ use super::cycles::Cycles;
 use super::inputs::Inputs;
 use super::outbox::{Cause, Outbox, Waiting};
 use super::plant::{Control, Demand, Plant};
-use harness_proto::can::Frame;
+use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::bit_timing::Nbt;
 use harness_proto::unitek::frame::CYCLES;
 use harness_proto::unitek::properties::{
-    CanCounters, CyclicFirst, EventMask, LockAtPowerUp, OneshotStops, PowerUpMode, Properties,
+    CanCounters, CyclicFirst, EventEdges, EventMask, IdChange, LockAtPowerUp, OneshotStops,
+    PowerUpMode, Properties, RateChange, SecondIdentifiers,
 };
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Ignored, REGISTERS, Register, Request};
@@ -41,6 +42,12 @@ pub struct Drive {
     eeprom: [Option<Arc<Cells>>; 2],
     /// On which it receives and sends now.
     identifiers: (u16, u16),
+    /// On which it also receives now and sends single replies (88, 89), as the registers hold them; 0 is none.
+    second: (u32, u32),
+    /// The bit rate of the bus, and 73 as the drive was set up for it.
+    bus: (BitRate, u16),
+    /// Whether the drive uses the bit rate of the bus; with another one it neither hears nor sends.
+    on_bus: bool,
     control: Control,
     plant: Plant,
     /// Scans until homing ends.
@@ -54,6 +61,8 @@ pub struct Drive {
     outbox: Outbox,
     /// STATUS in the last scan.
     last_status: u32,
+    /// Sending by event was switched on since the last scan, and that may be an event itself (`event-at-set-up`).
+    sets_up: bool,
     /// Whether it has its supply; without it, it does not even acknowledge.
     powered: bool,
     power_up: Instant,
@@ -74,6 +83,9 @@ impl Drive {
             cells: dump,
             eeprom: [Some(Arc::new(dump)), None],
             identifiers: (0, 0),
+            second: (0, 0),
+            bus: (BitRate::K500, Nbt::DEFAULT.0),
+            on_bus: true,
             control: Control::Speed,
             plant: Plant::new(POWER_UP_POSITION),
             homing: None,
@@ -83,6 +95,7 @@ impl Drive {
             cycles: Cycles::default(),
             outbox: Outbox::default(),
             last_status: 0,
+            sets_up: false,
             powered: true,
             power_up,
             scans: 0,
@@ -105,8 +118,17 @@ impl Drive {
             self.cells[usize::from(number)] = raw;
         }
         self.plant.preset(self.cells[0x6D].cast_signed());
-        self.identifiers = (self.cell16(0x68), self.cell16(0x69));
+        self.bus.1 = self.cell16(0x73);
+        self.use_bus_settings(true);
         self.last_status = self.status();
+        self
+    }
+
+    /// The drive on a bus of this bit rate; 500 kbit/s by default. It is set up for that rate, whatever 73 holds, until 73 changes.
+    #[must_use]
+    pub fn on_bus_of(mut self, rate: BitRate) -> Self {
+        self.bus.0 = rate;
+        self.use_bus_settings(true);
         self
     }
 
@@ -147,7 +169,7 @@ impl Drive {
         if self.properties.lock_at_power_up == LockAtPowerUp::Yes {
             self.cells[0x51] = MODE_LOCK.into();
         }
-        self.identifiers = (self.cell16(0x68), self.cell16(0x69));
+        self.use_bus_settings(true);
         self.control = match self.properties.power_up_mode {
             PowerUpMode::Speed => Control::Speed,
             PowerUpMode::Position => Control::Position,
@@ -164,6 +186,7 @@ impl Drive {
         self.scans = 0;
         self.next = Some(1);
         self.last_status = self.status();
+        self.sets_up = false;
     }
 
     /// Its properties.
@@ -191,10 +214,59 @@ impl Drive {
         self.identifiers
     }
 
-    /// The bit timing that it uses at the next power-up, if 73 is stored.
+    /// Whether it uses the bit rate of the bus. With another one it neither hears, sends nor acknowledges.
     #[must_use]
-    pub fn bit_timing(&self) -> Nbt {
-        Nbt(self.cell16(0x73))
+    pub const fn is_on_bus(&self) -> bool {
+        self.on_bus
+    }
+
+    /// Takes identifiers and bit timing over from the registers, as far as they are used at once, or all of them `at_power_up`.
+    fn use_bus_settings(&mut self, at_power_up: bool) {
+        let own = &self.properties;
+        if at_power_up || own.id_change == IdChange::Immediate {
+            self.identifiers = (self.cell16(0x68), self.cell16(0x69));
+        }
+        let second = match own.second_identifiers {
+            SecondIdentifiers::Stored => false,
+            SecondIdentifiers::Immediate => true,
+            SecondIdentifiers::Restart => at_power_up,
+        };
+        if second {
+            self.second = (self.cells[0x88], self.cells[0x89]);
+        }
+        if at_power_up || own.rate_change == RateChange::Immediate {
+            let (rate, set_up) = self.bus;
+            let timing = self.cell16(0x73);
+            self.on_bus = timing == set_up || Nbt(timing).rate() == Some(rate);
+            if !self.on_bus {
+                self.outbox.clear();
+            }
+        }
+    }
+
+    /// What it reads out of a frame on the bus, and the identifier on which it answers that.
+    ///
+    /// # Errors
+    /// [`Ignored`] where it does nothing with it.
+    pub fn reads(&self, frame: &Frame) -> Result<(Request, u16), Ignored> {
+        if !self.on_bus {
+            return Err(Ignored::OtherRate);
+        }
+        let (rx, tx) = self.identifiers;
+        let dlc4 = self.properties.dlc4;
+        match Request::decode(frame, rx, dlc4) {
+            Err(Ignored::OtherIdentifier) if self.second.0 != 0 => {
+                let own = |raw: u32| {
+                    u16::try_from(raw)
+                        .ok()
+                        .filter(|id| (1..=0x7FF).contains(id))
+                };
+                let rx = own(self.second.0).ok_or(Ignored::OtherIdentifier)?;
+                let request = Request::decode(frame, rx, dlc4)?;
+                Ok((request, own(self.second.1).unwrap_or(tx)))
+            }
+            read => Ok((read?, tx)),
+        }
     }
 
     /// The cycles that run: register, interval in ms.
@@ -221,7 +293,7 @@ impl Drive {
         self.cells[usize::from(number)] = raw & Register::of(number).mask();
         match number {
             0x6D => self.plant.preset(raw.cast_signed()),
-            0x68 | 0x69 => self.use_identifiers(),
+            0x68 | 0x69 | 0x73 | 0x88 | 0x89 => self.use_bus_settings(false),
             _ => {}
         }
         self.next = self.powered.then_some(self.scans + 1);
@@ -233,10 +305,13 @@ impl Drive {
     /// [`Ignored`] where the drive does nothing with it.
     pub fn receive(&mut self, at: Instant, frame: &Frame) -> Result<Request, Ignored> {
         self.advance(at);
-        let request = match Request::decode(frame, self.identifiers.0, self.properties.dlc4) {
-            Ok(request) => request,
+        let (request, tx) = match self.reads(frame) {
+            Ok(read) => read,
             Err(ignored) => {
-                let own = !matches!(ignored, Ignored::Extended | Ignored::OtherIdentifier);
+                let own = !matches!(
+                    ignored,
+                    Ignored::Extended | Ignored::OtherIdentifier | Ignored::OtherRate
+                );
                 self.count(0x97, own);
                 return Err(ignored);
             }
@@ -250,13 +325,13 @@ impl Drive {
                 if self.properties.oneshot_stops == OneshotStops::Yes {
                     self.cycles.stop(register);
                 }
-                self.reply(at, register, Cause::Asked);
+                self.reply(at, register, Cause::Asked, tx);
             }
             Request::Cycle { register, every } => {
                 let full = self.properties.table_full;
                 let started = self.cycles.start(register, every, self.scans, full);
                 if started && self.properties.cyclic_first == CyclicFirst::AtOnce {
-                    self.reply(at, register, Cause::Cycle(register));
+                    self.send(at, register, Cause::Cycle(register));
                 }
             }
             Request::Stop { register } => self.cycles.stop(register),
@@ -327,16 +402,29 @@ impl Drive {
             self.timed_out = true;
         }
         let status = self.status();
-        let differs = (status ^ self.last_status) & self.cells[0x52] != 0;
-        if differs && self.cell16(0x51) & MODE_EVENT != 0 {
-            self.reply(now, 0x40, Cause::Event);
+        if self.cell16(0x51) & MODE_EVENT != 0 && self.is_event(status) {
+            self.send(now, 0x40, Cause::Event);
         }
         self.last_status = status;
+        self.sets_up = false;
         for place in 0..CYCLES {
-            if let Some(register) = self.cycles.take_due(place, self.scans) {
-                self.reply(now, register, Cause::Cycle(register));
+            let accuracy = self.properties.interval_accuracy;
+            if let Some(register) = self.cycles.take_due(place, self.scans, accuracy) {
+                self.send(now, register, Cause::Cycle(register));
             }
         }
+    }
+
+    /// Whether STATUS is to be sent, where sending by event is switched on.
+    fn is_event(&self, status: u32) -> bool {
+        let last = self.last_status;
+        let edges = match self.properties.event_edges {
+            EventEdges::Both => status ^ last,
+            EventEdges::Rising => status & !last,
+            EventEdges::Falling => last & !status,
+        };
+        let set = if self.sets_up { status } else { 0 };
+        (edges | set) & self.cells[0x52] != 0
     }
 
     fn run_plant(&mut self) {

@@ -25,6 +25,8 @@ pub struct Reference {
     store: [Option<Arc<Cells>>; 2],
     rx: u32,
     tx: u32,
+    second: (u32, u32),
+    lost: bool,
     mode: char,
     speed: i64,
     position: i64,
@@ -40,6 +42,7 @@ pub struct Reference {
     table: [Option<Entry>; 8],
     asked: u64,
     before: u32,
+    set_up: bool,
 }
 
 fn signed(number: u8) -> bool {
@@ -79,6 +82,8 @@ impl Reference {
             inputs,
             rx: 0x201,
             tx: 0x181,
+            second: (0, 0),
+            lost: false,
             mode: if p.power_up_mode.word() == "position" {
                 'p'
             } else {
@@ -97,6 +102,7 @@ impl Reference {
             table: [None; 8],
             asked: 0,
             before: 0,
+            set_up: false,
             p,
         };
         let mask = u32::from_str_radix(p.event_mask.word(), 16).unwrap_or(0);
@@ -221,8 +227,11 @@ impl Reference {
         if wide(number) { raw } else { raw % 65_536 }
     }
 
-    fn answer(&self, number: u8, event: bool) -> Option<Frame> {
+    fn answer(&self, number: u8, event: bool, tx: u32) -> Option<Frame> {
         let p = &self.p;
+        if self.lost {
+            return None;
+        }
         if p.unknown_register.word() == "silent" && REGISTERS[number as usize].dump == 0xFACE {
             return None;
         }
@@ -233,7 +242,7 @@ impl Reference {
         let six = self.at(0xDC) / 256 % 2 == 1;
         let value = if cut {
             raw % 65_536
-        } else if !wide(number) && signed(number) {
+        } else if !wide(number) && signed(number) && p.wide_replies.word() == "sign" {
             raw_of(i16_of(raw))
         } else {
             raw
@@ -245,19 +254,27 @@ impl Reference {
         } else {
             &[number, a, b, p.stuff]
         };
-        Frame::base(self.tx as u16, bytes).ok()
+        Frame::base(tx as u16, bytes).ok()
     }
 
     /// A frame arrives; the frame that answers it.
     pub fn frame(&mut self, frame: &Frame) -> Option<Frame> {
         let d = frame.data();
-        let deaf = frame.id().is_extended() || frame.id().number() != self.rx || frame.is_remote();
-        if deaf || d.len() < 3 || (d.len() == 4 && self.p.dlc4.word() == "ignore") {
+        let id = frame.id().number();
+        let second = id != self.rx && id == self.second.0 && id != 0;
+        let deaf = frame.id().is_extended() || frame.is_remote() || (id != self.rx && !second);
+        if self.lost || deaf || d.len() < 3 || (d.len() == 4 && self.p.dlc4.word() == "ignore") {
             return None;
         }
         self.last = self.now;
         if d[0] == 0x3D {
-            return self.request(d[1], d[2]);
+            let (own, other) = (self.tx, self.second.1);
+            let tx = if second && (1..=0x7FF).contains(&other) {
+                other
+            } else {
+                own
+            };
+            return self.request(d[1], d[2], tx);
         }
         let low = u32::from(d[1]) + 256 * u32::from(d[2]);
         let value = if d.len() < 5 {
@@ -279,7 +296,7 @@ impl Reference {
         None
     }
 
-    fn request(&mut self, number: u8, t: u8) -> Option<Frame> {
+    fn request(&mut self, number: u8, t: u8, tx: u32) -> Option<Frame> {
         let own = self
             .table
             .iter()
@@ -289,7 +306,7 @@ impl Reference {
             self.table[own] = None;
         }
         if t == 0 {
-            return self.answer(number, false);
+            return self.answer(number, false, tx);
         }
         if t == 255 {
             return None;
@@ -302,7 +319,7 @@ impl Reference {
         self.asked += 1;
         self.table[place] = Some((number, t.into(), self.now, self.asked));
         if self.p.cyclic_first.word() == "at-once" {
-            return self.answer(number, false);
+            return self.answer(number, false, self.tx);
         }
         None
     }
@@ -322,6 +339,7 @@ impl Reference {
                         return;
                     }
                 }
+                let before = self.at(number);
                 self.held[number as usize] = value;
                 match number {
                     0x31 => self.mode = 's',
@@ -329,6 +347,12 @@ impl Reference {
                     0x6E => self.mode = 'p',
                     0x7A => self.position = i32_of(value),
                     0x35 | 0xED | 0xC7 => self.ramp = 0,
+                    0x51 if value / 16 % 2 == 1 && (before / 16).is_multiple_of(2) => {
+                        self.set_up = self.p.event_at_set_up.word() == "at-once";
+                    }
+                    _ => {}
+                }
+                match number {
                     0x51 if value / 4 % 2 == 1 && self.p.lock_clears_command.word() == "yes" => {
                         self.held[0x31] = 0;
                         self.held[0x90] = 0;
@@ -345,6 +369,18 @@ impl Reference {
         if self.p.id_change.word() == "immediate" {
             self.rx = self.at(0x68);
             self.tx = self.at(0x69);
+        }
+        if self.p.second_identifiers.word() == "immediate" {
+            self.second = (self.at(0x88), self.at(0x89));
+            if self.second.0 > 0x7FF {
+                self.second.0 = 0;
+            }
+        }
+        if self.p.rate_change.word() == "immediate" {
+            // A bit of 500 kbit/s is 10 quanta of 200 ns.
+            let n = self.at(0x73);
+            let quanta = (n / 256 % 64 + 1) * (3 + n % 16 + n / 16 % 8);
+            self.lost = quanta != 10;
         }
     }
 
@@ -382,19 +418,40 @@ impl Reference {
         }
         let mut out = Vec::new();
         let status = self.read(0x40);
-        if self.at(0x51) / 16 % 2 == 1 && (status ^ self.before) & self.at(0x52) != 0 {
-            out.extend(self.answer(0x40, true));
+        let (rises, falls) = (status & !self.before, self.before & !status);
+        let mut news = match self.p.event_edges.word() {
+            "rising" => rises,
+            "falling" => falls,
+            _ => rises | falls,
+        };
+        if self.set_up {
+            news |= status;
+        }
+        if self.at(0x51) / 16 % 2 == 1 && news & self.at(0x52) != 0 {
+            out.extend(self.answer(0x40, true, self.tx));
         }
         self.before = status;
+        self.set_up = false;
         for place in 0..8 {
             let Some((number, t, since, _)) = self.table[place] else {
                 continue;
             };
-            if (self.now - since).is_multiple_of(t) {
-                out.extend(self.answer(number, false));
+            if self.is_due(self.now - since, t) {
+                out.extend(self.answer(number, false, self.tx));
             }
         }
         out
+    }
+
+    /// Whether a cycle of `t` ms sends, `gone` ms behind its request.
+    fn is_due(&self, gone: u64, t: u64) -> bool {
+        if t == 1 || self.p.interval_accuracy.word() == "exact" {
+            return gone.is_multiple_of(t);
+        }
+        // The odd frames are on time; the even ones come 1 ms later.
+        let odd = gone.is_multiple_of(t) && gone / t % 2 == 1;
+        let late = gone > t && (gone - 1).is_multiple_of(t) && ((gone - 1) / t).is_multiple_of(2);
+        odd || late
     }
 
     fn motor(&mut self) {

@@ -30,6 +30,6 @@ impl Station for Drive {
     }
 
     fn acknowledges(&self) -> bool {
-        self.is_powered()
+        self.is_powered() && self.is_on_bus()
     }
 }

@@ -55,13 +55,14 @@ impl DriveSetup {
         }
     }
 
-    /// The drive, switched on at `power_up`.
+    /// The drive on a bus of this rate, switched on at `power_up`.
     #[must_use]
-    pub fn drive(&self, power_up: Instant) -> Deviant {
+    pub fn drive(&self, rate: BitRate, power_up: Instant) -> Deviant {
         let (rx, tx) = self.identifiers;
         let mut registers = vec![(0x68, rx.into()), (0x69, tx.into())];
         registers.extend(&self.registers);
         let mut drive = Drive::new(self.properties, self.inputs, power_up).with_setup(&registers);
+        drive = drive.on_bus_of(rate);
         if let Some(control) = self.control {
             drive = drive.with_control(control);
         }
@@ -92,7 +93,8 @@ impl Setup {
     #[must_use]
     pub fn segment(&self, guests: usize) -> Segment<Station> {
         let host = || Member::Host(Host::default());
-        let drive = |own: &DriveSetup| Member::Drive(Box::new(own.drive(Instant::START)));
+        let drive =
+            |own: &DriveSetup| Member::Drive(Box::new(own.drive(self.rate, Instant::START)));
         let drives = self.drives.iter().map(drive);
         let guests = (0..guests).map(|_| host());
         let stations = std::iter::once(host()).chain(drives).chain(guests);

@@ -87,6 +87,8 @@ struct Guarded {
     /// On which it may receive: after a write to 68 the old and the new one, since it is open when the drive changes.
     rx: Vec<u16>,
     tx: Vec<u16>,
+    /// On which it may receive as well: what has been written to 88 (`second-identifiers`).
+    second: Vec<u16>,
     /// A lock written through this gate is in force.
     locked: bool,
     /// Registers with a cycle and their intervals in ms.
@@ -115,6 +117,7 @@ impl Gate {
             first_tx: tx,
             rx: [rx].to_vec(),
             tx: [tx].to_vec(),
+            second: Vec::new(),
             locked: false,
             cycles: Vec::new(),
             moved: false,
@@ -135,9 +138,7 @@ impl Gate {
     /// [`Denial`]; the frame must not be sent, and the gate has not changed.
     pub fn admit(&mut self, now: Instant, frame: &Frame) -> Result<(), Denial> {
         let number = frame.id().number();
-        let meant = |drive: &Guarded| {
-            !frame.id().is_extended() && drive.rx.iter().any(|&rx| u32::from(rx) == number)
-        };
+        let meant = |drive: &Guarded| !frame.id().is_extended() && drive.may_hear(number);
         if !self.drives.iter().any(meant) {
             return match self.limits.other_identifiers {
                 true => Ok(()),
@@ -155,7 +156,7 @@ impl Gate {
             return Err(Denial::Load { permille: load });
         }
         for drive in self.drives.iter_mut().filter(|drive| meant(drive)) {
-            drive.follow(request, sure);
+            drive.follow(request, sure && !drive.is_second(number));
         }
         if let Request::Write { register: 0x84, .. } = request {
             self.eeprom_at = Some(now);
@@ -171,7 +172,7 @@ impl Gate {
             return;
         };
         for drive in &mut self.drives {
-            if drive.rx.iter().any(|&rx| u32::from(rx) == number) {
+            if drive.may_hear(number) {
                 // What another master locks it may release again.
                 drive.follow(request, false);
             }
@@ -307,6 +308,26 @@ fn read(frame: &Frame) -> Option<(Request, bool)> {
 }
 
 impl Guarded {
+    /// Whether it may hear a frame with this identifier of 11 bits.
+    fn may_hear(&self, number: u32) -> bool {
+        let mut all = self.rx.iter().chain(&self.second);
+        all.any(|&rx| u32::from(rx) == number)
+    }
+
+    /// Whether it hears frames with this identifier at most as those of a second one.
+    fn is_second(&self, number: u32) -> bool {
+        !self.rx.iter().any(|&rx| u32::from(rx) == number)
+    }
+
+    fn remember_second(&mut self, raw: u32) {
+        let id = u16::try_from(raw)
+            .ok()
+            .filter(|id| (1..=0x7FF).contains(id));
+        if let Some(id) = id.filter(|id| !self.second.contains(id)) {
+            self.second.push(id);
+        }
+    }
+
     /// Keeps the state that an admitted frame leads to. `sure`: every drive reads the frame so.
     fn follow(&mut self, request: Request, sure: bool) {
         match request {
@@ -344,6 +365,7 @@ impl Guarded {
             0x51 => self.locked |= sure,
             0x68 => remember(&mut self.rx),
             0x69 => remember(&mut self.tx),
+            0x88 => self.remember_second(data.bits()),
             _ => {}
         }
         self.moved |= matches!(register, 0x68 | 0x69 | 0x73);

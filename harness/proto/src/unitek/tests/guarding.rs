@@ -283,6 +283,29 @@ fn other_identifiers() {
     );
 }
 
+/// A drive may obey frames on the identifier in 88 (`second-identifiers`): they need the permissions of its first one, and lock nothing.
+#[test]
+fn second_identifiers() {
+    let mut own = gate(Limits {
+        bus_settings: true,
+        ..Limits::default()
+    });
+    assert_eq!(denied(&mut own, "27E#3D1B00"), Some(Denial::Identifier));
+    assert_eq!(denied(&mut own, "201#887E020000"), None);
+    assert_eq!(denied(&mut own, "27E#3D1B00"), None);
+    assert_eq!(
+        denied(&mut own, "27E#510000"),
+        missing(0x51, Missing::Motion)
+    );
+    assert_eq!(denied(&mut own, "27E#510400"), None);
+    assert_eq!(
+        denied(&mut own, "201#310000"),
+        missing(0x31, Missing::Motion)
+    );
+    assert_eq!(denied(&mut own, "201#510400"), None);
+    assert_eq!(denied(&mut own, "201#310000"), None);
+}
+
 proptest! {
     /// Without permissions no frame that passes writes to anything but harmless registers, however the drive reads it.
     #[test]

@@ -69,8 +69,6 @@ struct Memory {
     sent: u64,
     /// What was first sent of a register.
     first: BTreeMap<u8, Data>,
-    /// What was last sent of STATUS by event.
-    status: u32,
 }
 
 /// A frame that a deviant drive hears.
@@ -261,9 +259,6 @@ impl Deviant {
                 .first
                 .entry(reply.register)
                 .or_insert(reply.data);
-            if waiting.cause == super::Cause::Event {
-                self.memory.status = reply.data.bits();
-            }
         }
     }
 }

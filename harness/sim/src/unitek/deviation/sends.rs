@@ -32,12 +32,6 @@ sends! {
     "always-four-bytes" "App 2" "A reply always has 4 bytes." |s| {
         s.instead(Reply { data: Data::Short((s.reply.data.bits() & 0xFFFF) as u16), ..s.reply })
     };
-    "wide-replies-without-sign" "App 3" "With bit 8 of DC set, replies are extended by zeros." |s| match s.reply.data {
-        Data::Long(value) if harness_proto::unitek::Register::of(s.reply.register).width.bits() == 16 => {
-            s.instead(Reply { data: Data::Long(value & 0xFFFF), ..s.reply })
-        }
-        _ => s.as_it_is(),
-    };
     "replies-most-significant-first" "4.1" "The bytes of a reply stand in the other order." |s| s.contents(|bits| match s.reply.data {
         Data::Short(value) => value.swap_bytes().into(),
         Data::Long(_) => bits.swap_bytes(),
@@ -61,14 +55,6 @@ sends! {
             (Cause::Cycle(_), Some(first)) => s.instead(Reply { data: *first, ..s.reply }),
             _ => s.as_it_is(),
         }
-    };
-    "events-on-rising-bits" "ex 10" "STATUS is sent only when a bit becomes 1." |s| match s.waiting.cause {
-        Cause::Event if s.reply.data.bits() & !s.memory.status == 0 => Vec::new(),
-        _ => s.as_it_is(),
-    };
-    "events-on-falling-bits" "ex 10" "STATUS is sent only when a bit becomes 0." |s| match s.waiting.cause {
-        Cause::Event if s.memory.status & !s.reply.data.bits() == 0 => Vec::new(),
-        _ => s.as_it_is(),
     };
     "event-sends-masked-bits" "ex 10" "An event frame has only the bits of the mask." |s| match s.waiting.cause {
         Cause::Event => s.contents(|bits| bits & s.drive.register(0x52)),

@@ -5,8 +5,10 @@ use crate::unitek::outbox::{Cause, Waiting};
 use crate::unitek::plant::Control;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Occasion, reply_data};
-use harness_proto::unitek::properties::{IdChange, IdRange, LockClearsCommand, UnknownRegister};
-use harness_proto::unitek::words::MODE_LOCK;
+use harness_proto::unitek::properties::{
+    EventAtSetUp, IdRange, LockClearsCommand, UnknownRegister,
+};
+use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Reply};
 use std::sync::Arc;
 
@@ -24,6 +26,10 @@ impl Drive {
             Access::RW | Access::SP => {
                 if self.takes(number, raw) {
                     self.cells[usize::from(number)] = raw;
+                    let new = raw & !held;
+                    if number == 0x51 && new & u32::from(MODE_EVENT) != 0 {
+                        self.sets_up = self.properties.event_at_set_up == EventAtSetUp::AtOnce;
+                    }
                     self.act(number, raw);
                 }
             }
@@ -48,7 +54,7 @@ impl Drive {
             0x6E => self.control = Control::Position,
             0x35 | 0xED | 0xC7 => self.plant.forget_ramp(),
             0x51 if raw & u32::from(MODE_LOCK) != 0 => self.lock(),
-            0x68 | 0x69 => self.use_identifiers(),
+            0x68 | 0x69 | 0x73 | 0x88 | 0x89 => self.use_bus_settings(false),
             0x7A => self.plant.preset(raw.cast_signed()),
             _ => {}
         }
@@ -58,12 +64,6 @@ impl Drive {
         if self.properties.lock_clears_command == LockClearsCommand::Yes {
             self.cells[0x31] = 0;
             self.cells[0x90] = 0;
-        }
-    }
-
-    pub(super) fn use_identifiers(&mut self) {
-        if self.properties.id_change == IdChange::Immediate {
-            self.identifiers = (self.cell16(0x68), self.cell16(0x69));
         }
     }
 
@@ -77,7 +77,7 @@ impl Drive {
             }
             (0x83, 0 | 1) => {
                 self.load(usize::from(value == 1));
-                self.use_identifiers();
+                self.use_bus_settings(false);
             }
             (0x84, 0 | 1) => {
                 self.eeprom[usize::from(value == 1)] = Some(Arc::new(self.cells));
@@ -99,10 +99,17 @@ impl Drive {
         }
     }
 
-    pub(super) fn reply(&mut self, at: Instant, number: u8, cause: Cause) {
+    /// Sends a register on the identifier of 69.
+    pub(super) fn send(&mut self, at: Instant, number: u8, cause: Cause) {
+        self.reply(at, number, cause, self.identifiers.1);
+    }
+
+    /// Sends a register on identifier `tx`.
+    pub(super) fn reply(&mut self, at: Instant, number: u8, cause: Cause, tx: u16) {
         let register = Register::of(number);
         let unassigned = register.dump == UNASSIGNED;
-        if unassigned && self.properties.unknown_register == UnknownRegister::Silent {
+        let silent = self.properties.unknown_register == UnknownRegister::Silent;
+        if !self.on_bus || unassigned && silent {
             return;
         }
         let occasion = match cause {
@@ -120,7 +127,7 @@ impl Drive {
             Cause::Asked => self.properties.reply_delay,
             Cause::Cycle(_) | Cause::Event => Span::ZERO,
         };
-        if let Ok(frame) = reply.encode(self.identifiers.1) {
+        if let Ok(frame) = reply.encode(tx) {
             self.outbox.put(Waiting {
                 ready: at + delay,
                 cause,

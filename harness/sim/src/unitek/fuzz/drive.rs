@@ -257,8 +257,7 @@ impl Pair {
     }
 
     fn frame(&mut self, frame: &Frame, reached: &mut impl FnMut(Cell)) {
-        let (rx, dlc4) = (self.drive.identifiers().0, self.drive.properties().dlc4);
-        let request = Request::decode(frame, rx, dlc4);
+        let request = self.drive.reads(frame).map(|(request, _)| request);
         self.happened(self.event(request), reached);
         if let Ok(Request::Write { register, data }) = request
             && let Some(event) = other_width(register, data)
@@ -289,7 +288,9 @@ impl Pair {
         let cycles = || self.drive.running_cycles();
         let has_cycle = |register| cycles().any(|(own, _)| own == register);
         match request {
-            Err(Ignored::Extended | Ignored::OtherIdentifier) => Event::Foreign,
+            Err(Ignored::Extended | Ignored::OtherIdentifier | Ignored::OtherRate) => {
+                Event::Foreign
+            }
             Err(Ignored::Remote) => Event::Remote,
             Err(Ignored::TooShort | Ignored::FourBytes) => Event::TooShort,
             Ok(Request::Read { register }) if has_cycle(register) => Event::ReadOfCycle,
@@ -455,7 +456,7 @@ mod tests {
     /// The variants that the first byte chooses: two profiles, and the other values of what the reference model knows.
     #[test]
     fn every_variant_differs() {
-        assert_eq!(VARIANTS.len(), 20);
+        assert_eq!(VARIANTS.len(), 28);
         for (place, one) in VARIANTS.iter().enumerate() {
             for other in &VARIANTS[..place] {
                 assert_ne!(one.drive.properties(), other.drive.properties());

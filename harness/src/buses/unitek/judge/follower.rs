@@ -47,6 +47,10 @@ pub struct Follower {
     /// On which it may receive and send: after a change the old and the new ones, since it is open when a drive changes.
     pub(super) rx: Vec<u16>,
     pub(super) tx: Vec<u16>,
+    /// On which it may receive and send as well (`second-identifiers`).
+    pub(super) second: [Vec<u16>; 2],
+    /// 73 was written: it may use another bit rate than the bus, at once or from its next start on (`rate-change`).
+    pub(super) other_rate: bool,
     pub(super) held: Vec<Held>,
     pub(super) cycles: [Cycle; 256],
     pub(super) asked: VecDeque<Asked>,
@@ -93,6 +97,8 @@ impl Follower {
             drive,
             rx: vec![rx],
             tx: vec![tx],
+            second: Default::default(),
+            other_rate: false,
             held,
             cycles: [Cycle::Unknown; 256],
             asked: VecDeque::new(),
@@ -169,14 +175,14 @@ impl Follower {
                 self.missing(number, own.start);
                 self.sends(number, own);
             }
-        } else if among(&self.rx, &own.frame) {
+        } else if among(&self.rx, &own.frame) || among(&self.second[0], &own.frame) {
             self.hears(number, own);
         }
     }
 
     /// Whether a frame is the drive's: by its number, or by an identifier that it may have taken.
     fn sent_it(&self, own: &LineFrame) -> bool {
-        let moved = among(&self.tx, &own.frame);
+        let moved = among(&self.tx, &own.frame) || among(&self.second[1], &own.frame);
         match own.from {
             Some(drive) if drive == self.drive => true,
             Some(drive) => moved && !self.others.contains(&drive),
@@ -231,7 +237,8 @@ impl Follower {
             return;
         };
         // What an error ended may have been taken before; 4 bytes may be ignored (`dlc4`).
-        let sure = own.ended == FrameEnd::Good && self.rx.len() == 1 && own.frame.dlc() != 4;
+        let heard = self.rx == [rx] && !self.other_rate;
+        let sure = own.ended == FrameEnd::Good && heard && own.frame.dlc() != 4;
         match request {
             Request::Read { register } => {
                 if let Cycle::On(running) = &mut self.cycles[usize::from(register)] {
@@ -311,6 +318,7 @@ impl Follower {
                 (self.wide, self.wide_at) = (None, at);
             }
             0x78 => self.homes = true,
+            0x73 => self.other_rate |= self.held[place].sure() != Some(data.bits() & 0xFFFF),
             0xDC => {
                 let wide = data.bits() & 0x0100 != 0;
                 self.wide = sure.then_some(wide);
@@ -336,17 +344,19 @@ impl Follower {
         self.may_use(number, data.bits());
     }
 
-    /// A register of identifiers holds this: the drive may use it at once, or from its next start on (`id-change`).
+    /// A register of identifiers holds this: the drive may use it at once, or from its next start on (`id-change`, `second-identifiers`).
     fn may_use(&mut self, register: u8, raw: u32) {
-        if let (0x68 | 0x69, Ok(id @ 1..=0x7FF)) = (register, u16::try_from(raw & 0xFFFF)) {
-            let all = if register == 0x68 {
-                &mut self.rx
-            } else {
-                &mut self.tx
-            };
-            if !all.contains(&id) {
-                all.push(id);
-            }
+        let all = match register {
+            0x68 => &mut self.rx,
+            0x69 => &mut self.tx,
+            0x88 => &mut self.second[0],
+            0x89 => &mut self.second[1],
+            _ => return,
+        };
+        if let Ok(id @ 1..=0x7FF) = u16::try_from(raw & 0xFFFF)
+            && !all.contains(&id)
+        {
+            all.push(id);
         }
     }
 
@@ -363,6 +373,9 @@ impl Follower {
 
     /// Frames that have been due for long.
     fn missing(&mut self, number: usize, now: Instant) {
+        if self.other_rate {
+            return;
+        }
         let slowest = match self.timed {
             true => self.slowest,
             false => Some(self.slowest.unwrap_or_default()),
@@ -405,7 +418,8 @@ impl Follower {
         self.judged.compared += 1;
         let tx = u16::try_from(own.frame.id().number()).unwrap_or(0);
         let first = own.frame.data().first().copied().unwrap_or(0);
-        if !self.tx.contains(&tx) || own.frame.id().is_extended() {
+        let may_use = self.tx.contains(&tx) || self.second[1].contains(&tx);
+        if !may_use || own.frame.id().is_extended() {
             let id = identifier(own.frame.id());
             let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
             return self.breach((number, first), (Name, "3.1"), about);

@@ -85,6 +85,7 @@ impl Follower {
             Cycle::Off(_) | Cycle::Unknown => Cycle::Off(Instant::START),
         });
         (own.rx, own.tx) = (self.rx.clone(), self.tx.clone());
+        (own.second, own.other_rate) = (self.second.clone(), self.other_rate);
         own.asked = self.asked.clone();
         for asked in &mut own.asked {
             (asked.sure, asked.held) = (false, Held::any());
