@@ -38,6 +38,12 @@ fn open_points_are_settled_and_no_correct_drive_is_blamed() {
         ("event-reply", "as-map-reply"),
         ("homing-time", "700ms"),
         ("dlc4", "ignore"),
+        ("wide-replies", "zero"),
+        ("interval-accuracy", "one-scan"),
+        ("event-edges", "rising"),
+        ("event-edges", "falling"),
+        ("event-at-set-up", "at-once"),
+        ("second-identifiers", "immediate"),
     ] {
         let desk = desk(&format!("property {name} = {value}"), ALL);
         let output = qualify(&desk);
@@ -64,10 +70,20 @@ fn what_is_not_permitted_stays_open() {
     let deviations = kept(&desk, "deviations.txt");
     assert!(deviations.starts_with("deviations: none;"), "{deviations}");
     let profile = kept(&desk, "profile.toml");
+    for settled in [
+        "event-edges = both",
+        "event-reply = native",
+        "interval-accuracy = exact",
+    ] {
+        assert!(profile.contains(settled), "{settled}: {profile}");
+    }
     for (name, why) in [
         ("homing-time", "allow_motion"),
         ("id-change", "allow_bus_settings"),
         ("power-up-mode", "it shows when the drive is switched on"),
+        ("wide-replies", "allow_bus_settings"),
+        ("second-identifiers", "allow_bus_settings"),
+        ("rate-change", "an adapter with another bit rate"),
     ] {
         let line = profile
             .lines()

@@ -3,7 +3,7 @@
 //! They need no permission: reads, cycles, STATUS_MASK (52) and the lock. What they do not settle stays open, and a scenario that depends
 //! on it accuses no drive.
 
-use super::known::Known;
+use super::known::{FIRMWARE, Known};
 use super::observed::Observed;
 use crate::buses::unitek::driver::{Driver, Error};
 use crate::link::{Line, Link as _};
@@ -11,14 +11,26 @@ use crate::medium::{Heard, Out};
 use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
+use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::MapReply;
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
+use harness_proto::unitek::{Register, Width};
 
 /// A register to which nothing is assigned (dump).
 const UNASSIGNED: u8 = 0x81;
 const STATUS: u8 = 0x40;
 const MODE: u8 = 0x51;
 const MASK: u8 = 0x52;
+/// The commands of speed and of torque.
+const SPEED: u8 = 0x31;
+const TORQUE: u8 = 0x90;
+/// Bit 8 of its contents makes every reply 6 bytes long (App 3).
+const WIDTH: u8 = 0xDC;
+const WIDE: u32 = 0x0100;
+
+/// The second pair of identifiers, and an identifier that is tried in it: as printed, of node 126.
+const SECOND: u8 = 0x88;
+const TRIED: u16 = 0x27E;
 
 /// The interval of a probe's cycle, in ms.
 const EVERY: u8 = 100;
@@ -55,9 +67,9 @@ pub(super) fn settle(
         patience,
     };
     probe.by_replies()?;
-    probe.event()?;
     let lock = Data::Short(MODE_LOCK);
     probe.write(MODE, lock)?;
+    probe.events()?;
     probe.widths()?;
     probe.cycles()?;
     probe.table()?;
@@ -71,23 +83,48 @@ pub(super) fn settle(
     Ok(())
 }
 
-/// Settles what shows only where the motor of a drive may turn. It is locked afterwards.
+/// Settles what shows only within limits: where bus settings may be changed, which are as before afterwards and not stored, and where the
+/// motor of a drive may turn. It is locked afterwards.
 ///
 /// # Errors
 /// As [`settle`].
-pub(super) fn settle_moving(
+pub(super) fn settle_within(
     known: &mut Known,
     link: &mut Observed<'_>,
     (patience, rate): (Span, BitRate),
+    limits: &Limits,
 ) -> Result<(), Error> {
     let mut probe = Probe {
         known,
         link,
         patience,
     };
-    probe.homing(rate)?;
-    let lock = Data::Short(MODE_LOCK);
-    probe.write(MODE, lock)
+    if limits.bus_settings {
+        probe.wide()?;
+        probe.second()?;
+    }
+    if limits.motion {
+        probe.homing(rate)?;
+        probe.write(MODE, Data::Short(MODE_LOCK))?;
+    }
+    Ok(())
+}
+
+/// The value of `interval-accuracy` that the frames of a cycle show, where time is exact.
+fn accuracy(frames: &[Instant]) -> Option<&'static str> {
+    let gaps = frames.windows(2).map(|pair| pair[1].since(pair[0]));
+    let (late, quarter) = (Span::from_millis(1), Span::from_micros(250));
+    match gaps.max()? {
+        gap if gap < CYCLE + quarter => Some("exact"),
+        gap if gap + quarter > CYCLE + late && gap < CYCLE + late + quarter => Some("one-scan"),
+        _ => None,
+    }
+}
+
+/// Whether a register of 16 bits has a sign, and holds a negative value.
+fn is_negative(register: u8, bits: u32) -> bool {
+    let register = Register::of(register);
+    register.width == Width::Bits16 && register.signed && bits & 0x8000 != 0
 }
 
 struct Probe<'p, 'l> {
@@ -117,7 +154,12 @@ impl Probe<'_, '_> {
 
     /// Sends data bytes as they are. Returns when the frame has left.
     fn send(&mut self, data: &[u8]) -> Result<Instant, Error> {
-        let Ok(frame) = Frame::base(self.known.axis.rx, data) else {
+        self.send_on(self.known.axis.rx, data)
+    }
+
+    /// The same on an identifier.
+    fn send_on(&mut self, rx: u16, data: &[u8]) -> Result<Instant, Error> {
+        let Ok(frame) = Frame::base(rx, data) else {
             return Ok(self.link.now());
         };
         let end = self.link.send(0, Out::Frames(&[frame]));
@@ -173,6 +215,10 @@ impl Probe<'_, '_> {
                 self.known.settle("status-bits", "printed");
             }
         }
+        if self.known.is_wide() {
+            let replies: Vec<_> = self.known.replies.values().copied().collect();
+            replies.iter().for_each(|reply| self.extended(reply));
+        }
         let word = match self.read(UNASSIGNED) {
             Ok(_) => "face",
             Err(Error::NoReply { .. }) => "silent",
@@ -182,33 +228,46 @@ impl Probe<'_, '_> {
         Ok(())
     }
 
-    /// The width of STATUS in an event: locking an enabled drive is one (5.2).
-    fn event(&mut self) -> Result<(), Error> {
-        let enabled = self.known.cell(STATUS) & status::ENABLED != 0;
-        if !enabled || self.known.is_wide() {
-            return Ok(());
-        }
+    /// What is sent by event: a locked drive shows it, since a torque command of 0 clears bit 8 of STATUS and a speed command of 0 sets it.
+    fn events(&mut self) -> Result<(), Error> {
+        const BOTH: Data = Data::Short(MODE_LOCK | MODE_EVENT);
+        let zero = Data::Short(0);
         let mask = self.known.cell(MASK);
-        self.write(MASK, Data::Long(status::ENABLED))?;
-        let both = MODE_LOCK | MODE_EVENT;
-        let [low, high] = both.to_le_bytes();
-        let sent = self.send(&[MODE, low, high])?;
-        let heard = self.listen(sent + self.patience.max(SLACK))?;
-        let width = heard
-            .iter()
-            .find(|(_, reply)| reply.register == STATUS)
-            .map(|(_, reply)| matches!(reply.data, Data::Long(_)));
+        self.write(SPEED, zero)?;
+        self.write(MASK, Data::Long(status::SPEED))?;
+        let set_up = self.status_by((MODE, BOTH))?;
+        let falls = self.status_by((TORQUE, zero))?;
+        let rises = self.status_by((SPEED, zero))?;
         self.write(MODE, Data::Short(MODE_LOCK))?;
         self.write(MASK, Data::Long(mask))?;
+        let edges = match (rises.is_some(), falls.is_some()) {
+            (true, true) => "both",
+            (true, false) => "rising",
+            (false, true) => "falling",
+            // It may send nothing by event at all.
+            (false, false) => return Ok(()),
+        };
+        self.known.settle("event-edges", edges);
+        let word = if set_up.is_some() { "at-once" } else { "none" };
+        self.known.settle("event-at-set-up", word);
         let narrow = self.known.settled.contains("map-reply")
             && self.known.properties.map_reply == MapReply::Short;
-        match width {
-            Some(false) => self.known.settle("event-reply", "as-map-reply"),
+        match rises.or(falls) {
+            Some(Data::Short(_)) => self.known.settle("event-reply", "as-map-reply"),
             // With 32 bits in replies, both values give the same frame.
-            Some(true) if narrow => self.known.settle("event-reply", "native"),
+            Some(Data::Long(_)) if narrow => self.known.settle("event-reply", "native"),
             _ => {}
         }
         Ok(())
+    }
+
+    /// STATUS, if it is sent while a register is written. The write is not read back, so that no reply stands between.
+    fn status_by(&mut self, (register, data): (u8, Data)) -> Result<Option<Data>, Error> {
+        let [low, high, ..] = data.bits().to_le_bytes();
+        let sent = self.send(&[register, low, high])?;
+        let heard = self.listen(sent + self.patience.max(SLACK))?;
+        let status = heard.iter().find(|(_, reply)| reply.register == STATUS);
+        Ok(status.map(|(_, reply)| reply.data))
     }
 
     /// Frames of 4 bytes, and 16 bits to a register of 32. STATUS_MASK decides nothing while the drive sends no events.
@@ -231,6 +290,46 @@ impl Probe<'_, '_> {
             WHOLE => self.known.settle("dlc4", "ignore"),
             other if other == short => self.known.settle("dlc4", "as3"),
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// How a reply of 6 bytes extends 16 bits: a negative value of a register with a sign shows it.
+    fn extended(&mut self, reply: &Reply) {
+        let bits = reply.data.bits();
+        match (is_negative(reply.register, bits), reply.data, bits >> 16) {
+            (true, Data::Long(_), 0xFFFF) => self.known.settle("wide-replies", "sign"),
+            (true, Data::Long(_), 0) => self.known.settle("wide-replies", "zero"),
+            _ => {}
+        }
+    }
+
+    /// The same where replies have 4 bytes: with bit 8 of DC for one of them.
+    fn wide(&mut self) -> Result<(), Error> {
+        let cells = self.known.cells.iter();
+        let negative = cells.map(|(register, raw)| (*register, *raw));
+        let negative = negative.clone().find(|(own, raw)| is_negative(*own, *raw));
+        let (false, Some((register, _))) = (self.known.is_wide(), negative) else {
+            return Ok(());
+        };
+        let width = self.known.cell(WIDTH);
+        let written = |raw: u32| Data::Short((raw & 0xFFFF) as u16);
+        self.write(WIDTH, written(width | WIDE))?;
+        let reply = self.read(register)?;
+        self.write(WIDTH, written(width))?;
+        self.extended(&reply);
+        Ok(())
+    }
+
+    /// Whether the second identifiers are used at once. A drive that does not answer there may use them from its next start on.
+    fn second(&mut self) -> Result<(), Error> {
+        let before = self.known.cell(SECOND);
+        self.write(SECOND, Data::Long(TRIED.into()))?;
+        let sent = self.send_on(TRIED, &[0x3D, FIRMWARE, 0])?;
+        let heard = self.listen(sent + self.patience.max(SLACK))?;
+        self.write(SECOND, Data::Long(before))?;
+        if heard.iter().any(|(_, reply)| reply.register == FIRMWARE) {
+            self.known.settle("second-identifiers", "immediate");
         }
         Ok(())
     }
@@ -258,6 +357,10 @@ impl Probe<'_, '_> {
             if let [one, two, ..] = own(&first)[..] {
                 let (wait, gap) = (one.since(sent), two.since(one));
                 let regular = gap + SLACK > CYCLE && gap < CYCLE + SLACK;
+                let exact = self.link.time_tolerance() == Span::ZERO;
+                if let (true, Some(word)) = (exact && regular, accuracy(&own(&first))) {
+                    self.known.settle("interval-accuracy", word);
+                }
                 if regular && wait < HALF {
                     self.known.settle("cyclic-first", "at-once");
                 } else if regular && wait + SLACK > CYCLE {

@@ -27,15 +27,18 @@ enum Needs {
     Motion,
     /// Identifiers may be changed, and not stored.
     BusSettings,
+    /// The same, and where that shows nothing, the drive is switched off and on.
+    BusSettingsAndPowerUp,
     /// The drive is switched off and on.
     PowerUp,
     /// Frames without an adapter between.
     ExactTime,
+    /// An adapter at another bit rate, which brings the drive back.
+    OtherAdapter,
 }
 
 /// What the probe of a property needs, and the conversation whose frames show it; nothing for those that are not listed.
-const NEEDS: [(&str, Needs, &str); 9] = [
-    ("event-reply", Needs::Motion, "events"),
+const NEEDS: [(&str, Needs, &str); 12] = [
     ("id-change", Needs::BusSettings, "write-identifier"),
     ("id-range", Needs::BusSettings, "write-identifier-range"),
     ("event-mask", Needs::PowerUp, ""),
@@ -44,6 +47,10 @@ const NEEDS: [(&str, Needs, &str); 9] = [
     ("lock-clears-command", Needs::Motion, "lock-and-commands"),
     ("homing-time", Needs::Motion, ""),
     ("reply-delay", Needs::ExactTime, ""),
+    ("interval-accuracy", Needs::ExactTime, ""),
+    ("wide-replies", Needs::BusSettings, ""),
+    ("rate-change", Needs::OtherAdapter, ""),
+    ("second-identifiers", Needs::BusSettingsAndPowerUp, ""),
 ];
 
 /// Why a property is not settled.
@@ -56,11 +63,17 @@ fn why_open(property: &Description, limits: &Limits) -> String {
         Needs::Motion => {
             "the drive did not show it: its hardware enable is open, or it is not ready"
         }
-        Needs::BusSettings if !limits.bus_settings => {
+        Needs::BusSettings | Needs::BusSettingsAndPowerUp if !limits.bus_settings => {
             "not asked: this needs `allow_bus_settings` in [limits]"
+        }
+        Needs::BusSettingsAndPowerUp => {
+            "it does not use them at once; whether it does later shows when it is switched on"
         }
         Needs::PowerUp => "not asked: it shows when the drive is switched on",
         Needs::ExactTime => "not asked: the adapter and the computer take time, too",
+        Needs::OtherAdapter => {
+            "not asked: the drive could be brought back only by an adapter with another bit rate"
+        }
         Needs::Nothing | Needs::BusSettings => "the drive has shown no value that is known",
     };
     why.to_owned()

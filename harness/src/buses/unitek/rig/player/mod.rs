@@ -324,8 +324,8 @@ impl Player {
             known.read_all(&mut driver)?;
             drop(driver);
             probe::settle(known, link, self.patience)?;
-            if self.qualifies && self.limits.motion {
-                probe::settle_moving(known, link, (self.patience, self.rate))?;
+            if self.qualifies {
+                probe::settle_within(known, link, (self.patience, self.rate), &self.limits)?;
             }
             self.profile.settle(known, self.rate)?;
             driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
