@@ -20,7 +20,7 @@ const APART: [u16; 2] = [1622, 1624];
 pub(super) struct Known {
     pub(super) slave: RigSlave,
     /// What the parameters read, by number and IND.
-    pub(super) values: BTreeMap<(u16, u16), u32>,
+    pub(super) values: Values,
     /// How it behaves where the manual leaves that open, as far as a conversation has shown it.
     pub(super) properties: Properties,
     /// How it may behave as well, each with the words of the difference.
@@ -111,15 +111,25 @@ impl Known {
         let mut slave = SlaveSetup::new(self.slave.address);
         slave.ppo = self.ppo();
         slave.properties = properties;
-        for ((number, ind), raw) in &self.values {
-            if let Some(parameter) = Parameter::of(*number).filter(|_| !APART.contains(number)) {
-                let index = Index::of(parameter, *ind, SubindexBits::default());
-                let value = parameter.number_of(*raw);
-                slave.parameters.push((parameter, index, value));
-            }
-        }
+        slave.parameters.extend(stated(&self.values));
         slave
     }
+}
+
+/// What parameters read, by number and IND.
+pub(super) type Values = BTreeMap<(u16, u16), u32>;
+
+/// The same as the setup of a slave has it.
+pub(super) fn stated(
+    values: &Values,
+) -> impl Iterator<Item = (&'static Parameter, Index, i64)> + use<'_> {
+    let apart = |number: &u16| APART.contains(number);
+    let values = values.iter().filter(move |((number, _), _)| !apart(number));
+    values.filter_map(|((number, ind), raw)| {
+        let parameter = Parameter::of(*number)?;
+        let index = Index::of(parameter, *ind, SubindexBits::default());
+        Some((parameter, index, parameter.number_of(*raw)))
+    })
 }
 
 /// The IND of each value of a parameter.

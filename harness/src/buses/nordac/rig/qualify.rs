@@ -1,6 +1,6 @@
 //! A qualification of NORDAC inverters: the deviations that explain what they did, and the values of the open points that were settled.
 
-use super::known::{Known, value_of};
+use super::known::{Known, Values, value_of};
 use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
 use super::{RigSlave, slaves};
 use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified};
@@ -12,6 +12,8 @@ use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
 use harness_sim::nordac::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 /// The conversations that are played with each slave behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/nordac");
@@ -176,7 +178,11 @@ pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Q
     let profile = (!known.is_empty()).then(|| profile((rig, began), known.len(), points));
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let named: Vec<_> = named.collect();
-    qualified(&AttemptNotes(notes), profile, "telegram", &named, whole)
+    let notes = AttemptNotes {
+        notes,
+        behind: RefCell::default(),
+    };
+    qualified(&notes, profile, "telegram", &named, whole)
 }
 
 /// Settles the properties of a slave of which one value alone explains the conversation that shows it.
@@ -212,7 +218,11 @@ fn points<'p>(slaves: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
 }
 
 /// The attempts of a qualification.
-struct AttemptNotes<'n>(Vec<&'n AttemptNote>);
+struct AttemptNotes<'n> {
+    notes: Vec<&'n AttemptNote>,
+    /// What parameters of the slave at a place hold, if it has the deviation with this name and that changes what they read.
+    behind: RefCell<BTreeMap<(usize, &'static str), Values>>,
+}
 
 /// A deviation of the slave at a place.
 struct WrongSlave {
@@ -225,7 +235,11 @@ impl Attempts for AttemptNotes<'_> {
     type Deviation = WrongSlave;
 
     fn deviations(&self) -> Vec<WrongSlave> {
-        let addresses = self.0.first().into_iter().flat_map(|own| own.addresses());
+        let addresses = self
+            .notes
+            .first()
+            .into_iter()
+            .flat_map(|own| own.addresses());
         let each = addresses.enumerate().flat_map(|(place, address)| {
             deviations().map(move |deviation| WrongSlave {
                 place,
@@ -247,7 +261,7 @@ impl Attempts for AttemptNotes<'_> {
     }
 
     fn attempts(&self) -> Vec<Attempted> {
-        let attempted = self.0.iter().map(|own| Attempted {
+        let attempted = self.notes.iter().map(|own| Attempted {
             verdict: own.verdict,
             accuses: own.accuses,
             exact: own.exact,
@@ -257,11 +271,20 @@ impl Attempts for AttemptNotes<'_> {
     }
 
     fn is_right(&self, attempt: usize) -> bool {
-        self.0[attempt].is_explained_by(SlaveIs::Right)
+        self.notes[attempt].is_explained_by(SlaveIs::Right, &Values::new())
     }
 
     fn explains(&self, own: &WrongSlave, attempt: usize) -> bool {
-        self.0[attempt].is_explained_by(SlaveIs::WrongSlave(own.place, own.deviation))
+        let note = self.notes[attempt];
+        let wrong = SlaveIs::WrongSlave(own.place, own.deviation);
+        if note.is_explained_by(wrong, &Values::new()) {
+            return true;
+        }
+        let mut behind = self.behind.borrow_mut();
+        let held = behind.entry((own.place, own.deviation.name));
+        // Parameters are read once, so that every attempt knows the same.
+        let held = held.or_insert_with(|| note.behind(own.place, own.deviation));
+        !held.is_empty() && note.is_explained_by(wrong, held)
     }
 }
 

@@ -4,10 +4,10 @@
 //! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
 
 use super::{AttemptCourse, Own, Player};
-use crate::buses::nordac::rig::known::Known;
+use crate::buses::nordac::rig::known::{Known, Values, stated};
 use crate::buses::nordac::rig::observed::{Agreement, Came, Observed, WHOLE};
 use crate::buses::nordac::rig::settle::{Assumed, search};
-use crate::buses::nordac::rig::talk::TalkError;
+use crate::buses::nordac::rig::talk::{Talk, TalkError};
 use crate::buses::nordac::simulate::SlaveSetup;
 use crate::link::{Link as _, LinkEvent, Recording};
 use crate::scenario::run::{Outcome, Why};
@@ -164,19 +164,69 @@ impl AttemptNote {
         property: &Description,
     ) -> Vec<String> {
         let base: Assumed = known.iter().map(|own| own.properties).collect();
+        let none = Values::new();
         let explains = |word: &String| {
             let mut all = base.clone();
-            property.set(&mut all[place], word) && self.shown_by(Other::Right, &all) == self.shown
+            property.set(&mut all[place], word)
+                && self.shown_by(Other::Right, &all, &none) == self.shown
         };
         let values = crate::buses::nordac::rig::values(property).into_iter();
         values.filter(explains).collect()
     }
 
-    /// Whether slaves that differ so would have shown the same.
-    pub(in crate::buses::nordac) fn is_explained_by(&self, other: Other) -> bool {
+    /// What parameters of the slave at a place hold if it has a deviation that changes what they read; nothing where they hold what was read.
+    ///
+    /// A guess is kept where it reads as the slave did: that the deviation exchanges something, adds something, or shows the other half.
+    pub(in crate::buses::nordac) fn behind(
+        &self,
+        place: usize,
+        deviation: &'static Deviation,
+    ) -> Values {
+        let known = &self.slaves[place];
+        let reads = |held: &Values| {
+            let mut slave = known.model(known.properties);
+            slave.parameters.extend(stated(held));
+            slave.deviation = Some(deviation);
+            let mut link = self.begun.model(vec![slave], &self.begun.limits);
+            let mut again = Known::new(known.slave);
+            let mut talk = Talk::new(Box::new(&mut link), self.begun.patience);
+            // What was read before an error counts.
+            let _partly = again.read_all(&mut talk);
+            again.values
+        };
+        let differing = |read: &Values, wanted: Values| -> Values {
+            let differs = |(place, wanted): &(_, u32)| {
+                let read = read.get(place);
+                read.is_some_and(|read| read != wanted)
+            };
+            wanted.into_iter().filter(differs).collect()
+        };
+        let first = reads(&Values::new());
+        let mut open = differing(&first, known.values.clone());
+        let mut held = Values::new();
+        for guess in [
+            |_: u32, read: u32| read,
+            |wanted: u32, read: u32| wanted.wrapping_add(wanted).wrapping_sub(read),
+            |wanted: u32, _: u32| wanted >> 16,
+        ] {
+            if open.is_empty() {
+                break;
+            }
+            for (place, wanted) in &open {
+                held.insert(*place, guess(*wanted, first[place]));
+            }
+            open = differing(&reads(&held), open);
+        }
+        // What no guess explains is as it was read.
+        held.retain(|place, _| !open.contains_key(place));
+        held
+    }
+
+    /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read.
+    pub(in crate::buses::nordac) fn is_explained_by(&self, other: Other, held: &Values) -> bool {
         let base: Assumed = self.slaves.iter().map(|own| own.properties).collect();
         if let Other::WrongSlave(..) = other {
-            return self.shown_by(other, &base) == self.shown;
+            return self.shown_by(other, &base, held) == self.shown;
         }
         // A verdict in virtual time has looked for right slaves that do the same.
         if self.exact && self.verdict == Verdict::Failed {
@@ -192,24 +242,24 @@ impl AttemptNote {
             .collect();
         let may = |place: usize, property: &Description| open[place].contains(&property.name);
         let found = search(&base, may, |all| {
-            self.shown_by(other, all).agrees(&self.shown)
+            self.shown_by(other, all, held).agrees(&self.shown)
         });
         !found.is_empty()
     }
 
     /// What the attempt shows on models.
-    fn shown_by(&self, other: Other, properties: &Assumed) -> AttemptShown {
-        let mut last = self.played_by(other, properties, None);
+    fn shown_by(&self, other: Other, properties: &Assumed, held: &Values) -> AttemptShown {
+        let mut last = self.played_by((other, held), properties, None);
         // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
         if last != self.shown && self.slaves.iter().any(|own| own.values.is_empty()) {
-            last = self.played_by(other, properties, Some(2));
+            last = self.played_by((other, held), properties, Some(2));
         }
         last
     }
 
     fn played_by(
         &self,
-        other: Other,
+        (other, held): (Other, &Values),
         properties: &Assumed,
         interface: Option<i64>,
     ) -> AttemptShown {
@@ -222,6 +272,9 @@ impl AttemptNote {
             slave.parameters.extend(control);
             if let Other::WrongSlave(own, deviation) = other {
                 slave.deviation = (own == place).then_some(deviation);
+                slave
+                    .parameters
+                    .extend(stated(held).filter(|_| own == place));
             }
             slave
         });
