@@ -335,6 +335,25 @@ fn no_right_inverter_that_differs_in_several_points_is_blamed() {
     none_is_blamed(1..41, &[]);
 }
 
+/// A scenario for an inverter that its terminals control, where the bus controls it: what would switch that is named, and without it nothing is
+/// switched.
+#[test]
+fn other_settings_of_the_bus_are_named() {
+    let name = ["--filter", "nordac-3.4.2-low-byte"];
+    let output = run(&desk("", ""), &name);
+    let about = said(&output);
+    assert!(about.contains("1 skipped"), "{about}");
+    for word in [
+        "1621",
+        "--allow-motion",
+        "`allow_eeprom`",
+        "`allow_bus_settings`",
+    ] {
+        assert!(about.contains(word), "{word}: {about}");
+    }
+    ended(&run(&desk("", ALL), &name), 0, "1 passed");
+}
+
 /// Qualifies an inverter with a deviation: it is named, and no other one.
 fn named(wrong: &str, section: &str, limits: &str) -> (Desk, String) {
     let desk = desk(&format!("deviates {wrong}"), limits);

@@ -507,6 +507,17 @@ impl Player {
             return Ok(true);
         }
         let Some((why, settings)) = first.denied else {
+            let all = Limits {
+                motion: true,
+                eeprom: true,
+                bus_settings: true,
+                ..self.limits
+            };
+            if may && !permitted && self.rehearse(own, &all, with(true)).passes() {
+                let why = "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
+                    --allow-motion, `allow_eeprom` and `allow_bus_settings`";
+                return Err(Why::OtherDrives(why.to_owned()).into());
+            }
             let finding = first.outcome.finding.map(|own| own.message);
             let remark = first.outcome.remarks.into_iter().next();
             let found = finding.or(remark).unwrap_or_default();
