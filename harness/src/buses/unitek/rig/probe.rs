@@ -315,9 +315,9 @@ impl Probe<'_, '_> {
         let width = self.known.cell(WIDTH);
         let written = |raw: u32| Data::Short((raw & 0xFFFF) as u16);
         self.write(WIDTH, written(width | WIDE))?;
-        let reply = self.read(register)?;
+        let reply = self.read(register);
         self.write(WIDTH, written(width))?;
-        self.extended(&reply);
+        self.extended(&reply?);
         Ok(())
     }
 
