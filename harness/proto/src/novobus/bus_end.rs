@@ -21,7 +21,7 @@ use crate::nd21;
 use crate::time::Instant;
 
 pub use super::parameter_channel::Parameter;
-pub use relay::Relay;
+pub use relay::{Passing, Relay};
 pub use view::{Remaining, Silent};
 
 /// What a drive does about a byte or a deadline.

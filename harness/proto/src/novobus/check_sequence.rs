@@ -38,6 +38,11 @@ pub enum SequenceProgress {
 }
 
 impl SequenceWatch {
+    /// One that has seen this many bytes of a sequence, 0 to 4.
+    pub(super) const fn after(matched: u8) -> Self {
+        Self { matched }
+    }
+
     /// How many bytes of a sequence have come, 0 to 4.
     #[must_use]
     pub const fn matched(self) -> u8 {

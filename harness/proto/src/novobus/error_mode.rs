@@ -13,9 +13,13 @@
 //!
 //! After a time-out (9.9) received + 1 starts with the "*" itself, as the printed figure has it.
 
+mod climb;
+
 use super::check_sequence::{SequenceProgress, SequenceWatch, ZEROS};
 use super::properties::BrokenSequence;
 use crate::line::Received;
+
+pub use climb::Climb;
 
 /// Zeros in a row that show that the drive before is in the error mode: a telegram holds at most seven
 /// (ND21 9.7).

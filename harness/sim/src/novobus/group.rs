@@ -1,11 +1,11 @@
 //! Drives in a row that only pass bytes on, advanced together.
 //!
-//! A drive that is not addressed sends each byte one byte time after it has received it, an address byte with 1 added. So what
-//! [`Relay`] keeps of the bytes tells the state of all drives of the row: they differ by their place alone. A group takes each byte
-//! once, when the first drive receives it. It gives the byte to no drive but the one that is addressed, at that drive's own time,
-//! and puts it on the link behind the group when the last drive sends it.
+//! A drive that is not addressed sends each byte one byte time after it has received it, an address byte with 1 added; in the error mode it
+//! adds 1 to each but those of a check sequence. So what [`Relay`] keeps of the bytes tells the state of all drives of the row: they differ
+//! by their place alone. A group takes each byte once, when the first drive receives it. It gives the byte to no drive but the one that is
+//! addressed, at that drive's own time, and puts it on the link behind the group when the last drive sends it.
 //!
-//! Times are those of `Entry::home`: when a byte reaches the end of the ring. Sums are those of a drive before all others.
+//! Times are those of `Entry::home`: when a byte reaches the end of the ring. Bytes and [`Relay`] are those of the first drive.
 //! With both, a byte has the same entry at every drive.
 //!
 //! A group ends at the first byte that its drives do not pass on in this way. Then each drive and each link gets the state that the
@@ -16,7 +16,8 @@ use crate::novobus::link::Link;
 use crate::novobus::node::Node;
 use crate::novobus::under_way::UnderWay;
 use crate::record::LineByte;
-use harness_proto::novobus::bus_end::Relay;
+use harness_proto::novobus::bus_end::{Passing, Relay};
+use harness_proto::novobus::error_mode::Climb;
 use harness_proto::time::{Instant, Span};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -33,27 +34,31 @@ const SPENT: usize = 512;
 struct Entry {
     /// When it reaches the end of the ring.
     home: Instant,
-    /// What the drives before the addressed one receive; of a byte that each increments, what a drive before all others would.
+    /// What the first drive receives.
     byte: u8,
-    /// What the drives behind the addressed one receive.
-    answer: u8,
-    /// Whether each drive adds 1 to it.
+    /// Whether drives add 1 to it, up to the one at `turn`.
     climbs: bool,
-    /// The place of the addressed drive in the ring.
+    /// The first drive that does something else with it: its number in the group.
+    turn: u8,
+    /// What the drives behind that one receive.
+    answer: u8,
+    /// The number of the drive that is addressed.
     addressed: Option<u8>,
-    /// What a drive before all others keeps behind this byte.
+    /// What the first drive keeps behind this byte.
     relay: Relay,
 }
 
+/// No drive's number in a group: a ring has fewer.
+const NO_TURN: u8 = u8::MAX;
+
 impl Entry {
-    /// What the drive in this place receives.
+    /// What drive `number` of the group receives.
     #[inline]
-    fn at(&self, place: usize) -> u8 {
-        let place = low(place);
-        if self.climbs {
-            self.byte.wrapping_add(place)
-        } else if self.addressed.is_some_and(|addressed| addressed < place) {
+    fn at(&self, number: u8) -> u8 {
+        if number > self.turn {
             self.answer
+        } else if self.climbs {
+            self.byte.wrapping_add(number)
         } else {
             self.byte
         }
@@ -69,10 +74,14 @@ pub(crate) struct Group {
     end: usize,
     byte_time: Span,
     recording: bool,
+    /// Whether drives keep what they remark.
+    remarking: bool,
+    /// When the group was formed. What had arrived at a drive then, the drive has dealt with.
+    formed: Instant,
     /// How many bytes the first drive had received, and the last one had sent, when the group was formed.
     received_before: u64,
     sent_before: u64,
-    /// What a drive before all others keeps behind the last byte.
+    /// What the first drive keeps behind the last byte.
     relay: Relay,
     /// The bytes since the group was formed; where none is recorded, the last one that has left and those behind it.
     entries: Vec<Entry>,
@@ -85,42 +94,54 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// The group that begins with the first of `nodes`, in place `first`; `links[i]` ends at `nodes[i]`, and the last link leads away from
-    /// the last node. `None` where fewer than [`LEAST`] drives make one. Nothing may be due before `now`.
+    /// The group that ends with the last of `nodes`, the first of which is in place `first`; `links[i]` ends at `nodes[i]`, and the last
+    /// link leads away from the last node. It takes over what is under way inside of it. `None` where fewer than [`LEAST`] drives make
+    /// one. Nothing may be due before `now`.
     pub(crate) fn form<D: Device>(
         first: usize,
         nodes: &[Node<D>],
-        links: &[Link],
+        links: &mut [Link],
         end: usize,
         now: Instant,
     ) -> Option<Self> {
         nodes.get(LEAST - 1)?;
-        let relay = |node: &Node<D>, place: usize| {
-            let before = low(place).wrapping_neg();
-            Some(node.relay()?.behind(before))
-        };
-        let own = relay(nodes.first()?, first)?;
-        let recording = links.get(1)?.is_recording();
-        let fits = |(offset, (node, inbound)): &(usize, (&Node<D>, &Link))| {
-            inbound.is_idle(now)
-                && inbound.is_recording() == recording
-                && relay(node, first + offset) == Some(own)
-        };
-        let more = nodes.iter().zip(links).enumerate().skip(1);
-        let count = 1 + more.take_while(fits).count();
-        (count >= LEAST).then(|| Self {
-            places: first..first + count,
+        let row = Row::of(nodes, links, now)?;
+        let (nodes, links) = (&nodes[row.first..], &mut links[row.first..]);
+        nodes.get(LEAST - 1)?;
+        let last = nodes.len() - 1;
+        let start = first + row.first;
+        let mut group = Self {
+            places: start..start + nodes.len(),
             end,
-            byte_time: links[1].byte_time(),
-            recording,
-            received_before: links[0].arrived(),
-            sent_before: links[count].transmitted(),
-            relay: own,
+            byte_time: links[last].byte_time(),
+            recording: links[last].is_recording(),
+            remarking: nodes[last].is_recording(),
+            formed: now,
+            received_before: links[0].arrived().checked_sub(row.bytes.len() as u64)?,
+            sent_before: links[last + 1].transmitted(),
+            relay: nodes[last].relay()?.ahead(low(last)),
             entries: Vec::new(),
             dropped: 0,
             left: 0,
             waiting: BinaryHeap::new(),
-        })
+        };
+        for (inner, byte) in row.bytes {
+            group.enter(low(inner - row.first), byte)?;
+        }
+        group.relay = row.relay;
+        if let Some(newest) = group.entries.last_mut() {
+            newest.relay = row.relay;
+        }
+        let mut older = 0;
+        for inner in links[1..=last].iter_mut().rev() {
+            older += inner.hand_over(older);
+        }
+        Some(group)
+    }
+
+    /// The number of the drive in this place, or of the one that would follow the last.
+    fn number(&self, place: usize) -> u8 {
+        low(place - self.places.start)
     }
 
     /// The places of its drives.
@@ -160,7 +181,7 @@ impl Group {
         while let Some(byte) = inbound.peek()
             && byte.at <= until
         {
-            if !self.enter(byte.at, byte) {
+            if self.enter(0, byte).is_none() {
                 end = Some(byte.at - Span::from_units(1));
                 break;
             }
@@ -183,35 +204,68 @@ impl Group {
         end.map_or(Ok(()), Err)
     }
 
-    /// Takes a byte that arrives at the first drive; false where the drives do not pass it on as a group.
+    /// Takes a byte that arrives at drive `number` of the group, most often the first; `None` where the drives do not pass it on as a
+    /// group.
     #[inline]
-    fn enter(&mut self, at: Instant, byte: UnderWay) -> bool {
-        let Some(byte) = byte.plain() else {
-            return false;
+    fn enter(&mut self, number: u8, arriving: UnderWay) -> Option<()> {
+        let byte = arriving.plain()?;
+        let entry = match self.relay {
+            Relay::Passing(relay) => self.passed_on(relay, number, arriving.at, byte)?,
+            Relay::Climbing(relay) => self.climbed(relay, number, arriving.at, byte)?,
         };
-        let climbs = self.relay.awaits_address();
-        let first = low(self.places.start);
-        let byte = byte.wrapping_sub(if climbs { first } else { 0 });
-        let Some(relay) = self.relay.receive(byte) else {
-            return false;
-        };
-        let sum = self.relay.addressing().or_else(|| relay.addressing());
-        self.relay = relay;
+        self.relay = entry.relay;
+        self.entries.push(entry);
+        Some(())
+    }
+
+    /// When a byte that arrives at drive `number` at `at` reaches the end of the ring.
+    #[inline]
+    fn home(&self, number: u8, at: Instant) -> Instant {
+        at + self.way_home(self.places.start + usize::from(number))
+    }
+
+    /// A byte that arrives in normal mode.
+    #[inline]
+    fn passed_on(&mut self, before: Passing, number: u8, at: Instant, byte: u8) -> Option<Entry> {
+        let climbs = before.awaits_address();
+        let byte = byte.wrapping_sub(if climbs { number } else { 0 });
+        let relay = before.receive(byte)?;
+        let sum = before.addressing().or_else(|| relay.addressing());
         let addressed = sum.map(u8::wrapping_neg);
-        let addressed = addressed.filter(|own| self.places.contains(&usize::from(*own)));
-        if let Some(place) = addressed {
-            let at = at + self.byte_time * (usize::from(place) - self.places.start) as u64;
+        let addressed = addressed.filter(|own| usize::from(*own) < self.places.len());
+        if let Some(own) = addressed.filter(|own| *own >= number) {
+            let at = at + self.byte_time * u64::from(own - number);
             self.waiting.push(Reverse((at, self.count())));
         }
-        self.entries.push(Entry {
-            home: at + self.way_home(self.places.start),
+        Some(Entry {
+            home: self.home(number, at),
             byte,
-            answer: byte,
             climbs,
+            // Each drive adds 1 to an address byte, also the addressed one.
+            turn: addressed.filter(|_| !climbs).unwrap_or(NO_TURN),
+            answer: byte,
             addressed,
-            relay,
-        });
-        true
+            relay: Relay::Passing(relay),
+        })
+    }
+
+    /// A byte that arrives in the error mode.
+    #[inline(never)]
+    fn climbed(&self, before: Climb, number: u8, at: Instant, byte: u8) -> Option<Entry> {
+        let relay = before.behind(number).receive(byte)?.ahead(number);
+        let remarks = relay.began_sequence() && usize::from(relay.from()) < self.places.len();
+        if self.remarking && remarks {
+            return None;
+        }
+        Some(Entry {
+            home: self.home(number, at),
+            byte: byte.wrapping_sub(number),
+            climbs: true,
+            turn: relay.from(),
+            answer: relay.in_sequence(),
+            addressed: None,
+            relay: Relay::Climbing(relay),
+        })
     }
 
     /// How many bytes it has taken.
@@ -230,32 +284,33 @@ impl Group {
         let Some(entry) = self.entry(number).copied() else {
             return false;
         };
-        let place = usize::from(entry.addressed.unwrap_or_default());
-        let offset = place - self.places.start;
+        let own = entry.addressed.unwrap_or_default();
+        let offset = usize::from(own);
         let Some(node) = nodes.get_mut(offset) else {
             return false;
         };
-        self.make_up(place, number, node.device_mut());
+        self.make_up(self.places.start + offset, number, node.device_mut());
         let before = offset.checked_sub(1).and_then(|own| inner.get(own));
         let received = before.map_or(self.received_before, Link::arrived);
         let sent = inner
             .get(offset)
             .map_or(self.sent_before, Link::transmitted);
         let number_of = |before: u64| before + number as u64 + 1;
-        let answer = node.answer(at, entry.at(place), number_of(received), number_of(sent));
+        let answer = node.answer(at, entry.at(own), number_of(received), number_of(sent));
         let kept = self.entries.get_mut(number - self.dropped);
         if let (Some(kept), Some(answer)) = (kept, answer) {
             kept.answer = answer;
         }
-        node.relay() == Some(entry.relay.behind(low(place)))
+        node.relay() == Some(entry.relay.behind(own))
     }
 
     /// Lets the drive in this place make up for the bytes that it has passed on, of the first `count`.
     fn make_up<D: Device>(&self, place: usize, count: usize, device: &mut D) {
         let last = count.checked_sub(1).and_then(|last| self.entry(last));
-        if let Some(entry) = last.filter(|last| last.addressed != Some(low(place))) {
-            let at = entry.home - self.way_home(place);
-            device.has_relayed(at, entry.relay.behind(low(place)));
+        let Some(entry) = last else { return };
+        let (number, at) = (self.number(place), entry.home - self.way_home(place));
+        if entry.addressed != Some(number) && at > self.formed {
+            device.has_relayed(at, entry.relay.behind(number));
         }
     }
 
@@ -268,11 +323,11 @@ impl Group {
     /// Puts on the link behind the group what its last drive has received up to `now`.
     fn leave(&mut self, outbound: &mut Link, now: Instant) {
         let last = self.places.end - 1;
-        let way_home = self.way_home(last);
+        let (way_home, behind) = (self.way_home(last), self.number(last + 1));
         while let Some(entry) = self.entry(self.left)
             && entry.home <= now + way_home
         {
-            outbound.transmit(entry.home - way_home, entry.at(last + 1), true);
+            outbound.transmit(entry.home - way_home, entry.at(behind), true);
             self.left += 1;
         }
         let spent = (self.left - self.dropped).saturating_sub(1);
@@ -326,7 +381,8 @@ impl Group {
 
     /// The byte on the link to this place.
     fn on_link(&self, place: usize, entry: &Entry) -> UnderWay {
-        UnderWay::whole(entry.home - self.way_home(place), entry.at(place), true)
+        let byte = entry.at(self.number(place));
+        UnderWay::whole(entry.home - self.way_home(place), byte, true)
     }
 
     /// Ends the group at `now`, up to which everything has happened: gives each drive and each inner link its own state.
@@ -360,7 +416,71 @@ impl Group {
     }
 }
 
-/// A place as drives count sums; a ring has fewer than 256.
-fn low(place: usize) -> u8 {
-    place.to_le_bytes()[0]
+/// Drives that can make a group.
+struct Row {
+    /// The first of them, in the nodes from which they are taken. They end with the last node.
+    first: usize,
+    /// What is under way between them, the oldest first, each with the drive to which it is under way.
+    bytes: Vec<(usize, UnderWay)>,
+    /// What the first of them keeps.
+    relay: Relay,
+    /// When the newest of the bytes arrives, or has arrived, at the second of them.
+    newest: Option<Instant>,
+}
+
+impl Row {
+    /// The longest row that ends with the last of `nodes`.
+    fn of<D: Device>(nodes: &[Node<D>], links: &[Link], now: Instant) -> Option<Self> {
+        let first = nodes.len().checked_sub(1)?;
+        let mut row = Self {
+            first,
+            bytes: Vec::new(),
+            relay: nodes[first].relay()?,
+            newest: None,
+        };
+        let recording = links[first].is_recording();
+        while let Some(ahead) = row.first.checked_sub(1)
+            && links[row.first].is_recording() == recording
+            && row
+                .lengthen(&nodes[ahead], &links[row.first], now)
+                .is_some()
+        {}
+        Some(row)
+    }
+
+    /// Takes one more drive into the row, and the link that leads away from it; `None` where it is none of the row.
+    fn lengthen<D: Device>(&mut self, ahead: &Node<D>, link: &Link, now: Instant) -> Option<()> {
+        // What the links of the row have carried is counted without these bytes.
+        let counted = link.arrived() >= self.bytes.len() as u64;
+        if !link.is_clear(now) || !counted {
+            return None;
+        }
+        let byte = match link.under_way() {
+            [] => None,
+            [byte] if !link.is_recording() => Some(*byte),
+            _ => return None,
+        };
+        // When the link to the drive ahead carried the newest of the bytes so far.
+        let passed = self.newest.map(|at| at - link.byte_time());
+        let newest = byte.map(|byte| byte.at).or(passed);
+        let undelayed = newest.map_or(link.is_idle(now), |at| link.is_free_from(at));
+        let waits = byte.is_some_and(|byte| self.newest.is_some_and(|at| byte.at < at));
+        if !undelayed || waits {
+            return None;
+        }
+        let mut relay = self.relay;
+        if let Some(byte) = byte {
+            relay = relay.receive(byte.plain()?)?;
+        }
+        self.relay = relay.led_by(ahead.relay()?)?;
+        self.bytes.extend(byte.map(|byte| (self.first, byte)));
+        self.newest = newest;
+        self.first -= 1;
+        Some(())
+    }
+}
+
+/// A number of places as drives count sums; a ring has fewer than 256.
+fn low(places: usize) -> u8 {
+    places.to_le_bytes()[0]
 }

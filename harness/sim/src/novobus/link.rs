@@ -430,14 +430,34 @@ impl Link {
         self.byte_time
     }
 
+    /// Whether a byte sent from `now` on arrives, as it was sent.
+    pub(crate) fn is_clear(&self, now: Instant) -> bool {
+        self.sound && !self.cut && self.held_until <= now
+    }
+
     /// Whether a byte sent from `now` on arrives a byte time later, and none is under way.
     pub(crate) fn is_idle(&self, now: Instant) -> bool {
-        self.sound
-            && !self.cut
+        self.is_clear(now)
             && self.line_free <= now
             && self.last_arrival <= now
-            && self.held_until <= now
             && self.bytes.under_way().is_empty()
+    }
+
+    /// Whether the last byte arrives, or has arrived, at `at`, without a delay.
+    pub(crate) fn is_free_from(&self, at: Instant) -> bool {
+        self.line_free == at && self.last_arrival == at
+    }
+
+    /// Hands over what is under way on a link without a record, and as many bytes before it as are `older`. It counts as if it
+    /// had carried none of them. Says how many were under way.
+    pub(crate) fn hand_over(&mut self, older: u64) -> u64 {
+        let under_way = match self.is_recording() {
+            true => 0,
+            false => self.bytes.take_under_way().len() as u64,
+        };
+        self.arrived -= older;
+        self.transmitted -= older + under_way;
+        under_way
     }
 
     /// A sound wire without a record, which is free from `line_free` on.

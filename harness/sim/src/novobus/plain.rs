@@ -112,7 +112,9 @@ impl Device for PlainDrive {
 
     fn has_relayed(&mut self, at: Instant, relay: Relay) {
         self.bus_end.has_relayed(at, relay);
-        if let Some(sum) = relay.sum() {
+        if let Relay::Passing(passing) = relay
+            && let Some(sum) = passing.sum()
+        {
             self.memory.write(ram::BUS_ADDR, sum);
         }
     }

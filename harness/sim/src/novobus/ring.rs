@@ -127,18 +127,23 @@ impl<D: Device> Ring<D> {
     fn form_groups(&mut self) {
         let now = self.now;
         self.next_groups = Some(now + self.byte_time() * BYTES_AN_ATTEMPT);
-        let (mut place, mut index) = (0, 0);
-        while place < self.nodes.len() {
-            let next = self.groups.get(index).map(Group::places);
-            if let Some(places) = next.clone().filter(|next| next.start == place) {
-                (place, index) = (places.end, index + 1);
-                continue;
-            }
-            let end = next.map_or(self.nodes.len(), |next| next.start);
-            let (nodes, links) = (&self.nodes[place..end], &self.links[place..=end]);
-            match Group::form(place, nodes, links, self.nodes.len(), now) {
-                Some(group) => self.groups.insert(index, group),
-                None => place += 1,
+        // From the end of the ring, where the oldest of the bytes under way are. The first `index` groups are ahead of `end`.
+        let (mut end, mut index) = (self.nodes.len(), self.groups.len());
+        loop {
+            let ahead = index
+                .checked_sub(1)
+                .map(|ahead| self.groups[ahead].places());
+            let start = ahead.as_ref().map_or(0, |ahead| ahead.end);
+            let (nodes, links) = (&self.nodes[start..end], &mut self.links[start..=end]);
+            if let Some(group) = Group::form(start, nodes, links, self.nodes.len(), now) {
+                end = group.places().start;
+                self.groups.insert(index, group);
+            } else if end > start {
+                end -= 1;
+            } else if let Some(ahead) = ahead {
+                (end, index) = (ahead.start, index - 1);
+            } else {
+                return;
             }
         }
     }

@@ -1,18 +1,73 @@
-//! A drive that only passes bytes on (ND21 9.2, 9.3): its state follows from the bytes and its place.
+//! A drive that only passes bytes on (ND21 9.2, 9.3) or adds 1 to them in the error mode (9.7): its state follows from the bytes and
+//! its place.
 
-use super::{BusEnd, Reaction, State};
+use super::{BusEnd, Reaction, Silence, State};
 use crate::line::Received;
 use crate::novobus::address::passed_on;
+use crate::novobus::error_mode::{Climb, ErrorMode};
 use crate::novobus::memory::Memory;
-use crate::novobus::properties::{EmptyShortTelegram, ShortAddress};
+use crate::novobus::properties::{BrokenSequence, EmptyShortTelegram, ShortAddress};
 use crate::novobus::sync::{Addressing, Header, SyncByte};
 use crate::time::Instant;
+
+/// What a drive keeps of the bytes that it passes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relay {
+    /// In normal mode.
+    Passing(Passing),
+    /// In the error mode.
+    Climbing(Climb),
+}
+
+impl Relay {
+    /// The same of the drive `places` behind.
+    #[must_use]
+    #[inline]
+    pub fn behind(self, places: u8) -> Self {
+        match self {
+            Self::Passing(own) => Self::Passing(own.behind(places)),
+            Self::Climbing(own) => Self::Climbing(own.behind(places)),
+        }
+    }
+
+    /// The same of the drive `places` ahead.
+    #[must_use]
+    #[inline]
+    pub fn ahead(self, places: u8) -> Self {
+        match self {
+            Self::Passing(own) => Self::Passing(own.behind(places.wrapping_neg())),
+            Self::Climbing(own) => Self::Climbing(own.ahead(places)),
+        }
+    }
+
+    /// Takes a byte as a drive that is not addressed; `None` for a byte that a drive does not simply pass on ([`Passing::receive`],
+    /// [`Climb::receive`]).
+    #[must_use]
+    pub fn receive(self, byte: u8) -> Option<Self> {
+        match self {
+            Self::Passing(own) => own.receive(byte).map(Self::Passing),
+            Self::Climbing(own) => own.receive(byte).map(Self::Climbing),
+        }
+    }
+
+    /// The same of a row that begins one drive ahead, with a drive that keeps `own`; `None` where that drive is none of the row.
+    #[must_use]
+    pub fn led_by(self, own: Self) -> Option<Self> {
+        match (self, own) {
+            (Self::Passing(row), Self::Passing(own)) => {
+                (own.behind(1) == row).then_some(Self::Passing(own))
+            }
+            (Self::Climbing(row), Self::Climbing(own)) => row.led_by(own).map(Self::Climbing),
+            _ => None,
+        }
+    }
+}
 
 /// What a drive in normal mode keeps of the bytes that it passes on.
 ///
 /// Drives in a row that pass the same bytes on differ in the sum alone, by 1 from drive to drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Relay {
+pub struct Passing {
     awaits: Awaits,
     /// The address sum (`BusAddr`), once an address byte has passed.
     sum: Option<u8>,
@@ -26,7 +81,7 @@ enum Awaits {
     Net(u8),
 }
 
-impl Relay {
+impl Passing {
     /// Whether the next byte is an address byte, to which each drive adds 1.
     #[must_use]
     #[inline]
@@ -87,25 +142,29 @@ impl Relay {
 }
 
 impl BusEnd {
-    /// What a drive with this `BusAddr` keeps of the bytes that it has passed on; `None` in the error mode, and for properties under
-    /// which a drive looks at more.
+    /// What a drive with this `BusAddr` keeps of the bytes that it has passed on; `None` in the error mode until it increments (ND21 9.7),
+    /// after a time-out, and for properties under which a drive looks at more.
     #[must_use]
     pub fn relay(&self, bus_addr: u8) -> Option<Relay> {
-        let properties = &self.properties;
-        let kept =
-            self.short_address_valid || properties.short_address == ShortAddress::NotAddressed;
-        let accepted = properties.empty_short_telegram == EmptyShortTelegram::Accepted;
-        if !kept || !accepted {
-            return None;
-        }
         let awaits = match &self.state {
             State::Sync => Awaits::Sync,
             State::Address(header) => Awaits::Address(*header),
             State::Passing { left } | State::Addressed { left, .. } => Awaits::Net(*left),
+            State::Error(mode, Silence::None) => return self.climb(mode).map(Relay::Climbing),
             State::Error(..) => return None,
         };
+        let properties = &self.properties;
+        let kept =
+            self.short_address_valid || properties.short_address == ShortAddress::NotAddressed;
+        let accepted = properties.empty_short_telegram == EmptyShortTelegram::Accepted;
         let sum = self.short_address_valid.then_some(bus_addr);
-        Some(Relay { awaits, sum })
+        (kept && accepted).then_some(Relay::Passing(Passing { awaits, sum }))
+    }
+
+    #[cold]
+    fn climb(&self, mode: &ErrorMode) -> Option<Climb> {
+        let answered = self.properties.broken_sequence == BrokenSequence::Answered;
+        mode.climb().filter(|_| answered)
     }
 
     /// Takes an undamaged byte that is for this drive, as [`Self::receive`] does. [`Self::relay`] must not be `None`.
@@ -120,11 +179,20 @@ impl BusEnd {
     /// Makes up for bytes that were passed on without it, the last of them at `at`. The caller writes `BusAddr`.
     pub fn has_relayed(&mut self, at: Instant, relay: Relay) {
         self.last_received = Some(at);
-        self.short_address_valid = relay.sum.is_some();
-        self.state = match relay.awaits {
-            Awaits::Sync => State::Sync,
-            Awaits::Address(header) => State::Address(header),
-            Awaits::Net(left) => State::Passing { left },
-        };
+        match relay {
+            Relay::Passing(Passing { awaits, sum }) => {
+                self.short_address_valid = sum.is_some();
+                self.state = match awaits {
+                    Awaits::Sync => State::Sync,
+                    Awaits::Address(header) => State::Address(header),
+                    Awaits::Net(left) => State::Passing { left },
+                };
+            }
+            Relay::Climbing(climb) => {
+                if let State::Error(mode, _) = &mut self.state {
+                    mode.has_climbed(climb);
+                }
+            }
+        }
     }
 }

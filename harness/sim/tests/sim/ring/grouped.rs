@@ -5,9 +5,11 @@ use super::against_reference::{fault, telegram};
 use super::common::{Random, repeat, seed};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 use harness_sim::fault::{DriveFault, LinkFault};
+use harness_sim::novobus::device::Device;
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
 
@@ -31,7 +33,7 @@ impl Pair {
                 eeprom,
             )
         });
-        if random.below(3) == 0 {
+        if random.below(2) == 0 {
             grouped.stop_recording();
         }
         let mut each = grouped.clone();
@@ -149,8 +151,17 @@ impl Pair {
                     now + self.each.byte_time() * (u64::from(self.drives) + 60 + random.below(60));
                 self.both(|ring| ring.run_until(until));
             }
+            27 if random.below(3) == 0 => {
+                let bytes = long(random, self.drives);
+                self.both(|ring| ring.send(now, &bytes));
+            }
             _ => self.run(random),
         }
+    }
+
+    fn all_in_error(&self) -> bool {
+        let in_error = |k| self.each.drive(k).is_some_and(Device::in_error);
+        (0..self.drives).all(in_error)
     }
 
     fn look(&self, k: u8) {
@@ -190,8 +201,36 @@ impl Pair {
     }
 }
 
+/// Bytes without a gap, long enough for groups to begin among them: of a ring in normal mode, or in the error mode, with sequences whole
+/// and broken (ND21 9.7, 9.8).
+fn long(random: &mut Random, drives: u8) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let in_error = random.below(4) > 0;
+    if in_error {
+        bytes.extend([0; 40]);
+    }
+    let length = bytes.len() + 100 + random.below(500) as usize;
+    while bytes.len() < length {
+        let more = 1 + random.below(30) as usize;
+        match random.below(6) {
+            0 if in_error => bytes.extend(vec![0; more]),
+            1 if in_error => bytes.extend(&SEQUENCE[..1 + random.below(5) as usize]),
+            2 if in_error => bytes.extend((0..more).map(|_| random.below(256) as u8)),
+            // What the first drives add up to FF, 44, 72 or 4C.
+            3 if in_error => {
+                let places = random.below(u64::from(drives) + 1) as u8;
+                let near = |byte: &u8| byte.wrapping_sub(places);
+                bytes.extend(SEQUENCE[..4].iter().map(near));
+            }
+            4 => bytes.extend(vec![SYNCO; more]),
+            _ => bytes.extend(telegram(random, drives)),
+        }
+    }
+    bytes
+}
+
 fn play(cases: u64) {
-    let mut grouped = 0;
+    let (mut grouped, mut in_error) = (0, 0);
     for case in 0..cases {
         let mut random = Random(seed().wrapping_mul(cases).wrapping_add(case));
         let mut pair = Pair::new(&mut random);
@@ -199,7 +238,9 @@ fn play(cases: u64) {
             for _ in 0..20 + random.below(60) {
                 pair.act(&mut random);
                 pair.compare();
-                grouped += u64::from(pair.grouped.grouped() > 0);
+                let groups = u64::from(pair.grouped.grouped() > 0);
+                grouped += groups;
+                in_error += groups * u64::from(pair.all_in_error());
                 assert_eq!(pair.each.grouped(), 0);
             }
             pair.same();
@@ -208,6 +249,7 @@ fn play(cases: u64) {
     }
     // A test without groups would show nothing.
     assert!(grouped > 5 * cases, "{grouped} steps with groups");
+    assert!(in_error > cases, "{in_error} steps in the error mode");
 }
 
 #[test]
