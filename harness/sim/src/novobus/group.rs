@@ -24,7 +24,7 @@ use std::collections::BinaryHeap;
 use std::ops::Range;
 
 /// Minimum number of drives in a group: below it, the bookkeeping of a group costs more than its drives.
-const LEAST: usize = 6;
+pub(crate) const LEAST: usize = 6;
 
 /// How many bytes that have left a group are kept at most where none is recorded.
 const SPENT: usize = 512;

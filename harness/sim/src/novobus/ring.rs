@@ -7,7 +7,7 @@
 
 use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
-use crate::novobus::group::Group;
+use crate::novobus::group::{Group, LEAST};
 use crate::novobus::link::Link;
 use crate::novobus::node::Node;
 use crate::record::{Channel, LineByte, Remark, Trace};
@@ -71,7 +71,8 @@ impl<D: Device> Ring<D> {
             now: Instant::START,
             sent_by: Instant::START,
             groups: Vec::new(),
-            next_groups: Some(Instant::START),
+            // A short ring has no room for a group.
+            next_groups: (usize::from(size.drives()) >= LEAST).then_some(Instant::START),
             views: OnceLock::new(),
         }
     }
