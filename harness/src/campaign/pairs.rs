@@ -6,13 +6,14 @@ use super::file::{CampaignFile, MAX_CASES, Pairs};
 use super::plan::cases;
 use super::run::{Campaign, CaseOutcome, Contradiction};
 use crate::campaign::report::share;
+use crate::partition::Partition;
 use std::fmt::Write as _;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// The most single faults of which all pairs are counted: what becomes of each is kept.
-const MOST_SINGLES: usize = 30_000;
+pub(super) const MOST_SINGLES: usize = 30_000;
 
 /// Where the two faults of a pair are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -99,6 +100,34 @@ impl PairCounts {
     pub fn played(&self) -> u64 {
         self.counts.iter().flatten().sum()
     }
+
+    /// The counts by the names of where the faults are and of the class, in order.
+    pub(super) fn named(&self) -> Vec<(String, u64)> {
+        let names = Apart::ALL.iter().flat_map(|apart| {
+            let classes = CaseClass::ALL.iter();
+            classes.map(|class| format!("{}, {}", class.name(), apart.name()))
+        });
+        names.zip(self.counts.iter().flatten().copied()).collect()
+    }
+
+    /// The counts with these [names](Self::named), and [`Self::closer`]; `None` where the names are others.
+    pub(super) fn of_named<'a>(
+        named: impl Iterator<Item = (&'a str, u64)>,
+        closer: u64,
+    ) -> Option<Self> {
+        let mut all = Self::default();
+        let (names, counts): (Vec<_>, Vec<_>) = named.unzip();
+        let own = all.named();
+        let known = own.iter().map(|(name, _)| name.as_str());
+        if !known.eq(names) {
+            return None;
+        }
+        for (own, count) in all.counts.iter_mut().flatten().zip(counts) {
+            *own = count;
+        }
+        all.closer = closer;
+        Some(all)
+    }
 }
 
 /// Pairs of a campaign that were counted.
@@ -112,6 +141,8 @@ pub struct PlayedPairs {
     pub singles: u64,
     /// The seed of a sample; `None` where every pair was counted.
     pub seed: Option<u32>,
+    /// The part that was counted, of all pairs.
+    pub part: Option<Partition>,
     /// The counts.
     pub counts: PairCounts,
 }
@@ -217,18 +248,36 @@ impl Campaign {
         Ok(singles * singles.saturating_sub(1) / 2)
     }
 
-    /// Counts what comes of every pair of its cases, on `threads` threads; `progress` is called with the number of pairs done since its
-    /// last call. The counts do not depend on the number of threads.
+    /// How many of all pairs of its cases are in this part: a pair belongs to the part of its second fault.
+    #[must_use]
+    pub fn pairs_of_part(&self, part: Partition) -> u64 {
+        let wanted = self.in_part(Some(part));
+        let seconds = (0..self.cases.len()).filter(|place| wanted(*place));
+        seconds.map(|place| place as u64).sum()
+    }
+
+    /// Whether the single fault at a place belongs to the part.
+    fn in_part(&self, part: Option<Partition>) -> impl Fn(usize) -> bool + '_ {
+        move |place| {
+            let name = || self.cases[place].name(self.shape.drives);
+            part.is_none_or(|part| part.has(place, &name()))
+        }
+    }
+
+    /// Counts what comes of every pair of its cases, or of those of a part ([`Self::pairs_of_part`]), on `threads` threads; `progress` is
+    /// called with the number of pairs done since its last call. The counts do not depend on the number of threads.
     ///
     /// # Errors
     /// Its cases are no single faults or too many, the driver plays them, or a pair fits no class.
     pub fn count_pairs(
         &self,
+        part: Option<Partition>,
         threads: usize,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<PlayedPairs, PairsError> {
         self.pairs(false)?;
         let singles = self.singles()?;
+        let wanted = self.in_part(part);
         let links = usize::from(self.shape.drives) + 1;
         let counts = in_threads(
             threads,
@@ -240,7 +289,7 @@ impl Campaign {
                 let Some(sharing) = sharing else {
                     return Ok(());
                 };
-                sharing.pairs(&singles, link, &mut |alike| {
+                sharing.pairs(&singles, link, &wanted, &mut |alike| {
                     let outcome = self.outcome(&alike.case, alike.evidence.clone())?;
                     let named = alike.evidence.named;
                     counts.add(&alike.case, outcome.class, named, alike.count);
@@ -249,7 +298,10 @@ impl Campaign {
                 })
             },
         )?;
-        Ok(self.played_pairs(&singles, None, counts))
+        Ok(PlayedPairs {
+            part,
+            ..self.played_pairs(&singles, None, counts)
+        })
     }
 
     /// Plays `sample` pairs of its cases that are drawn by `seed`, each on a ring of its own from the start. Where cases share what they
@@ -316,6 +368,7 @@ impl Campaign {
             title: self.file.title.clone(),
             singles: singles.len() as u64,
             seed,
+            part: None,
             counts,
         }
     }
@@ -333,9 +386,11 @@ impl PlayedPairs {
     pub fn table(&self) -> String {
         let counts = &self.counts;
         let (pairs, played) = (self.pairs(), counts.played());
-        let what = match self.seed {
-            None => format!("all {pairs} pairs"),
-            Some(seed) => format!("{played} of {pairs} pairs, seed {seed}"),
+        let what = match (self.seed, self.part) {
+            (Some(seed), _) => format!("{played} of {pairs} pairs, seed {seed}"),
+            (None, Some(part)) => format!("{played} of {pairs} pairs, part {part},"),
+            (None, None) if played == pairs => format!("all {pairs} pairs"),
+            (None, None) => format!("{played} of {pairs} pairs"),
         };
         let mut text = format!(
             "{}\n{}: {what} of {} faults\n\n",
@@ -389,6 +444,7 @@ impl PlayedPairs {
             "pairs": self.pairs(),
             "played": self.counts.played(),
             "seed": self.seed,
+            "partition": self.part.map(|part| part.to_string()),
             "counts": Apart::ALL.map(of),
             "located_closer": self.counts.closer(),
         })

@@ -2,6 +2,7 @@
 
 use super::file::ExpectedCounts;
 use super::line::{LineCampaign, PlayedLine};
+use super::pairs::{Apart, MOST_SINGLES, PairCounts, PlayedPairs};
 use super::{Campaign, CaseClass, PlayedCampaign};
 use crate::counted::counted;
 use crate::partition::{Partition, Spread};
@@ -46,6 +47,21 @@ pub struct CampaignCounts {
     pub counts: Vec<ClassCount>,
     /// The figures that its file pins.
     pub expect: Vec<ClassCount>,
+    /// Where its cases are the pairs of single faults: what the classes do not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pairs: Option<PairFacts>,
+}
+
+/// Facts of a count of pairs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PairFacts {
+    /// What the campaign shows.
+    title: String,
+    /// How many single faults it has.
+    faults: u64,
+    /// Of the located pairs on two links, those of which the link closer to the master's receiver was named.
+    located_closer: u64,
 }
 
 /// How many cases a class has; the class `cases` stands for all.
@@ -148,6 +164,36 @@ impl WholeCampaign {
         whole
     }
 
+    /// Of the pairs of the cases of a campaign on rings.
+    #[must_use]
+    pub fn of_pairs(campaign: &Campaign) -> Self {
+        let drives = campaign.shape.drives;
+        let names: Vec<_> = campaign.cases.iter().map(|own| own.name(drives)).collect();
+        let texts = [&["pairs"], &campaign.texts()[..]].concat();
+        let singles = names.len() as u64;
+        Self {
+            cases: singles * singles.saturating_sub(1) / 2,
+            ..Self::new(&texts, &names, &[])
+        }
+    }
+
+    /// The counts of pairs that were played.
+    #[must_use]
+    pub fn counts_of_pairs(self, played: &PlayedPairs) -> CampaignCounts {
+        let counts = played.counts.named();
+        let counts = counts
+            .iter()
+            .map(|(name, cases)| ClassCount::of(name, *cases));
+        CampaignCounts {
+            pairs: Some(PairFacts {
+                title: played.title.clone(),
+                faults: played.singles,
+                located_closer: played.counts.closer(),
+            }),
+            ..self.counted(&played.name, counts.collect())
+        }
+    }
+
     fn new(texts: &[&str], cases: &[String], expect: &[(&str, u64)]) -> Self {
         let expect = expect.iter();
         Self {
@@ -182,11 +228,28 @@ impl WholeCampaign {
             cases: self.cases,
             counts,
             expect: self.expect,
+            pairs: None,
         }
     }
 }
 
 impl CampaignCounts {
+    /// The pairs that were counted, where its cases are pairs.
+    #[must_use]
+    pub fn pairs(&self) -> Option<PlayedPairs> {
+        let facts = self.pairs.as_ref()?;
+        let named = self.counts.iter();
+        let named = named.map(|own| (own.class.as_str(), own.cases));
+        Some(PlayedPairs {
+            name: self.name.clone(),
+            title: facts.title.clone(),
+            singles: facts.faults,
+            seed: None,
+            part: None,
+            counts: PairCounts::of_named(named, facts.located_closer)?,
+        })
+    }
+
     /// How many cases were played; `None` if the numbers are too large.
     #[must_use]
     pub fn played(&self) -> Option<u64> {
@@ -279,6 +342,11 @@ impl CountsFile {
                 all.collect::<Vec<_>>().join(", ")
             };
             let classes: Vec<_> = own.counts.iter().map(|own| own.class.as_str()).collect();
+            let counted = match &own.pairs {
+                None => "single cases".to_owned(),
+                Some(pairs) => format!("pairs of {} faults", pairs.faults),
+            };
+            facts.push((format!("count of {name}"), counted));
             facts.push((format!("sum of {name}"), own.sha256.clone()));
             facts.push((format!("number of cases of {name}"), own.cases.to_string()));
             facts.push((format!("list of classes of {name}"), format!("{classes:?}")));
@@ -337,6 +405,13 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
             // Each part has at most all cases, and there are few parts: see `fits`.
             count.cases = all.fold(0, u64::saturating_add);
         }
+        if let Some(sum) = &mut sum.pairs {
+            let own = parts
+                .iter()
+                .filter_map(|(_, file, _)| file.campaigns[place].pairs.as_ref());
+            let all = own.map(|own| own.located_closer);
+            sum.located_closer = all.fold(0, u64::saturating_add);
+        }
         let played = sum.played().unwrap_or(u64::MAX);
         if played > sum.cases || missing.is_empty() && played != sum.cases {
             return Err(CountsError::Wrong(format!(
@@ -353,6 +428,30 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
     })
 }
 
+/// How many pairs a slice has: those of which the second fault is one of its faults.
+fn share_of_pairs(
+    own: &CampaignCounts,
+    facts: &PairFacts,
+    partition: Partition,
+) -> Result<u64, String> {
+    let (faults, name) = (facts.faults, &own.name);
+    let most = MOST_SINGLES as u64;
+    if faults > most || own.cases != faults * faults.saturating_sub(1) / 2 {
+        return Err(format!(
+            "{name} has {} pairs of {faults} faults, which cannot be",
+            own.cases
+        ));
+    }
+    let located = own
+        .pairs()
+        .map(|own| own.counts.count(Apart::Links, CaseClass::Located));
+    if located.is_none_or(|located| facts.located_closer > located) {
+        return Err(format!("the counts of {name} are not those of pairs"));
+    }
+    let first = u64::from(partition.number - 1);
+    Ok((first..faults).step_by(partition.of as usize).sum())
+}
+
 /// Whether a part can have these counts.
 fn fits(own: &CampaignCounts, partition: Partition) -> Result<(), String> {
     let played = own.played().filter(|played| *played <= own.cases);
@@ -362,7 +461,10 @@ fn fits(own: &CampaignCounts, partition: Partition) -> Result<(), String> {
             own.name, own.cases
         ));
     };
-    let share = partition.share(own.cases);
+    let share = match &own.pairs {
+        None => partition.share(own.cases),
+        Some(facts) => share_of_pairs(own, facts, partition)?,
+    };
     match partition.spread {
         Spread::Slice if played != share => Err(format!(
             "it has {played} cases of {}, and {partition} has {share}",

@@ -464,15 +464,16 @@ pub struct CampaignArguments {
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
     /// Count what two faults do: every pair of the cases of a campaign of single faults.
-    #[arg(long, requires = "campaigns", conflicts_with_all = ["only", "case", "partition", "output", "html"])]
+    #[arg(long, requires = "campaigns", conflicts_with_all = ["only", "case", "html"])]
     pub pairs: bool,
     /// Draw this number of pairs, and play each from the start; show the shares of all pairs with 95 % confidence.
-    #[arg(long, value_name = "NUMBER", requires = "pairs", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "NUMBER", requires = "pairs", conflicts_with_all = ["partition", "output"], value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub sample: Option<u64>,
     /// Where the drawing starts: the same seed draws the same pairs.
     #[arg(long, value_name = "NUMBER", requires = "sample", default_value_t = 0)]
     pub seed: u32,
-    /// Play one part of the cases of each campaign: slice:M/N takes every N-th, hash:M/N takes them by name. `merge` adds the counts of the parts.
+    /// Play one part of the cases of each campaign: slice:M/N takes every N-th, hash:M/N takes them by name; with --pairs, all pairs whose
+    /// second fault is in the part. `merge` adds the counts of the parts.
     #[arg(long, value_name = "PART", requires = "output", conflicts_with_all = ["case", "html"])]
     pub partition: Option<Partition>,
     /// Write the counts into this file, as JSON.

@@ -25,9 +25,6 @@ pub(crate) fn campaign(
         Ok(found) => found,
         Err(exit) => return Ok(exit),
     };
-    if arguments.pairs {
-        return pairs(&found, arguments, output);
-    }
     if let Some(name) = &arguments.case {
         return replay(name, &found.on_rings, &found.on_lines, output);
     }
@@ -35,6 +32,9 @@ pub(crate) fn campaign(
         if writable(path, output).is_err() {
             return Ok(Exit::Usage);
         }
+    }
+    if arguments.pairs {
+        return pairs(&found, arguments, output);
     }
     let wholes = found.divide(arguments.partition);
     let all = match play_rings(&found.on_rings, arguments, output)? {
@@ -54,16 +54,31 @@ pub(crate) fn campaign(
     {
         return Ok(Exit::RigError);
     }
-    let counts = CountsFile::new(arguments.partition, wholes.counts(&all, &played));
+    let differs = all.iter().any(|own| !own.differs().is_empty());
+    let differs = differs || played.iter().any(|own| !own.differs().is_empty());
+    Ok(keep(
+        wholes.counts(&all, &played),
+        differs,
+        arguments,
+        output,
+    ))
+}
+
+/// Writes counts where they are asked for; says how it ended.
+fn keep(
+    counts: Vec<CampaignCounts>,
+    differs: bool,
+    arguments: &CampaignArguments,
+    output: &mut Output,
+) -> Exit {
+    let counts = CountsFile::new(arguments.partition, counts);
     if let Some(path) = &arguments.output
         && !save(path, &counts.text(), "the counts are", output)
     {
-        return Ok(Exit::RigError);
+        return Exit::RigError;
     }
-    let differs = all.iter().any(|own| !own.differs().is_empty());
-    let differs = differs || played.iter().any(|own| !own.differs().is_empty());
     let nothing = counts.campaigns.iter().all(|own| own.played() == Some(0));
-    Ok(match (&arguments.partition, differs) {
+    match (&arguments.partition, differs) {
         (_, true) => Exit::Failed,
         (Some(part), false) if nothing => {
             output.complain(&format!("{part} has no case"));
@@ -76,7 +91,7 @@ pub(crate) fn campaign(
             Exit::Passed
         }
         (None, false) => Exit::Passed,
-    })
+    }
 }
 
 /// The campaigns that were found.
@@ -199,14 +214,18 @@ fn pairs(
     let mut counted = Vec::new();
     for campaign in &found.on_rings {
         match campaign.pairs(arguments.sample.is_some()) {
-            Ok(all) => counted.push(arguments.sample.map_or(all, |sample| sample.min(all))),
+            Ok(all) => counted.push(match (arguments.sample, arguments.partition) {
+                (Some(sample), _) => sample.min(all),
+                (None, Some(part)) => campaign.pairs_of_part(part),
+                (None, None) => all,
+            }),
             Err(error) => {
                 output.complain(&error.to_string());
                 return Ok(Exit::Usage);
             }
         }
     }
-    let mut listed = Vec::new();
+    let (mut listed, mut counts) = (Vec::new(), Vec::new());
     for (campaign, cases) in found.on_rings.iter().zip(counted) {
         let bar = progress_bar(
             usize::try_from(cases).unwrap_or(usize::MAX),
@@ -215,24 +234,28 @@ fn pairs(
         bar.set_message(campaign.name.clone());
         let progress = |done| bar.inc(done);
         let played = match arguments.sample {
-            None => campaign.count_pairs(threads, &progress),
+            None => campaign.count_pairs(arguments.partition, threads, &progress),
             Some(sample) => campaign.sample_pairs(sample, arguments.seed, threads, &progress),
         };
         bar.finish_and_clear();
-        match played {
-            Ok(played) if arguments.format == TableFormat::Json => listed.push(played.json()),
-            Ok(played) => output.result(&(played.table() + "\n"))?,
+        let played = match played {
+            Ok(played) => played,
             Err(error) => {
                 output.complain(&error.to_string());
                 return Ok(Exit::RigError);
             }
+        };
+        match arguments.format {
+            TableFormat::Json => listed.push(played.json()),
+            TableFormat::Table => output.result(&(played.table() + "\n"))?,
         }
+        counts.push(WholeCampaign::of_pairs(campaign).counts_of_pairs(&played));
     }
     if arguments.format == TableFormat::Json {
         let all = serde_json::json!({ "schema": 1, "pairs": listed });
         output.result(&format!("{all}\n"))?;
     }
-    Ok(Exit::Passed)
+    Ok(keep(counts, false, arguments, output))
 }
 
 fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {

@@ -55,6 +55,9 @@ pub(crate) fn merge_counts(
 
 /// The counts of a campaign; what is pinned is compared only where no part is missing.
 fn table(own: &CampaignCounts, whole: bool) -> String {
+    if let Some(pairs) = own.pairs() {
+        return pairs.table() + "\n";
+    }
     let played = own.played().unwrap_or(u64::MAX);
     let mut text = format!("{}: {played} of {} cases\n\n", own.name, own.cases);
     // Writing to a String cannot fail.

@@ -67,6 +67,68 @@ fn merged_counts_equal_one_machine() {
     }
 }
 
+/// Two faults in one conversation: a pair is in the part of its second fault.
+#[test]
+fn merged_counts_of_pairs_equal_one_machine() {
+    let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
+    let lost =
+        "schema = 1\ntitle = \"Lost\"\nscenario = \"9.6-every-write\"\nfaults = [\"drop\"]\n";
+    fs::write(desk.path("lost.toml"), lost).expect("room");
+    let count = |file: &str, more: &[&str]| {
+        let own = ["campaign", "lost.toml", "--pairs", "--output", file];
+        desk.run(&[&own, more].concat())
+    };
+    let whole = count("whole.json", &[]);
+    ended(&whole, 0, "lost: all 48516 pairs of 312 faults");
+    for (spread, of) in [("slice", 3), ("hash", 2)] {
+        let mut files = Vec::new();
+        for number in 1..=of {
+            let (part, file) = (
+                format!("{spread}:{number}/{of}"),
+                format!("{spread}-{number}.json"),
+            );
+            let output = count(&file, &["--partition", &part]);
+            ended(
+                &output,
+                0,
+                &format!("of 48516 pairs, part {part}, of 312 faults"),
+            );
+            files.push(file);
+        }
+        let name = format!("{spread}.json");
+        let merged = merge(&desk, &files, &name);
+        assert_eq!(merged.status.code(), Some(0), "{}", said(&merged));
+        assert_eq!(merged.stdout, whole.stdout, "{spread}");
+        assert_eq!(text(&desk, &name), text(&desk, "whole.json"), "{spread}");
+        let missing = merge(&desk, &files[1..], &format!("{spread}-missing.json"));
+        ended(&missing, 5, &format!("part {spread}:1/{of} is missing"));
+    }
+    let singles = [
+        "campaign",
+        "lost.toml",
+        "--output",
+        "single.json",
+        "--partition",
+        "slice:2/3",
+    ];
+    ended(&desk.run(&singles), 0, "slice:2/3 was counted");
+    let mixed = merge(&desk, &["slice-1.json", "single.json"], "mixed.json");
+    ended(
+        &mixed,
+        2,
+        "the count of lost is pairs of 312 faults in the first and single cases in the second",
+    );
+    let edited = text(&desk, "slice-2.json").replace("\"faults\": 312", "\"faults\": 313");
+    fs::write(desk.path("slice-2.json"), edited).expect("room");
+    ended(
+        &merge(&desk, &["slice-2.json"], "edited.json"),
+        2,
+        "lost has 48516 pairs of 313 faults, which cannot be",
+    );
+    let sampled = count("sample.json", &["--sample", "20"]);
+    ended(&sampled, 2, "--sample");
+}
+
 #[test]
 fn parts_of_counts_are_compared_with_the_pinned_figures_together() {
     let desk = desk();

@@ -131,8 +131,9 @@ fn counted_pairs_are_what_each_pair_is_from_the_start() {
          inserted = [\"88\"]\ngaps = [6]\ndelays = [\"3ms\"]\nbreaks = [\"1ms\"]",
     ] {
         let campaign = load(&format!("{head}{faults}\n")).expect("a campaign");
-        let counted = campaign.count_pairs(1, &|_| {}).expect("counts");
-        assert_eq!(campaign.count_pairs(3, &|_| {}).as_ref(), Ok(&counted));
+        let counted = campaign.count_pairs(None, 1, &|_| {}).expect("counts");
+        let in_threads = campaign.count_pairs(None, 3, &|_| {});
+        assert_eq!(in_threads.as_ref(), Ok(&counted));
         let singles: Vec<_> = campaign.cases.iter().map(|case| case.first).collect();
         let mut expected = BTreeMap::new();
         let mut closer = 0;
@@ -169,7 +170,7 @@ fn a_sample_of_all_pairs_has_their_counts() {
     let text = "schema = 1\ntitle = \"t\"\nscenario = \"9.6-every-write\"\nfaults = [\"bits\"]\nlinks = [\"master->2\", \"2->1\"]\n\
                 bytes = \"35\"\n";
     let campaign = load(text).expect("a campaign");
-    let counted = campaign.count_pairs(1, &|_| {}).expect("counts");
+    let counted = campaign.count_pairs(None, 1, &|_| {}).expect("counts");
     let sampled = campaign.sample_pairs(1_000, 7, 2, &|_| {}).expect("counts");
     assert_eq!(sampled.counts, counted.counts);
     assert_eq!((sampled.seed, counted.seed), (Some(7), None));

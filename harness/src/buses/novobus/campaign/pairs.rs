@@ -38,8 +38,8 @@ fn add(forks: &mut Places, all: &mut Forks, fork: Fork, case: CaseFaults) {
 }
 
 impl Sharing<'_> {
-    /// Plays every pair of which the second fault is on link `link`, and gives `found` what comes of them. `singles` are in the order of
-    /// links.
+    /// Plays every pair of which the second fault is on link `link` and `wanted`, by its place in `singles`, and gives `found` what comes
+    /// of them. `singles` are in the order of links.
     ///
     /// # Errors
     /// That of `found`.
@@ -47,17 +47,19 @@ impl Sharing<'_> {
         &mut self,
         singles: &[Injected],
         link: usize,
+        wanted: &dyn Fn(usize) -> bool,
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let from = singles.partition_point(|single| single.link < link);
         let to = singles.partition_point(|single| single.link <= link);
         let (before, own) = (&singles[..from], &singles[from..to]);
-        self.pairs_within(own, found)?;
+        let wanted = |place: &usize| wanted(from + place);
+        self.pairs_within(own, &wanted, found)?;
         // Faults that last longer have a longer opening.
         let mut by_length: BTreeMap<usize, Vec<Injected>> = BTreeMap::new();
-        for single in own {
-            let lasts = self.lasts(single, None);
-            by_length.entry(lasts).or_default().push(*single);
+        for place in (0..own.len()).filter(&wanted) {
+            let lasts = self.lasts(&own[place], None);
+            by_length.entry(lasts).or_default().push(own[place]);
         }
         for own in by_length.values() {
             self.pairs_across(before, own, found)?;
@@ -65,13 +67,15 @@ impl Sharing<'_> {
         Ok(())
     }
 
-    /// Pairs of faults of one link.
+    /// Pairs of faults of one link, of which the second is `wanted`.
     fn pairs_within<E>(
         &mut self,
         own: &[Injected],
+        wanted: &impl Fn(&usize) -> bool,
         found: &mut impl FnMut(AlikePairs<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        for (place, second) in own.iter().enumerate() {
+        for place in (0..own.len()).filter(wanted) {
+            let second = &own[place];
             for first in &own[..place] {
                 self.sound(self.lasts(first, Some(second)));
             }
