@@ -89,7 +89,8 @@ impl Cells {
     }
 
     /// RAM and the register field, FD80 to FFFF (ND21 10.1).
-    pub(crate) fn ram_and_registers(&self) -> &[u8; RAM_AND_REGISTERS] {
+    #[must_use]
+    pub fn ram_and_registers(&self) -> &[u8; RAM_AND_REGISTERS] {
         &self.ram
     }
 

@@ -208,10 +208,13 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
             return Some(beside_bus(ring, drive, "error mode", "9.7", ""));
         }
         // The reference model knows one code for every bad byte.
-        let cells = (0xFD80..=0xFFFF).filter(|cell| ![0xFD82, 0xFD83].contains(cell));
-        let mut differing =
-            cells.filter(|cell| link.peek(ring, drive, *cell) != Some(other.peek(*cell)));
-        differing.next().map(|cell| {
+        let own = link.ring(ring)?.drive(drive)?.cells().ram_and_registers();
+        let cells = own.iter().zip(other.ram_and_registers());
+        let mut cells = (0xFD80_u16..=0xFFFF).zip(cells);
+        let differing = cells.find(|(cell, (own, other))| {
+            own != other && ![ram::ERRORCODE, ram::ERRORCODE + 1].contains(cell)
+        });
+        differing.map(|(cell, _)| {
             let detail = format!(" {cell:04X}");
             beside_bus(ring, drive, "contents of a cell", "10.2", &detail)
         })
