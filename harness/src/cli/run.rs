@@ -199,7 +199,10 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         keep: arguments.keep.unwrap_or_default(),
         earlier: std::mem::take(&mut chosen.earlier),
     };
-    state_size(&chosen.entries, &job, output);
+    let rig = chosen.rig.as_ref();
+    let not_too_large = |entry: &&Entry| rig.is_none_or(|rig| too_large(entry, rig).is_none());
+    let played = chosen.entries.iter().filter(not_too_large);
+    state_size(played, &job, output);
     match chosen.in_use() {
         Some(rig) if rig.port().is_some() => {
             run_segment::work(rig, &chosen.entries, &job, page, output)

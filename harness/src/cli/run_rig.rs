@@ -134,10 +134,14 @@ fn megabytes(bytes: u64) -> String {
     format!("{}.{} MB", tenths / 10, tenths % 10)
 }
 
-/// States before a run how large its captures may become, where `--keep` is given or where they may become large.
-pub(super) fn state_size(entries: &[Entry], job: &PlayOrder, output: &mut Output) {
+/// States before a run how large the captures of these scenarios may become, where `--keep` is given or where they may become large.
+pub(super) fn state_size<'e>(
+    played: impl Iterator<Item = &'e Entry>,
+    job: &PlayOrder,
+    output: &mut Output,
+) {
     let Some(path) = &job.evidence else { return };
-    let estimate = job.keep.estimate(entries);
+    let estimate = job.keep.estimate(played);
     let beside = match job.keep {
         Keep::All if estimate < LARGE => return,
         Keep::All => "; --keep 10 keeps those of every tenth attempt that passes",
@@ -172,7 +176,11 @@ pub(crate) fn reports(
             output.say(&format!("evidence in {}\n", path.display()));
             if left_out > 0 {
                 let count = counted(left_out, "capture");
-                output.say(&format!("{}; {count} left out\n", megabytes(size(&path))));
+                let (all, captures) = size(&path);
+                let (all, captures) = (megabytes(all), megabytes(captures));
+                output.say(&format!(
+                    "{all}, {captures} of them captures; {count} left out\n"
+                ));
             }
             let Some(page) = page else { return true };
             match std::fs::read_to_string(path.join(PAGE)) {

@@ -10,7 +10,7 @@ use super::junit::{JunitCase, junit};
 use super::merge::{MERGE, derive_merged};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened, is_name, scenarios};
-use crate::capture::read;
+use crate::capture::{MAX_FILE, read};
 use crate::library::Entry;
 use crate::report::finding::{class, explain};
 use crate::report::html::{Head, ScenarioView, ShownScenario, run, section};
@@ -313,7 +313,7 @@ fn entry(name: &str, text: &str) -> Option<Entry> {
     Entry::new(source, None).ok()
 }
 
-/// What the links carried; nothing where no capture was kept.
+/// What the links carried; nothing where no capture was kept, or where it is longer than a capture that is read ([`MAX_FILE`]).
 fn traces(
     path: &Path,
     name: &str,
@@ -324,6 +324,14 @@ fn traces(
     let foreign = |error: String| {
         EvidenceError::Foreign(path.display().to_string(), format!("{file}: {error}"))
     };
+    // A page with this many bytes could not be shown either. The record has them, so no verdict rests on the capture.
+    if path
+        .join(&file)
+        .metadata()
+        .is_ok_and(|file| file.len() > MAX_FILE)
+    {
+        return Ok(Vec::new());
+    }
     let bytes = match files::read(path, &file) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
         bytes => bytes.map_err(|error| foreign(error.to_string()))?,

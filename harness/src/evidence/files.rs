@@ -73,12 +73,15 @@ pub(super) fn names(path: &Path) -> Vec<String> {
     listing.map_or_else(|_| Vec::new(), |own| own.sums.into_keys().collect())
 }
 
-/// How many bytes the files of a folder have together.
+/// How many bytes the files of a folder have together, and how many of them its captures have.
 #[must_use]
-pub fn size(path: &Path) -> u64 {
+pub fn size(path: &Path) -> (u64, u64) {
     let files = names(path).into_iter().chain([SUMS.to_owned()]);
-    let sizes = files.filter_map(|file| Some(path.join(file).metadata().ok()?.len()));
-    sizes.sum()
+    let size = |file: &String| path.join(file).metadata().map_or(0, |own| own.len());
+    let (captures, others): (Vec<_>, Vec<_>) =
+        files.partition(|file| Path::new(file).starts_with(CAPTURES));
+    let captures = captures.iter().map(size).sum();
+    (captures + others.iter().map(size).sum::<u64>(), captures)
 }
 
 /// What is wrong with the files of a folder. Without sums, as of a run that did not end, only that one is no regular file.

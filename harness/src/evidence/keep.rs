@@ -9,10 +9,12 @@ use std::fmt;
 use std::num::NonZeroU32;
 use std::str::FromStr;
 
-/// The most that a scenario on a ring leaves for each link, and one on a shared line altogether, in bytes: the means of the built-in scenarios,
-/// which are 18 to 29 kB a link on rings of 1 to 100 drives and 1.3 kB on CAN, rounded up.
+/// What a byte on a link takes in a capture, in bytes.
+const EACH_BYTE: u64 = 64;
+/// What a scenario in which the driver plays leaves for each link, in bytes: the mean of the built-in scenarios, 18 to 29 kB on rings of 1 to
+/// 100 drives, rounded up. Its file does not say how many bytes the driver sends.
 const EACH_LINK: u64 = 30_000;
-/// See [`EACH_LINK`].
+/// What a scenario on a shared line leaves, in bytes: the mean of the built-in scenarios on CAN is 1.3 kB.
 const SHARED_LINE: u64 = 2_000;
 
 /// Which captures are kept: those of attempts that did not pass always are.
@@ -28,13 +30,18 @@ pub enum Keep {
 }
 
 impl Keep {
-    /// How many bytes the captures of these scenarios take if all of them pass, by experience: an estimate.
+    /// How many bytes the captures of these scenarios take if all of them are played and pass: an estimate. A scenario that sends its
+    /// bytes itself is counted by them.
     #[must_use]
-    pub fn estimate(self, entries: &[Entry]) -> u64 {
-        let sizes = entries.iter().map(|entry| match &entry.plan {
+    pub fn estimate<'e>(self, entries: impl Iterator<Item = &'e Entry>) -> u64 {
+        let sizes = entries.map(|entry| match &entry.plan {
             Some(plan) => {
                 let links = plan.rings.iter().map(|ring| u64::from(ring.drives()) + 1);
-                EACH_LINK * links.sum::<u64>()
+                let of_link = match plan.pieces_sent() as u64 {
+                    0 => EACH_LINK,
+                    sent => EACH_BYTE * sent,
+                };
+                of_link * links.sum::<u64>()
             }
             None => SHARED_LINE,
         });

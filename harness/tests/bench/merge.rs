@@ -1,6 +1,8 @@
 //! Runs that are spread over machines: the merged parts say what one machine says, and nothing else is merged.
 
 use crate::program::{Desk, ended, said};
+use harness::capture::MAX_FILE;
+use harness::evidence::derive;
 use std::fs;
 use std::path::Path;
 use std::process::Output;
@@ -384,6 +386,23 @@ fn nothing_is_played_again_if_all_has_passed() {
     ended(&desk.run(&["run", "all", "--rerun", "whole"]), 2, "--rig");
     edit(&desk.path("left/run.jsonl"), "\"passed\"", "\"failed\"");
     refused("sim:3", "left", "it is not what its record gives");
+}
+
+/// A capture that is too long to be read again is kept, and the page and the verdicts are made without it.
+#[test]
+fn a_capture_of_more_than_256_mib_costs_no_verdict() {
+    let desk = desk(&SCENARIOS[..1]);
+    ended(&run(&desk, "sim:3", "long", &[]), 0, "1 passed");
+    let folder = desk.path("long");
+    let before = derive(&folder).expect("a page");
+    let capture = folder.join("captures/one.1.json");
+    let capture = fs::File::options().write(true).open(capture);
+    // A hole: it takes no room.
+    let grown = capture.and_then(|file| file.set_len(MAX_FILE + 1));
+    grown.expect("a long file");
+    let after = derive(&folder).expect("a page");
+    assert_eq!(after.junit, before.junit);
+    assert!(after.html.contains("passed") && after.html.len() < before.html.len());
 }
 
 /// Captures of what passed are left out as `--keep` says, and `verify` knows which.

@@ -37,6 +37,15 @@ pub struct Plan<L: Language = DefaultBus> {
     pub setup: L::Setup,
 }
 
+impl<L: Language> Plan<L> {
+    /// How many pieces the steps of the plan send; those of a master's own program are not known.
+    #[must_use]
+    pub fn pieces_sent(&self) -> usize {
+        let steps = self.steps.iter();
+        steps.map(|step| step.action.pieces().0).sum()
+    }
+}
+
 impl<L: Language> Deref for Plan<L> {
     type Target = L::Setup;
 
