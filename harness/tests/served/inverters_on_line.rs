@@ -10,6 +10,23 @@ use std::time::{Duration, Instant};
 
 pub(crate) const SAFE: &str = "safe state: the output of every inverter is off";
 
+/// A computer that stands still for longer than the slot time of the master, 131 ms, loses the slave: the command is then given again, twice
+/// at most.
+pub(crate) fn while_the_slave_is_lost(mut run: impl FnMut() -> Output) -> Output {
+    let is_lost = |output: &Output| {
+        let lost = said(output).contains("left the exchange, or answers no more");
+        lost && output.status.code() != Some(7)
+    };
+    let mut output = run();
+    for _ in 0..2 {
+        if !is_lost(&output) {
+            break;
+        }
+        output = run();
+    }
+    output
+}
+
 /// A served slave, and a folder with a rig file for it.
 pub(crate) struct Desk {
     _sim: Sim,
@@ -64,7 +81,7 @@ impl Desk {
     }
 
     pub(crate) fn run(&self, line: &str) -> Output {
-        self.command(line).output().expect("the program")
+        while_the_slave_is_lost(|| self.command(line).output().expect("the program"))
     }
 
     /// Turns the motor, and goes on until it is ended. Returns when it turns.
@@ -221,19 +238,19 @@ fn a_program_that_hangs_is_watched() {
     std::fs::write(&path, text).expect("room");
     let mut line = "exchange 8 STW=047E".to_owned();
     line.push_str(&" then STW=047F HSW=20%".repeat(200));
-    let mut command = desk.command(&(line + " --move --rig desk.toml"));
-    let mut child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program");
-    let pipe = child.stdout.as_ref().expect("its output");
-    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
-    let mut said = String::new();
-    let mut err = child.stderr.take().expect("a pipe");
-    err.read_to_string(&mut said).expect("text");
-    assert_eq!(child.wait().expect("its end").code(), Some(7), "{said}");
-    assert!(said.contains("no sign of life"), "{said}");
+    line.push_str(" --move --rig desk.toml");
+    let output = while_the_slave_is_lost(|| {
+        let mut command = desk.command(&line);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        let pipe = child.stdout.take().expect("its output");
+        rustix::pipe::fcntl_setpipe_size(&pipe, 4_096).expect("a small pipe");
+        child.wait_with_output().expect("its end")
+    });
+    ended(&output, 7, "no sign of life");
     // The DP watchdog of the slave (1 s) was faster: it takes no words any more, and the bus time-out (1625) has stopped the motor.
     desk.shows("read 8 ZSW --rig desk.toml", "fault");
 }
