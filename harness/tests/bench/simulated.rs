@@ -340,7 +340,7 @@ fn a_run_that_judges_nothing_is_incomplete() {
     let folder = tempfile::tempdir().expect("a folder");
     let kept = folder.path().join("kept");
     let evidence = ["--evidence", kept.to_str().expect("a name")];
-    let other = ["10.2-write-byte", "8.2-exchange-4"];
+    let other = ["9.6-every-write", "8.2-exchange-4"];
     let bare = rig(2, true, "", "");
     let own = rig(2, true, "", ", \"drive 0 memory FE97 = 00\"");
     for text in [bare, own] {

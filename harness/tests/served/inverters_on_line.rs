@@ -14,8 +14,9 @@ pub(crate) const SAFE: &str = "safe state: the output of every inverter is off";
 /// at most.
 pub(crate) fn while_the_slave_is_lost(mut run: impl FnMut() -> Output) -> Output {
     let is_lost = |output: &Output| {
-        let lost = said(output).contains("left the exchange, or answers no more");
-        lost && output.status.code() != Some(7)
+        let said = said(output);
+        let lost = ["left the exchange, or answers no more", "does not start"];
+        lost.iter().any(|lost| said.contains(lost)) && output.status.code() != Some(7)
     };
     let mut output = run();
     for _ in 0..2 {

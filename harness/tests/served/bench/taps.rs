@@ -41,7 +41,7 @@ fn taps_unlock_what_is_said_of_them() {
     ended(
         &without,
         5,
-        "more scenarios with: a tap at 1->0 and a tap at 2->1 (4)\n",
+        "more scenarios with: taps at 1->0 and 2->1 (4)\n",
     );
     let path = desk.path("desk.toml");
     let mut text = std::fs::read_to_string(&path).expect("a rig");
