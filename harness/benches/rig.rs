@@ -21,7 +21,7 @@ mod ring;
 use harness::library::Entry;
 use harness::link::{Line, Link, Octets};
 use harness::port::Endpoint;
-use harness::rig::{Options, Rig, Run, Session, parse};
+use harness::rig::{Rig, Run, Session, UseOptions, parse};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate;
@@ -283,7 +283,7 @@ fn rig(served: &Served) -> Rig {
 fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<Turn>, usize) {
     let mut stream = TcpStream::connect(address).expect("a server");
     stream.set_nodelay(true).expect("no delay");
-    let mut session = Session::open(rig, &Options::default()).expect("a rig in use");
+    let mut session = Session::open(rig, &UseOptions::default()).expect("a rig in use");
     let mut run = Run::new(&mut session).expect("a model");
     let calm = |turn: &&(f64, _)| turn.0 < DISTURBED;
     let mut turn = || {

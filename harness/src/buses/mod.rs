@@ -61,7 +61,7 @@ use crate::manual::Manual;
 use crate::port::Wire;
 use crate::report::pcapng_telegrams::PacketOctet;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
-use crate::rig::{Options, Rig, SessionError};
+use crate::rig::{Rig, SessionError, UseOptions};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
@@ -69,7 +69,7 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
-use crate::serve::{End, Host, Job, Marks, ServeError, serve};
+use crate::serve::{Job, Marks, ServeEnd, ServeError, ServeHost, serve};
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
@@ -179,7 +179,7 @@ impl PortBus {
 ///
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
-pub(crate) fn run_on(rig: &Rig, options: &Options) -> Result<Box<dyn SegmentRun>, SessionError> {
+pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError> {
     match rig.port() {
         Some(port) => (port.bus.row().run)(rig, options),
         None => Err(SessionError::Drives {
@@ -420,7 +420,7 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
 /// [`Failure`]; nothing is left locked or open.
 pub(crate) fn hold(
     rig: &Rig,
-    options: &Options,
+    options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
     match rig.port() {
@@ -546,8 +546,8 @@ pub(crate) fn serve_frames(
     bus: Bus,
     (drives, header): (Option<u8>, Option<&Source>),
     job: &FrameJob,
-    host: &mut dyn Host,
-) -> Result<Result<End, ServeError>, Problems> {
+    host: &mut dyn ServeHost,
+) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
         Bus::Unitek => {
             let plan = unitek::serve::bench(drives, header)?;
@@ -581,8 +581,8 @@ pub(crate) fn serve_octets(
     (slaves, header): (Option<&[u8]>, Option<&Source>),
     marks: Marks,
     job: &Job,
-    host: &mut dyn Host,
-) -> Result<Result<End, ServeError>, Problems> {
+    host: &mut dyn ServeHost,
+) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
         Bus::Nordac => {
             let plan = nordac::serve::bench(slaves, header)?;

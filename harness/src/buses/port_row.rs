@@ -11,15 +11,15 @@ use crate::rig::condition::Mistake;
 use crate::rig::file::Interlock;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
-use crate::rig::{Options, Rig, SessionError};
+use crate::rig::{Rig, SessionError, UseOptions};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::{Source, line_number};
 
 /// Takes a rig to play scenarios on it.
-type OpenRun = fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>;
+type OpenRun = fn(&Rig, &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError>;
 
 /// Takes a rig for a session.
-type OpenSession = fn(&Rig, &Options) -> Result<Box<dyn HeldBench>, SessionError>;
+type OpenSession = fn(&Rig, &UseOptions) -> Result<Box<dyn HeldBench>, SessionError>;
 
 /// Judges what was played on a rig again.
 type OpenJudge = fn(&Rig, bool, bool) -> Box<dyn SegmentJudge>;
@@ -62,7 +62,7 @@ pub(crate) struct PortRow {
     /// Takes a rig for a session.
     pub(crate) hold: OpenSession,
     /// Runs `rig check`, as text or for tools.
-    pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
+    pub(crate) check: fn(&Rig, &UseOptions, bool, &mut Output) -> Result<Exit, Failure>,
     /// Explores its drives.
     pub(crate) fuzz: LineFuzz,
 }

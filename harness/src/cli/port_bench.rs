@@ -7,7 +7,7 @@ use super::rig_failure::{alarm, exit_of, tell_end};
 use crate::buses::commands::{Axes, RigArguments, Use};
 use crate::link::{Line, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession};
-use crate::rig::{Options, Rig};
+use crate::rig::{Rig, UseOptions};
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use std::time::Duration;
@@ -52,13 +52,13 @@ pub(crate) fn on<D: PortDrives>(
             sim.setup = vec![source.text.to_string()];
         }
     }
-    let options = Options {
+    let options = UseOptions {
         purpose: as_what.purpose.to_owned(),
         wait: Duration::from_nanos(arguments.patience.as_nanos()),
         allow_motion: as_what.moves,
         interrupt: interrupt_flag(),
         alarm: alarm(),
-        ..Options::default()
+        ..UseOptions::default()
     };
     let session = PortSession::open(&rig, &options);
     let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;

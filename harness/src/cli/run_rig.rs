@@ -15,7 +15,7 @@ use crate::link::{Line, Octets, Trouble};
 use crate::qualify::{Qualification, QualificationFacts};
 use crate::report::html::Head;
 use crate::report::plot::plot;
-use crate::rig::{Keeper, Options, Played, Rig, Run, Session, SessionError};
+use crate::rig::{Keeper, Played, Rig, Run, Session, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
@@ -81,7 +81,7 @@ pub(crate) fn work(
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let options = Options {
+    let options = UseOptions {
         purpose: job.purpose.to_owned(),
         wait: job.wait,
         allow_motion: job.allow_motion,

@@ -9,7 +9,7 @@ use crate::buses::run_on;
 use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;
-use crate::rig::{Options, Played, Rig};
+use crate::rig::{Played, Rig, UseOptions};
 use crate::signals::interrupt_flag;
 
 /// Plays scenarios on a rig with a port, and gives the rig back in its safe state.
@@ -20,14 +20,14 @@ pub(crate) fn work(
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let options = Options {
+    let options = UseOptions {
         purpose: job.purpose.to_owned(),
         wait: job.wait,
         allow_motion: job.allow_motion,
         ill_as_well: job.qualify,
         interrupt: interrupt_flag(),
         alarm: alarm(),
-        ..Options::default()
+        ..UseOptions::default()
     };
     let run = match run_on(rig, &options) {
         Ok(run) => run,

@@ -2,7 +2,9 @@
 
 use super::Error;
 use crate::buses::drives::released;
-use crate::serve::{EndRequest, Host, Job, Marks, Pace, ServeError, ServedAt, Server, serve_until};
+use crate::serve::{
+    EndRequest, Job, Marks, Pace, ServeError, ServeHost, ServedAt, Server, serve_until,
+};
 use std::io;
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
@@ -69,7 +71,7 @@ impl Drop for Served {
 /// Passes the address on. The lines about clients are for the user of `drivebench sim`.
 struct Teller(Sender<SocketAddr>);
 
-impl Host for Teller {
+impl ServeHost for Teller {
     fn tell(&mut self, _line: &str) -> io::Result<()> {
         Ok(())
     }

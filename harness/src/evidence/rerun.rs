@@ -5,7 +5,7 @@ use super::folder::capture;
 use super::record::RecordLine;
 use super::verify::{Opened, text_of};
 use crate::link::{LinkEvent, Sink};
-use crate::rig::{Alarm, Attempt, Keeper, Options, Played, Run, Session};
+use crate::rig::{Alarm, Attempt, Keeper, Played, Run, Session, UseOptions};
 use crate::scenario::run::{Outcome, Skip};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub(super) fn rerun(
     rig.file.hooks = Default::default();
     rig.file.power.clear();
     rig.file.quarantine = None;
-    let options = Options {
+    let options = UseOptions {
         purpose: "verify".to_owned(),
         wait: Duration::ZERO,
         allow_motion: true,

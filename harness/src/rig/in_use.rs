@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// How a rig is used.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct UseOptions {
     /// The purpose, shown to others who want the rig.
     pub purpose: String,
     /// How long to wait for a rig that is in use.
@@ -28,7 +28,7 @@ pub struct Options {
     pub alarm: Alarm,
 }
 
-impl Options {
+impl UseOptions {
     /// Returns an error once the program has been interrupted.
     pub(crate) fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
         match self.interrupt.load(Ordering::Relaxed) {

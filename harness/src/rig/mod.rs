@@ -33,7 +33,7 @@ pub use check::{FindProfile, Rig, parse, parse_beside};
 pub use ends::Ends;
 pub use file::schema;
 pub use find::{FindError, find};
-pub use in_use::{End, Options};
+pub use in_use::{End, UseOptions};
 pub use open::OpenRigError;
 pub(crate) use open::{line_rate, stated_rate};
 pub(crate) use permitted::{limits, standing};

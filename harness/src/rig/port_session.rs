@@ -5,7 +5,7 @@ use super::port_file::Port;
 use super::segment::observed::Beats;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
-use super::{Alarm, End, Ends, Options, Rig, SessionError, file, standing};
+use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};
 use crate::guard::{Guarded, Safe, SafeStep, Standstill, Watch};
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Pieces};
@@ -32,7 +32,7 @@ pub trait PortDrives: Clone + std::fmt::Debug {
     fn open(
         rig: &Rig,
         port: &Port,
-        options: &Options,
+        options: &UseOptions,
     ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError>;
 
     /// Finds out whether the drives of an open rig can be used; even `ill_as_well` where a drive does not answer.
@@ -88,7 +88,7 @@ impl<D: PortDrives> PortSession<D> {
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
-    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+    pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         let port = rig
             .port()
             .ok_or_else(|| failed(rig, "it has no [port.1]"))?;

@@ -2,7 +2,7 @@
 
 use super::Rig;
 use super::around::Around;
-use super::in_use::Options;
+use super::in_use::UseOptions;
 use super::lock::RigLock;
 use super::session_error::SessionError;
 use super::state;
@@ -15,7 +15,7 @@ pub(crate) struct Taken {
 }
 
 /// Takes a rig. A simulated one needs no lock.
-pub(crate) fn take(rig: &Rig, options: &Options) -> Result<Taken, SessionError> {
+pub(crate) fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
     let forbidden = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
         rig: rig.id().to_owned(),
         since: quarantine.since.clone(),

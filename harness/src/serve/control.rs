@@ -5,7 +5,7 @@ use std::fmt;
 
 /// The answer to a line of control. As a text it is one line without its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum ControlAnswer {
     /// It is done, or the check holds: `ok`.
     Ok,
     /// What was asked for: `ok ` and the state of a drive, `name=value` with a space between.
@@ -16,7 +16,7 @@ pub enum Answer {
     Error(String),
 }
 
-impl fmt::Display for Answer {
+impl fmt::Display for ControlAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ok => f.write_str("ok"),

@@ -1,9 +1,9 @@
 //! A stream of lines of control and their answers: standard input, or a client of a socket.
 
-use super::control::Answer;
+use super::control::ControlAnswer;
 use super::lines::Lines;
 use super::place::ControlPlace;
-use super::shell::{Host, ServeError};
+use super::shell::{ServeError, ServeHost};
 use super::tcp::Tcp;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io;
@@ -72,8 +72,8 @@ impl ControlStream {
     /// An answer cannot be written to standard output.
     pub(super) fn obey(
         &mut self,
-        host: &mut dyn Host,
-        answer: &mut dyn FnMut(&str) -> Option<Answer>,
+        host: &mut dyn ServeHost,
+        answer: &mut dyn FnMut(&str) -> Option<ControlAnswer>,
     ) -> io::Result<()> {
         if let Source::Tcp(tcp) = &mut self.source {
             // A second client is turned away here too.
@@ -95,7 +95,7 @@ impl ControlStream {
             for line in lines {
                 let answer = match line {
                     Ok(line) => answer(&line),
-                    Err(length) => Some(Answer::Error(format!(
+                    Err(length) => Some(ControlAnswer::Error(format!(
                         "a line of {length} bytes is too long for a line of control"
                     ))),
                 };

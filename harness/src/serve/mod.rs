@@ -17,9 +17,9 @@ mod stage;
 mod tcp;
 
 pub use crate::buses::rings::serve::Server;
-pub use control::Answer;
+pub use control::ControlAnswer;
 pub(crate) use control::first;
 pub use place::{ClientRole, ControlPlace, Inner, Marks, Pace, ServedAt};
 pub use served::ServedBus;
-pub use shell::{End, Host, Job, ServeError, serve};
 pub(crate) use shell::{EndRequest, serve_until};
+pub use shell::{Job, ServeEnd, ServeError, ServeHost, serve};

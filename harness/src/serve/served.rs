@@ -1,6 +1,6 @@
 //! What a bus behind streams of octets offers the shell: octets and the time are arguments, deadlines are return values.
 
-use super::control::Answer;
+use super::control::ControlAnswer;
 use crate::web::LiveView;
 use harness_proto::marks::BadMark;
 use harness_proto::time::Instant;
@@ -39,7 +39,7 @@ pub trait ServedBus {
     /// When, by the clock, [`advance`](Self::advance) is to be called again if nothing comes before.
     fn deadline(&self) -> Instant;
     /// Does a line of control at once; `None` for an empty line or a comment.
-    fn control(&mut self, line: &str) -> Option<Answer>;
+    fn control(&mut self, line: &str) -> Option<ControlAnswer>;
     /// What it shows on a live page.
     fn live(&mut self) -> &mut dyn LiveView;
 }

@@ -43,7 +43,7 @@ pub struct Job {
 
 /// Why serving has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum ServeEnd {
     /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP; or the drop of the handle.
     Interrupted,
     /// The time is over.
@@ -92,7 +92,7 @@ pub enum ServeError {
 }
 
 /// Receives the server's output.
-pub trait Host {
+pub trait ServeHost {
     /// A line for tools, without its end: a ring is ready, or the answer to a line of control.
     ///
     /// # Errors
@@ -112,7 +112,11 @@ pub trait Host {
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
-pub fn serve(server: impl ServedBus, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
+pub fn serve(
+    server: impl ServedBus,
+    job: &Job,
+    host: &mut dyn ServeHost,
+) -> Result<ServeEnd, ServeError> {
     let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
     serve_until(ending, server, job, host)
 }
@@ -125,8 +129,8 @@ pub(crate) fn serve_until(
     ending: EndRequest,
     mut server: impl ServedBus,
     job: &Job,
-    host: &mut dyn Host,
-) -> Result<End, ServeError> {
+    host: &mut dyn ServeHost,
+) -> Result<ServeEnd, ServeError> {
     if job.places.len() != server.seats() {
         let inner = server.seats() - server.masters();
         return Err(ServeError::Places {
@@ -229,7 +233,7 @@ struct Shell<'a> {
     ends: Vec<Seat>,
     control: Option<ControlStream>,
     stage: Option<Stage>,
-    host: &'a mut dyn Host,
+    host: &'a mut dyn ServeHost,
     ending: EndRequest,
     clock: Clock,
     /// Clients there are.
@@ -266,19 +270,19 @@ impl Shell<'_> {
         Ok(())
     }
 
-    fn run(&mut self, job: &Job) -> Result<End, ServeError> {
+    fn run(&mut self, job: &Job) -> Result<ServeEnd, ServeError> {
         wake_on_time();
         let end = job.length.map(|length| Instant::START + length);
         loop {
             if end.is_some_and(|end| end <= self.clock.now()) {
-                return Ok(End::TimeOver);
+                return Ok(ServeEnd::TimeOver);
             }
             let news = self.stage.as_ref().map_or(Instant::NEVER, Stage::deadline);
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
             let until = until.min(news);
             let ready = self.wait(until).map_err(ServeError::Wait)?;
             if ready && self.ending.has_come() {
-                return Ok(End::Interrupted);
+                return Ok(ServeEnd::Interrupted);
             }
             let seats = 0..self.ends.len();
             for seat in seats.clone().filter(|_| ready) {
@@ -302,7 +306,7 @@ impl Shell<'_> {
                 stage.work(self.server.live(), now);
             }
             if job.once && self.gone {
-                return Ok(End::ClientsGone);
+                return Ok(ServeEnd::ClientsGone);
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::blind::Blind;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
 use harness::qualify::deviating_masters;
-use harness::rig::{Options, Run, Session, parse};
+use harness::rig::{Run, Session, UseOptions, parse};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
@@ -253,9 +253,9 @@ fn every_wrong_master_is_named() {
         );
         let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
         let rig = parse(&source.expect("a text")).expect("a rig");
-        let options = Options {
+        let options = UseOptions {
             allow_motion: true,
-            ..Options::default()
+            ..UseOptions::default()
         };
         let mut session = Session::open(&rig, &options).expect("a rig in use");
         let plan = found_by(deviation.name, &by, &scenarios).plan.clone();
@@ -296,7 +296,7 @@ fn a_broken_sequence_is_tried_with_every_drive() {
         );
         let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
         let rig = parse(&source.expect("a text")).expect("a rig");
-        let mut session = Session::open(&rig, &Options::default()).expect("a rig in use");
+        let mut session = Session::open(&rig, &UseOptions::default()).expect("a rig in use");
         let mut on_rig = Run::new(&mut session).expect("a twin");
         let played = plans.iter().map(|plan| {
             let played = on_rig.play(plan, None).expect("a healthy rig");

@@ -3,7 +3,7 @@
 use super::report::{Reader, TelegramRun, runs};
 use super::serve::SegmentServer;
 use crate::counted::counted;
-use crate::serve::{Answer, ServedBus};
+use crate::serve::{ControlAnswer, ServedBus};
 use crate::web::{
     ARROWS, FaultPlace, LiveNews, LiveOrder, LivePicture, LiveRow, LiveScene, LiveView, MAX_ROWS,
 };
@@ -384,7 +384,7 @@ impl LiveView for SegmentServer {
                 let so_far = self.bench.line().telegrams();
                 let line = format!("! telegram {}: {fault}", so_far + 1 + place as u64);
                 match ServedBus::control(self, &line) {
-                    Some(Answer::Ok) => Ok(format!(
+                    Some(ControlAnswer::Ok) => Ok(format!(
                         "{line}. {} so far on the line.",
                         counted(so_far, "telegram")
                     )),

@@ -13,7 +13,7 @@ use crate::scenario::plan::{Plan, plan as settle, plan_step};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
-use crate::serve::{Answer, Marks, ServedBus, first};
+use crate::serve::{ControlAnswer, Marks, ServedBus, first};
 use crate::web::LiveView;
 use harness_proto::decode::Decoded;
 use harness_proto::line::{LineError, Received};
@@ -348,7 +348,7 @@ impl ServedBus for SegmentServer {
 
     /// A fault (`! telegram 3: lost`), something that happens to a slave from outside the bus (`slave 8 fault on`), or a check of a parameter
     /// (`? slave 8 parameter 1202 = 100`). `state 8` asks what a drive shows.
-    fn control(&mut self, line: &str) -> Option<Answer> {
+    fn control(&mut self, line: &str) -> Option<ControlAnswer> {
         let said = line.split('#').next().unwrap_or_default().trim();
         if said.is_empty() {
             return None;
@@ -360,24 +360,24 @@ impl ServedBus for SegmentServer {
                 .ok()
                 .and_then(|own| self.bench.drive(own));
             return Some(match drive {
-                Some(drive) => Answer::State(state(drive)),
-                None => Answer::Error(
+                Some(drive) => ControlAnswer::State(state(drive)),
+                None => ControlAnswer::Error(
                     "`state` and the first address of a slave expected: `state 8`".to_owned(),
                 ),
             });
         }
         let source = match Source::from_bytes("control".to_owned(), line.trim_end().into()) {
             Ok(source) => source,
-            Err(error) => return Some(Answer::Error(error.to_string())),
+            Err(error) => return Some(ControlAnswer::Error(error.to_string())),
         };
         let step =
             parse_step::<Nordac>(&source).and_then(|step| plan_step(&self.plan, &step, &source));
         Some(match step {
-            Err(problems) => Answer::Error(first(&source.text, &problems)),
+            Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
             Ok(step) => match now(&mut self.bench, &step) {
-                Ok(()) => Answer::Ok,
-                Err(NotNow::Otherwise(found)) => Answer::No(found),
-                Err(NotNow::Refused(why)) => Answer::Error(why.to_owned()),
+                Ok(()) => ControlAnswer::Ok,
+                Err(NotNow::Otherwise(found)) => ControlAnswer::No(found),
+                Err(NotNow::Refused(why)) => ControlAnswer::Error(why.to_owned()),
             },
         })
     }

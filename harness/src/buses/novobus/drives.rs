@@ -143,10 +143,10 @@ impl Drives {
     pub fn open(rig: &str, allow_motion: bool) -> Result<Self, Error> {
         let rig = rig::find(rig, &rig::find::folder())?;
         let plan = rig.plan()?;
-        let options = rig::Options {
+        let options = rig::UseOptions {
             purpose: "another program".to_owned(),
             allow_motion,
-            ..rig::Options::default()
+            ..rig::UseOptions::default()
         };
         let session = Session::open(&rig, &options)?;
         let sizes = session.rings().to_vec();

@@ -6,7 +6,7 @@ use super::serve::SharedDrives;
 use crate::buses::unitek::language::identifier;
 use crate::buses::unitek::rig::Axis;
 use crate::counted::counted;
-use crate::serve::Answer;
+use crate::serve::ControlAnswer;
 use crate::serve::frames::SharedBus;
 use crate::web::{
     ARROWS, FaultPlace, LiveNews, LiveOrder, LivePicture, LiveRow, LiveScene, LiveView, MAX_ROWS,
@@ -264,7 +264,7 @@ impl LiveView for SharedDrives {
                 let number = self.bench.frames() + 1 + place as u64;
                 let line = format!("! frame {number}: {fault}");
                 match self.control(&line) {
-                    Some(Answer::Ok) => Ok(format!(
+                    Some(ControlAnswer::Ok) => Ok(format!(
                         "{line}. {} so far on the bus.",
                         counted(number - 1 - place as u64, "frame")
                     )),

@@ -10,7 +10,7 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::serve::frames::{FrameJob, MOST_CLIENTS, SharedBus, serve_frames};
-use crate::serve::{Answer, End, Host, ServeError, first};
+use crate::serve::{ControlAnswer, ServeEnd, ServeError, ServeHost, first};
 use crate::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
@@ -28,8 +28,8 @@ const STATE: [u8; 6] = [0x51, 0x40, 0x8F, 0xE2, 0x30, 0x6D];
 pub(crate) fn serve(
     plan: Plan<Unitek>,
     job: &FrameJob,
-    host: &mut dyn Host,
-) -> Result<End, ServeError> {
+    host: &mut dyn ServeHost,
+) -> Result<ServeEnd, ServeError> {
     serve_frames(SharedDrives::new(plan), job, host)
 }
 
@@ -144,27 +144,30 @@ impl SharedBus for SharedDrives {
 
     /// A fault (`! frame 3: lost`), something that happens to a drive from outside the bus (`drive 1 input limit1 high`), or a check of a
     /// register (`? drive 1 register 6E = 0`). `state 1` asks what a drive shows, `state 1 SPEED_ACTUAL 6E` for these registers.
-    fn control(&mut self, line: &str) -> Option<Answer> {
+    fn control(&mut self, line: &str) -> Option<ControlAnswer> {
         let said = line.trim();
         if said.is_empty() || said.starts_with('#') {
             return None;
         }
         let source = match Source::from_bytes("control".to_owned(), line.trim_end().into()) {
             Ok(source) => source,
-            Err(error) => return Some(Answer::Error(error.to_string())),
+            Err(error) => return Some(ControlAnswer::Error(error.to_string())),
         };
         let mut words = said.split_whitespace();
         if words.next() == Some("state") {
-            return Some(self.state(words).map_or_else(Answer::Error, Answer::State));
+            return Some(
+                self.state(words)
+                    .map_or_else(ControlAnswer::Error, ControlAnswer::State),
+            );
         }
         let step =
             parse_step::<Unitek>(&source).and_then(|step| plan_step(&self.plan, &step, &source));
         Some(match step {
-            Err(problems) => Answer::Error(first(&source.text, &problems)),
+            Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
             Ok(step) => match now(&mut self.bench, &step) {
-                Ok(()) => Answer::Ok,
-                Err(NotNow::Otherwise(found)) => Answer::No(found),
-                Err(NotNow::Refused(why)) => Answer::Error(why.to_owned()),
+                Ok(()) => ControlAnswer::Ok,
+                Err(NotNow::Otherwise(found)) => ControlAnswer::No(found),
+                Err(NotNow::Refused(why)) => ControlAnswer::Error(why.to_owned()),
             },
         })
     }

@@ -2,7 +2,7 @@
 
 use super::serve::{SharedDrives, bench};
 use crate::scenario::source::Source;
-use crate::serve::Answer;
+use crate::serve::ControlAnswer;
 use crate::serve::frames::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
 use harness_proto::time::{Instant, Span};
 use std::time::Duration;
@@ -101,7 +101,10 @@ fn a_frame_that_nobody_acknowledges() {
     let mut server = server(1);
     let one = slcan(&mut server, "O\r");
     let listener = slcan(&mut server, "L\r");
-    assert_eq!(server.bus().control("! drive 1: off"), Some(Answer::Ok));
+    assert_eq!(
+        server.bus().control("! drive 1: off"),
+        Some(ControlAnswer::Ok)
+    );
     server.receive(one, b"t20133D1B00\r");
     run(&mut server, at(50_000));
     assert_eq!(took(&mut server, one), "z\r");
@@ -271,7 +274,10 @@ fn lines_of_control_act_on_drives() {
     assert_eq!((control("  "), control("# nothing")), (None, None));
     run(&mut server, at(20_000));
     assert_eq!(took(&mut server, one), "t1816400501000000\r");
-    assert_eq!(server.bus().control("! frame 1: lost"), Some(Answer::Ok));
+    assert_eq!(
+        server.bus().control("! frame 1: lost"),
+        Some(ControlAnswer::Ok)
+    );
     server.receive(one, b"t20133D1B00\rt20133D5100\r");
     run(&mut server, at(30_000));
     assert_eq!(took(&mut server, one), "z\rz\rt181451100000\r");

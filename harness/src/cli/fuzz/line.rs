@@ -17,7 +17,7 @@ use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Spiced, Target, read_as,
 };
 use crate::link::Line as _;
-use crate::rig::{Options, Rig};
+use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
 use std::time::Duration;
 
@@ -154,13 +154,13 @@ fn on_adapter<B: LineRig>(
         &mut Output,
     ) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
-    let options = Options {
+    let options = UseOptions {
         purpose: purpose.to_owned(),
         wait: wait.unwrap_or_default(),
         allow_motion,
         interrupt: interrupt_flag(),
         alarm: alarm(),
-        ..Options::default()
+        ..UseOptions::default()
     };
     let mut session = match SessionOf::<B>::open(rig, &options) {
         Ok(session) => session,

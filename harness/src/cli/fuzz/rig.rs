@@ -7,7 +7,7 @@ use crate::explore::{CaseScope, ExploreError, RingScope, RingSetup, Spice};
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
-use crate::rig::{Options, Rig, Run, Session};
+use crate::rig::{Rig, Run, Session, UseOptions};
 use crate::scenario::run::start_anew;
 use crate::signals::interrupt_flag;
 use std::time::Duration;
@@ -39,7 +39,7 @@ pub(crate) fn on_ports(
     output: &mut Output,
     work: impl FnOnce(&mut Run<'_>, &mut Output) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
-    let options = Options {
+    let options = UseOptions {
         purpose: how.purpose.to_owned(),
         wait: how.wait,
         allow_motion: how.allow_motion,

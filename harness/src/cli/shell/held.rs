@@ -12,7 +12,7 @@ use crate::medium::Medium;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::segment::SegmentRun;
 use crate::rig::segment::run::{PortPlayer, PortRun};
-use crate::rig::{End, Ends, Options, Played, Rig, SessionError};
+use crate::rig::{End, Ends, Played, Rig, SessionError, UseOptions};
 use harness_proto::time::Span;
 
 /// A bench that stays open between requests.
@@ -128,7 +128,7 @@ impl<D: HeldDrives> HeldPort<D> {
     ///
     /// # Errors
     /// See [`PortSession::open`].
-    pub(crate) fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+    pub(crate) fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         let mut session = PortSession::open(rig, options)?;
         session.look_at_interlocks();
         Ok(Self(PortRun::on(session, options)))

@@ -18,7 +18,7 @@ use super::exit::Exit;
 use super::output::{Output, Stream};
 use super::rig_failure::{alarm, find_any_rig, tell_end};
 use crate::buses::{Bus, hold};
-use crate::rig::Options;
+use crate::rig::UseOptions;
 use crate::signals::{at_ctrl_c, interrupt_flag, interrupt_flag_without_ctrl_c};
 use clap::Args;
 use inbox::{LineWriter, RequestReader};
@@ -172,14 +172,14 @@ fn serve(
             let _overtakes = own.push(Value::Null, SessionRequest::Stop { drive: None });
         });
     }
-    let options = Options {
+    let options = UseOptions {
         purpose: "shell".to_owned(),
         wait: arguments.wait.unwrap_or_default(),
         allow_motion: arguments.leave,
         keeps_lines: true,
         interrupt: Arc::clone(&interrupt),
         alarm: alarm(),
-        ..Options::default()
+        ..UseOptions::default()
     };
     let bench = match hold(&rig, &options, told) {
         Ok(bench) => bench,

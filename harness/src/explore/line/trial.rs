@@ -10,7 +10,7 @@ use crate::explore::{
     Watcher,
 };
 use crate::library::Entry;
-use crate::rig::{Options, find};
+use crate::rig::{UseOptions, find};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -89,9 +89,9 @@ impl<B: LineBus> EngineTrial<B> {
         // The slowest right drive replies after 137 ms.
         let port = rig.file.port.as_mut().expect("a port");
         port.first.patience.0 = Duration::from_millis(200);
-        let options = Options {
+        let options = UseOptions {
             allow_motion: true,
-            ..Options::default()
+            ..UseOptions::default()
         };
         let mut session = SessionOf::<B>::open(&rig, &options).expect("drives");
         let drives = B::stations(&rig, Some(&session));

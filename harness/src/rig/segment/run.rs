@@ -5,7 +5,7 @@ use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession, failed};
-use crate::rig::{Again, Attempt, End, Keeper, Options, Played, Rig, SessionError, attempts_of};
+use crate::rig::{Again, Attempt, End, Keeper, Played, Rig, SessionError, UseOptions, attempts_of};
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
@@ -73,7 +73,7 @@ pub(crate) trait PortPlayer: Sized {
 /// A rig in use.
 pub(crate) struct PortRun<P: PortPlayer> {
     session: PortSession<P::Drives>,
-    options: Options,
+    options: UseOptions,
     player: P,
     again: Again,
     notes: Vec<String>,
@@ -88,7 +88,7 @@ impl<P: PortPlayer> PortRun<P> {
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
-    pub(crate) fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+    pub(crate) fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         if rig.port().is_some_and(|port| port.listen_only) {
             let why = "scenarios send, and its file says `listen_only = true`; set it to false";
             return Err(failed(rig, why));
@@ -97,7 +97,7 @@ impl<P: PortPlayer> PortRun<P> {
     }
 
     /// Takes a rig that is open, of whose drives nothing is known.
-    pub(crate) fn on(mut session: PortSession<P::Drives>, options: &Options) -> Self {
+    pub(crate) fn on(mut session: PortSession<P::Drives>, options: &UseOptions) -> Self {
         let mut player = P::new(session.rig(), options.allow_motion, options.ill_as_well);
         player.shows_life(session.beats());
         Self {
@@ -301,10 +301,10 @@ impl<P: PortPlayer> PortJudge<P> {
         let mut run = match self.run.take() {
             Some(run) => run,
             None => {
-                let options = Options {
+                let options = UseOptions {
                     allow_motion: self.allow_motion,
                     ill_as_well: self.qualifies,
-                    ..Options::default()
+                    ..UseOptions::default()
                 };
                 // Nothing outside the folder is touched.
                 let mut rig = self.rig.clone();

@@ -11,7 +11,7 @@ pub use server::{FrameServer, MOST_CLIENTS};
 pub use session::Protocol;
 pub use shell::{FrameJob, FramePlace, serve_frames};
 
-use super::Answer;
+use super::ControlAnswer;
 use crate::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
@@ -41,7 +41,7 @@ pub trait SharedBus {
     fn put(&mut self, client: usize, host: Host);
 
     /// Does a line of control. `None` for an empty line or a comment.
-    fn control(&mut self, line: &str) -> Option<Answer>;
+    fn control(&mut self, line: &str) -> Option<ControlAnswer>;
 
     /// What it shows on a live page.
     fn live(&mut self) -> &mut dyn LiveView;

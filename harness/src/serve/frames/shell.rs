@@ -7,7 +7,7 @@ use crate::serve::arrival::Client;
 use crate::serve::clock::Clock;
 use crate::serve::control_stream::ControlStream;
 use crate::serve::pty::{Change, Pty};
-use crate::serve::shell::{End, EndRequest, Host, ServeError};
+use crate::serve::shell::{EndRequest, ServeEnd, ServeError, ServeHost};
 use crate::serve::stage::Stage;
 use crate::serve::tcp::Listener;
 use crate::serve::{ControlPlace, ServedAt};
@@ -51,8 +51,8 @@ pub struct FrameJob {
 pub fn serve_frames<B: SharedBus>(
     mut bus: B,
     job: &FrameJob,
-    host: &mut dyn Host,
-) -> Result<End, ServeError> {
+    host: &mut dyn ServeHost,
+) -> Result<ServeEnd, ServeError> {
     let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
     let mut doors = Vec::new();
     let mut seats = Vec::new();
@@ -122,7 +122,7 @@ struct Shell<'a, B> {
     seats: Vec<Seat>,
     control: Option<ControlStream>,
     stage: Option<Stage>,
-    host: &'a mut dyn Host,
+    host: &'a mut dyn ServeHost,
     ending: EndRequest,
     clock: Clock,
     /// Clients there are.
@@ -156,19 +156,19 @@ impl<B: SharedBus> Shell<'_, B> {
         Ok(())
     }
 
-    fn run(&mut self, job: &FrameJob) -> Result<End, ServeError> {
+    fn run(&mut self, job: &FrameJob) -> Result<ServeEnd, ServeError> {
         wake_on_time();
         let end = job.length.map(|length| Instant::START + length);
         loop {
             if end.is_some_and(|end| end <= self.clock.now()) {
-                return Ok(End::TimeOver);
+                return Ok(ServeEnd::TimeOver);
             }
             let news = self.stage.as_ref().map_or(Instant::NEVER, Stage::deadline);
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
             let until = until.min(news);
             let ready = self.wait(until).map_err(ServeError::Wait)?;
             if ready && self.ending.has_come() {
-                return Ok(End::Interrupted);
+                return Ok(ServeEnd::Interrupted);
             }
             if ready {
                 self.accept();
@@ -195,7 +195,7 @@ impl<B: SharedBus> Shell<'_, B> {
                 stage.work(self.server.bus().live(), now);
             }
             if job.once && self.gone {
-                return Ok(End::ClientsGone);
+                return Ok(ServeEnd::ClientsGone);
             }
         }
     }

@@ -15,7 +15,7 @@ use crate::rig::file::Marks;
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
-use crate::rig::{Ends, Options, Rig, SessionError};
+use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::profibus::dp::Diagnosis;
 use harness_proto::time::Span;
@@ -40,7 +40,7 @@ impl PortDrives for Inverters {
     fn open(
         rig: &Rig,
         port: &Port,
-        options: &Options,
+        options: &UseOptions,
     ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
         let slaves = slaves(port);
         let (ends, locks) = ends(rig, port, options)?;
@@ -198,7 +198,11 @@ fn differs(slave: &RigSlave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(
 }
 
 /// The end of the line: simulated, or an adapter that is opened and locked. Nothing is sent.
-fn ends(rig: &Rig, port: &Port, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
+fn ends(
+    rig: &Rig,
+    port: &Port,
+    options: &UseOptions,
+) -> Result<(Ends, Vec<PortLock>), SessionError> {
     if rig.is_simulated() {
         let setup = setup(port, &setup_text(rig));
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;

@@ -10,7 +10,7 @@ use crate::cli::output::Output;
 use crate::cli::shell::{HeldBench, HeldRecord, record_from_now};
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
-use crate::rig::{End, Options, Played, Rig, Run, Session, SessionError, Shared};
+use crate::rig::{End, Played, Rig, Run, Session, SessionError, Shared, UseOptions};
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, plan_step};
 use crate::scenario::run::{Now, now};
@@ -33,7 +33,7 @@ struct HeldRings {
 /// [`SessionError`], as text with its exit code.
 pub(crate) fn hold(
     rig: &Rig,
-    options: &Options,
+    options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
     let plan = rig.plan()?;

@@ -311,7 +311,7 @@ pub(crate) fn take(
     as_what: Use,
     ill_as_well: bool,
 ) -> Result<Session, Failure> {
-    let options = rig::Options {
+    let options = rig::UseOptions {
         purpose: as_what.purpose.to_owned(),
         wait: Duration::from_nanos(arguments.patience.as_nanos()),
         allow_motion: as_what.moves,

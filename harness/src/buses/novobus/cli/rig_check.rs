@@ -9,7 +9,7 @@ use crate::cli::run::progress_bar;
 use crate::counted::counted;
 use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
-use crate::rig::{Options, Rig, Session};
+use crate::rig::{Rig, Session, UseOptions};
 use crate::signals::interrupt_flag;
 use clap::Args;
 use harness_proto::time::Span;
@@ -32,14 +32,14 @@ pub struct CheckRigArguments {
 
 impl CheckRigArguments {
     /// How the bench is used.
-    pub(crate) fn options(&self) -> Options {
-        Options {
+    pub(crate) fn options(&self) -> UseOptions {
+        UseOptions {
             purpose: "rig check".to_owned(),
             wait: self.wait.unwrap_or_default(),
             keeps_lines: true,
             interrupt: interrupt_flag(),
             alarm: alarm(),
-            ..Options::default()
+            ..UseOptions::default()
         }
     }
 }

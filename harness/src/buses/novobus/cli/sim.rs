@@ -12,8 +12,8 @@ use crate::scenario::argument::duration;
 use crate::scenario::source::Source;
 use crate::serve::frames::FrameJob;
 use crate::serve::{
-    ClientRole, ControlPlace, End, Host, Inner, Job, Marks, Pace, ServeError, ServedAt, Server,
-    serve,
+    ClientRole, ControlPlace, Inner, Job, Marks, Pace, ServeEnd, ServeError, ServeHost, ServedAt,
+    Server, serve,
 };
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
@@ -233,8 +233,8 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
         error => Failure::refused(error.to_string()),
     })?;
     Ok(match end {
-        End::Interrupted => Exit::Interrupted,
-        End::TimeOver | End::ClientsGone => Exit::Passed,
+        ServeEnd::Interrupted => Exit::Interrupted,
+        ServeEnd::TimeOver | ServeEnd::ClientsGone => Exit::Passed,
     })
 }
 
@@ -285,7 +285,7 @@ fn octets(
     bus: Bus,
     arguments: &SimArguments,
     output: &mut Output,
-) -> Result<Result<End, ServeError>, Failure> {
+) -> Result<Result<ServeEnd, ServeError>, Failure> {
     let others = [
         ("--tap", !arguments.tap.is_empty()),
         ("--cut", !arguments.cut.is_empty()),
@@ -320,7 +320,7 @@ fn frames(
     bus: Bus,
     arguments: &SimArguments,
     output: &mut Output,
-) -> Result<Result<End, ServeError>, Failure> {
+) -> Result<Result<ServeEnd, ServeError>, Failure> {
     let rings = [
         ("--tcp", !arguments.tcp.is_empty()),
         ("--pty", !arguments.pty.is_empty()),
@@ -353,7 +353,7 @@ fn frames(
 fn rings(
     arguments: &SimArguments,
     output: &mut Output,
-) -> Result<Result<End, ServeError>, Failure> {
+) -> Result<Result<ServeEnd, ServeError>, Failure> {
     if !arguments.frames.places().is_empty() {
         return Err(Failure::refused(
             "--slcan, --slcan-pty and --socketcand serve a CAN bus; --bus unitek expected with them",
@@ -385,7 +385,7 @@ fn rings(
     Ok(serve(server, &job, output))
 }
 
-impl Host for Output {
+impl ServeHost for Output {
     fn tell(&mut self, line: &str) -> std::io::Result<()> {
         self.result(&format!("{line}\n"))
     }

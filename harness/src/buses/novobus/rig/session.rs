@@ -15,7 +15,7 @@ use crate::rig::open::{Opened, open};
 use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
 use crate::rig::{
-    Alarm, End, Ends, Options, Rig, SessionError, file, limits, standing, state, stated_rate,
+    Alarm, End, Ends, Rig, SessionError, UseOptions, file, limits, standing, state, stated_rate,
 };
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
@@ -55,7 +55,7 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
-    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+    pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         let (error, opens) = match Self::open_as_stated(rig, options) {
             Ok(mut session) => {
                 if !session.lacks_marks() {
@@ -83,8 +83,8 @@ impl Session {
     }
 
     /// The cause that a rig file with one other setting proves by opening the ring.
-    fn cause_by_neighbour(rig: &Rig, options: &Options) -> Option<LikelyCause> {
-        let plain = Options {
+    fn cause_by_neighbour(rig: &Rig, options: &UseOptions) -> Option<LikelyCause> {
+        let plain = UseOptions {
             ill_as_well: false,
             allow_motion: false,
             ..options.clone()
@@ -102,7 +102,7 @@ impl Session {
     }
 
     /// Takes a rig as its file describes it.
-    fn open_as_stated(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+    fn open_as_stated(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         rig.of_rings()?;
         let taken = take(rig, options)?;
         let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
@@ -115,7 +115,7 @@ impl Session {
     /// Takes a rig that is taken and whose ends are open: listens, examines its rings, and looks at its interlocks.
     fn over(
         rig: &Rig,
-        options: &Options,
+        options: &UseOptions,
         taken: Taken,
         opened: Opened,
     ) -> Result<Self, SessionError> {
@@ -171,7 +171,7 @@ impl Session {
     #[cfg(test)]
     pub(crate) fn at_port(
         rig: &Rig,
-        options: &Options,
+        options: &UseOptions,
         port: Box<dyn PortLink>,
     ) -> Result<Self, SessionError> {
         let taken = Taken {

@@ -7,33 +7,33 @@ use crate::scenario::parse::parse_step;
 use crate::scenario::plan::plan_step;
 use crate::scenario::run::{Now, now};
 use crate::scenario::source::Source;
-use crate::serve::{Answer, first};
+use crate::serve::{ControlAnswer, first};
 
 impl Server {
     /// Does a line of control at once: a fault (`! 98->97: flip 0`), something that happens to drives from outside the bus
     /// (`drive 3 input GPIN5 high`), or a check that looks at drives (`? drive 3 nist = 0rpm +-5rpm`). `state 3` asks what a drive
     /// shows outside the bus, `state 2:3 nist FF08:2` for cells of it, in hexadecimal digits. `None` for an empty line or a comment. Bytes and times in a fault are counted from the server's start.
-    pub fn control(&mut self, line: &str) -> Option<Answer> {
+    pub fn control(&mut self, line: &str) -> Option<ControlAnswer> {
         let said = line.split('#').next().unwrap_or_default().trim();
         if said.is_empty() {
             return None;
         }
         let source = match Source::from_bytes("control".to_owned(), line.trim_end().into()) {
             Ok(source) => source,
-            Err(error) => return Some(Answer::Error(error.to_string())),
+            Err(error) => return Some(ControlAnswer::Error(error.to_string())),
         };
         let mut words = said.split_whitespace().map(str::to_owned);
         if words.next().as_deref() == Some("state") {
             let state = self.state(words.next().as_deref(), &words.collect::<Vec<_>>());
-            return Some(state.map_or_else(Answer::Error, Answer::State));
+            return Some(state.map_or_else(ControlAnswer::Error, ControlAnswer::State));
         }
         let step = parse_step(&source).and_then(|step| plan_step(&self.plan, &step, &source));
         Some(match step {
-            Err(problems) => Answer::Error(first(&source.text, &problems)),
+            Err(problems) => ControlAnswer::Error(first(&source.text, &problems)),
             Ok(step) => match now(&self.plan, &mut self.link, &step) {
-                Now::Done => Answer::Ok,
-                Now::Otherwise(found) => Answer::No(found),
-                Now::Refused(why) => Answer::Error(why.to_owned()),
+                Now::Done => ControlAnswer::Ok,
+                Now::Otherwise(found) => ControlAnswer::No(found),
+                Now::Refused(why) => ControlAnswer::Error(why.to_owned()),
             },
         })
     }

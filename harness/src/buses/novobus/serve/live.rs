@@ -5,7 +5,7 @@ use super::server::Server;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::counted::counted;
 use crate::link::Line;
-use crate::serve::{Answer, ServedBus};
+use crate::serve::{ControlAnswer, ServedBus};
 use crate::web::{FaultPlace, LiveCell, LiveNews, LiveOrder, LiveScene, LiveView};
 use harness_proto::nd21::cells::cell;
 use harness_proto::nd21::ram;
@@ -216,7 +216,7 @@ impl LiveView for Server {
                 let (fault, _) = FAULTS.get(fault).ok_or("there is no such fault")?;
                 let line = format!("! {link}: {fault}");
                 match self.control(&line) {
-                    Some(Answer::Ok) => {}
+                    Some(ControlAnswer::Ok) => {}
                     answer => {
                         let said = answer.map(|answer| answer.to_string());
                         return Err(format!("{line}: {}", said.unwrap_or_default()));

@@ -5,7 +5,7 @@ use crate::buses::novobus::link::SimulatedLink;
 use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
-use crate::serve::{Answer, ClientRole, Inner, Marks, Pace, ServedBus};
+use crate::serve::{ClientRole, ControlAnswer, Inner, Marks, Pace, ServedBus};
 use crate::web::LiveView;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
@@ -456,7 +456,7 @@ impl ServedBus for Server {
         next.min(exact).max(self.clock)
     }
 
-    fn control(&mut self, line: &str) -> Option<Answer> {
+    fn control(&mut self, line: &str) -> Option<ControlAnswer> {
         Self::control(self, line)
     }
 

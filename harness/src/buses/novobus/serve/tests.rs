@@ -137,7 +137,7 @@ fn a_marked_byte_is_a_parity_error_for_the_first_drive() {
     assert_eq!(answer[..2], [0x80, 0x00]);
     assert_eq!(answer.last(), Some(&0x02));
     let check = server.control("? error 0502 at 2");
-    assert_eq!(check, Some(Answer::Ok));
+    assert_eq!(check, Some(ControlAnswer::Ok));
 
     // The sequence's own FF is doubled in both directions.
     let mut sequence = RECOVERY.to_vec();
@@ -149,7 +149,7 @@ fn a_marked_byte_is_a_parity_error_for_the_first_drive() {
     let end = [&[0xFF, 0xFF, 0x44, 0x72, 0x4C, 0x41][..], &ANSWER[..]].concat();
     assert!(answer.ends_with(&end), "{answer:02X?}");
     let check = server.control("? drives 0..last normal");
-    assert_eq!(check, Some(Answer::Ok));
+    assert_eq!(check, Some(ControlAnswer::Ok));
 }
 
 /// FF 00 00 is a break of one byte: the first drive sees a framing error, and the byte behind it is whole.
@@ -160,7 +160,7 @@ fn a_marked_zero_is_a_break() {
     run(&mut server, at(5));
     assert_eq!(taken(&mut server, 0), [0, 0]);
     let check = server.control("? error 0503 at 0");
-    assert_eq!(check, Some(Answer::Ok));
+    assert_eq!(check, Some(ControlAnswer::Ok));
 }
 
 /// A byte that comes back damaged is marked, or bare where the stream has no marks.
@@ -171,7 +171,10 @@ fn what_comes_back_damaged() {
         (Marks::None, &[0x81, 0x80][..]),
     ] {
         let mut server = server(HEADER, &[2], Pace::Line, marks);
-        assert_eq!(server.control("! 0->master: flip 0"), Some(Answer::Ok));
+        assert_eq!(
+            server.control("! 0->master: flip 0"),
+            Some(ControlAnswer::Ok)
+        );
         server.receive(0, &[0x80, 0x80]).expect("no mark");
         run(&mut server, at(5));
         assert_eq!(taken(&mut server, 0), expected);
@@ -250,7 +253,7 @@ fn two_rings_have_two_clients_and_one_clock() {
     run(&mut server, at(5));
     assert_eq!(taken(&mut server, 0), [0x80]);
     assert_eq!(taken(&mut server, 1), [0x80, 0x80]);
-    assert_eq!(server.control("! drive 2:1: off"), Some(Answer::Ok));
+    assert_eq!(server.control("! drive 2:1: off"), Some(ControlAnswer::Ok));
     server.receive(0, &[0x80]).expect("no marks");
     server.receive(1, &[0x80]).expect("no marks");
     run(&mut server, at(10));
@@ -342,7 +345,10 @@ fn the_state_of_a_drive_follows_what_happens() {
     let turning = state(&mut server, "state 1 nsoll nist");
     assert!(turning.starts_with("ok nsoll=0652 nist=06"), "{turning}");
     assert_eq!(state(&mut server, "state 0 nist"), "ok nist=0000");
-    assert_eq!(server.control("! master->1: flip p"), Some(Answer::Ok));
+    assert_eq!(
+        server.control("! master->1: flip p"),
+        Some(ControlAnswer::Ok)
+    );
     server.receive(0, &[0x80]).expect("no marks");
     run(&mut server, at(2_010));
     let broken = state(&mut server, "state 1");
@@ -354,7 +360,7 @@ fn the_state_of_a_drive_follows_what_happens() {
 fn a_fault_at_a_time() {
     let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
     let armed = server.control("! drive 1 @20ms: off");
-    assert_eq!(armed, Some(Answer::Ok));
+    assert_eq!(armed, Some(ControlAnswer::Ok));
     server.receive(0, &[0x80]).expect("no marks");
     run(&mut server, at(15));
     assert_eq!(taken(&mut server, 0), [0x80]);

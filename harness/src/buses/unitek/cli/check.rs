@@ -8,7 +8,7 @@ use crate::cli::output::Output;
 use crate::cli::port_bench::select;
 use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
 use crate::link::Line as _;
-use crate::rig::{Options, Rig};
+use crate::rig::{Rig, UseOptions};
 use harness_proto::unitek::words::{ERRORS, set_bits};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -19,7 +19,7 @@ use std::fmt::Write as _;
 /// [`Failure`].
 pub(crate) fn check(
     rig: &Rig,
-    options: &Options,
+    options: &UseOptions,
     for_tools: bool,
     output: &mut Output,
 ) -> Result<Exit, Failure> {

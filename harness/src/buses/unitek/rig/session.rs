@@ -12,7 +12,7 @@ use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
-use crate::rig::{Ends, Options, Rig, SessionError};
+use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
 use harness_proto::unitek::guard::{Gate, Limits};
@@ -40,7 +40,7 @@ impl PortDrives for UnitekDrives {
     fn open(
         rig: &Rig,
         port: &Port,
-        options: &Options,
+        options: &UseOptions,
     ) -> Result<(Self, Guarded<Ends>, Vec<PortLock>), SessionError> {
         let axes = axes(port);
         let (ends, locks) = if rig.is_simulated() {
@@ -178,7 +178,7 @@ fn adapter(
     rig: &Rig,
     port: &Port,
     axes: &[Axis],
-    options: &Options,
+    options: &UseOptions,
 ) -> Result<(Ends, Vec<PortLock>), SessionError> {
     let place = port.can_adapter();
     let place = place.ok_or_else(|| failed(rig, "its port has no adapter"))?;

@@ -9,7 +9,7 @@ use crate::buses::novobus::guard::safe_state::{SafeState, Standstill, safe_state
 use crate::library::{Entry, sources};
 use crate::link::Line as _;
 use crate::rig::check::parse;
-use crate::rig::{Options, Rig, SessionError};
+use crate::rig::{Rig, SessionError, UseOptions};
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -50,10 +50,10 @@ fn line(drives: &str, stalls: Stalls) -> BusyLine {
 
 /// A rig with such drives.
 fn session(rig: &Rig, drives: &str, stalls: Stalls) -> Result<Session, SessionError> {
-    let options = Options {
+    let options = UseOptions {
         allow_motion: true,
         ill_as_well: true,
-        ..Options::default()
+        ..UseOptions::default()
     };
     Session::at_port(rig, &options, Box::new(line(drives, stalls)))
 }
