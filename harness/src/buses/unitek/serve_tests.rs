@@ -220,6 +220,34 @@ fn places_are_limited_and_used_again() {
     assert_eq!(server.come(Protocol::Socketcand), Some(all[3]));
 }
 
+/// An adapter stamps frames by a clock of its own. It goes on where the bus stood still because the computer did.
+#[test]
+fn stamps_go_on_while_the_computer_stands_still() {
+    let mut server = server(1);
+    let client = slcan(&mut server, "S6\rZ1\rO\r");
+    assert_eq!(server.receive(client, b"t20133D1B0A\r"), [""; 0]);
+    let stamps = |text: &str| -> Vec<u64> {
+        let frames = text.split('\r').filter(|line| line.starts_with("t181"));
+        let stamp = |line: &str| u64::from_str_radix(&line[line.len() - 4..], 16).expect("a stamp");
+        frames.map(stamp).collect()
+    };
+    run(&mut server, at(100_000));
+    let before = stamps(&took(&mut server, client));
+    assert!(
+        matches!(before[..], [.., last] if (90..=100).contains(&last)),
+        "{before:?}"
+    );
+    // It stands still for 5 s, and the bus makes up for one of them.
+    run(&mut server, at(5_100_000));
+    took(&mut server, client);
+    run(&mut server, at(5_200_000));
+    let behind = stamps(&took(&mut server, client));
+    assert!(
+        matches!(behind[..], [first, .., last] if first >= 5_100 && last >= 5_190),
+        "{behind:?}"
+    );
+}
+
 /// A bus on which nothing happens is looked at once a second; a program that was stopped resumes where it was.
 #[test]
 fn an_idle_bus_rests_and_a_late_server_resumes() {

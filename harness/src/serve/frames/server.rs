@@ -175,22 +175,22 @@ impl<B: SharedBus> FrameServer<B> {
         let due = to + self.clock.since(from);
         let most = self.bus.now() + CATCH_UP;
         self.bus.advance(due.min(most));
+        self.fetch();
         if due > most {
             self.base = (self.clock, self.bus.now());
         }
-        self.fetch();
     }
 
     /// Hands over what the clients' stations have heard by now.
     fn fetch(&mut self) {
-        let now = self.bus.now();
+        let (now, base) = (self.bus.now(), self.base);
         for (number, seat) in self.seats.iter_mut().enumerate() {
             let Some(host) = self.bus.host(number) else {
                 continue;
             };
             if let Some(client) = &mut seat.client {
                 client.heard.extend(std::iter::from_fn(|| host.receive()));
-                client.deliver(now);
+                client.deliver(now, base);
             }
             host.forget();
             if seat
@@ -242,8 +242,9 @@ impl<B: SharedBus> FrameServer<B> {
 }
 
 impl Client {
-    /// Tells the client what has ended by `now`.
-    fn deliver(&mut self, now: Instant) {
+    /// Tells the client what has ended by `now`. An adapter stamps by a clock of its own, which goes on where the bus stood still because the
+    /// computer did: `base` is a time of the clock, and that of the bus then.
+    fn deliver(&mut self, now: Instant, base: (Instant, Instant)) {
         while let Some(&(at, heard)) = self.heard.front()
             && at <= now
         {
@@ -254,7 +255,8 @@ impl Client {
                 continue;
             }
             let mut bytes = Vec::new();
-            self.session.hear(at, heard, &mut bytes);
+            let stamped = base.0 + at.since(base.1);
+            self.session.hear(stamped, heard, &mut bytes);
             if self.outbox.len() + bytes.len() > UNREAD {
                 self.lost += 1;
             } else {
