@@ -61,6 +61,17 @@ impl Session {
         }
     }
 
+    /// Lets drive 0 turn, with the requests 1 and 2.
+    pub(crate) fn turn_drive_0(&mut self) {
+        for request in [
+            json!({"id": 1, "do": "write", "drive": 0, "values": ["nsoll=200rpm"]}),
+            json!({"id": 2, "do": "go", "drive": 0}),
+        ] {
+            let answer = self.ask(&request);
+            assert!(answer.get("result").is_some(), "{answer}");
+        }
+    }
+
     pub(crate) fn ask(&mut self, request: &Value) -> Value {
         self.send(request.to_string().as_bytes());
         self.answer()
@@ -196,13 +207,7 @@ fn a_session_holds_the_bench_and_ends_in_the_safe_state() {
     let served = Served::start("nd21", &[2], "tcp", true, &[]);
     let desk = at(&served);
     let mut session = Session::open(&desk, &["--rig", "desk.toml", "--move"]);
-    for request in [
-        json!({"id": 1, "do": "write", "drive": 0, "values": ["nsoll=200rpm"]}),
-        json!({"id": 2, "do": "go", "drive": 0}),
-    ] {
-        let answer = session.ask(&request);
-        assert!(answer.get("result").is_some(), "{answer}");
-    }
+    session.turn_drive_0();
     std::thread::sleep(std::time::Duration::from_millis(1500));
     let read = session.ask(&json!({"id": 3, "do": "read", "drive": 0, "cells": ["nist"]}));
     let speed = read["result"]["values"][0]["value"]
