@@ -4,7 +4,7 @@
 use super::args::RigArguments;
 use super::axes;
 use crate::buses::SimulatedLink;
-use crate::buses::novobus::driver::{Axis, OpenRings, Options};
+use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
 use crate::buses::novobus::rig::named::sizes_of_rings;
 use crate::cli::exit::Exit;
@@ -217,8 +217,11 @@ impl OpenBench {
         output: &mut Output,
     ) -> Result<(), Failure> {
         let mut confirmed: BTreeMap<bool, Vec<Axis>> = BTreeMap::new();
-        for axis in self.bus.axes() {
-            let error = self.bus.state(axis)?.error;
+        let axes = self.bus.axes();
+        // All are asked before the first answers: each alone would take a round of the ring.
+        let cells = axes.iter().map(|axis| (*axis, ram::ERRORCODE, Width::Word));
+        let errors = self.bus.read_many(cells)?;
+        for (axis, error) in axes.into_iter().zip(errors) {
             let Some(error) = BusError::from_code(error) else {
                 continue;
             };
