@@ -24,6 +24,7 @@ use crate::scenario::source::Source;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
+use std::sync::atomic::AtomicBool;
 
 /// Reads every scenario selected; the size of a rig's ring is taken where the scenario allows it.
 ///
@@ -359,6 +360,15 @@ pub(crate) struct PlayedOnce {
 
 /// Plays a scenario on a simulated bench.
 pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> PlayedOnce {
+    play_entry_until(entry, at_mismatch, &AtomicBool::new(false))
+}
+
+/// The same, aborted once `interrupt` is set.
+pub(crate) fn play_entry_until(
+    entry: &Entry,
+    at_mismatch: AtMismatch,
+    interrupt: &AtomicBool,
+) -> PlayedOnce {
     let Some(plan) = entry.settled() else {
         return PlayedOnce {
             outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
@@ -366,7 +376,7 @@ pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> PlayedOnce {
         };
     };
     let mut link = plan.simulate();
-    let outcome = plan.play(&mut *link, at_mismatch);
+    let outcome = plan.play_until(&mut *link, at_mismatch, interrupt);
     PlayedOnce {
         outcome,
         traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
@@ -419,4 +429,29 @@ pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::verdict::Verdict;
+
+    /// A request of a session is broken off on drives of the scenario's own too, whatever the bus.
+    #[test]
+    fn an_interrupted_scenario_is_aborted() {
+        for text in [
+            "ring 3\nwait 1s\n",
+            "bus unitek\ndrive 1\nwait 1s\n",
+            "bus nordac\nslave 8\nwait 1s\n",
+        ] {
+            let source = Source::from_bytes("waits".to_owned(), text.as_bytes().to_vec());
+            let entry = Entry::fitting(source.expect("text"), None).expect("a scenario");
+            let play = |interrupt| {
+                let flag = AtomicBool::new(interrupt);
+                play_entry_until(&entry, AtMismatch::Stop, &flag).outcome
+            };
+            assert_eq!(play(false).verdict, Verdict::Passed, "{text}");
+            assert_eq!(play(true).verdict, Verdict::Aborted, "{text}");
+        }
+    }
 }

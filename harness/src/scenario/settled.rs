@@ -4,13 +4,15 @@ use super::language::Language;
 use super::parse::parse;
 use super::plan::{Plan, plan};
 use super::problem::Problems;
-use super::run::{AtMismatch, Outcome, play};
+use super::run::player::play_until;
+use super::run::{AtMismatch, Outcome};
 use super::source::Source;
 use super::syntax::Scenario;
 use crate::link::{Capability, Link};
 use crate::traffic::SegmentReport;
 use std::fmt::Debug;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// A settled scenario, and what every bus can do with it.
 pub trait Settled: Debug + Send + Sync {
@@ -33,7 +35,17 @@ pub trait Settled: Debug + Send + Sync {
     fn simulate(&self) -> Box<dyn Link>;
 
     /// Plays it on a link.
-    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome;
+    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+        self.play_until(link, at_mismatch, &AtomicBool::new(false))
+    }
+
+    /// The same, aborted once `interrupt` is set.
+    fn play_until(
+        &self,
+        link: &mut dyn Link,
+        at_mismatch: AtMismatch,
+        interrupt: &AtomicBool,
+    ) -> Outcome;
 }
 
 impl<L: Language> Settled for Plan<L> {
@@ -61,8 +73,13 @@ impl<L: Language> Settled for Plan<L> {
         L::simulate(self)
     }
 
-    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
-        play(self, link, at_mismatch)
+    fn play_until(
+        &self,
+        link: &mut dyn Link,
+        at_mismatch: AtMismatch,
+        interrupt: &AtomicBool,
+    ) -> Outcome {
+        play_until(self, link, at_mismatch, interrupt)
     }
 }
 

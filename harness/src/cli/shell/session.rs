@@ -12,7 +12,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::help::command;
 use crate::cli::output::Output;
-use crate::cli::run::play_entry;
+use crate::cli::run::play_entry_until;
 use crate::library::{Entry, sources};
 use crate::link::Trouble;
 use crate::rig::Rig;
@@ -582,7 +582,8 @@ impl HeldSession {
         }
         if self.rig.is_bare() {
             // Drives of its own.
-            return Ok(play_entry(entry, AtMismatch::Stop).outcome);
+            let played = play_entry_until(entry, AtMismatch::Stop, &self.interrupt);
+            return Ok(played.outcome);
         }
         // What is judged is recorded whole.
         let Some(capture) = &mut self.capture else {

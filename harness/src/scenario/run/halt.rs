@@ -6,6 +6,7 @@ use crate::link::Trouble;
 use crate::scenario::language::Language;
 use crate::scenario::plan::MAX_CARRIED;
 use harness_proto::time::Span;
+use std::sync::atomic::Ordering;
 
 /// How long a computer may hold bytes that a scenario has given up.
 const LATE: Span = Span::from_millis(1_000);
@@ -66,8 +67,14 @@ impl<L: Language> Runner<'_, L> {
         let carried =
             carried.then(|| format!("more than {MAX_CARRIED} bytes on the ring's links: too long"));
         let too_much = carried.or_else(|| L::too_much(&self.own));
-        let trouble = || self.link.trouble().cloned().map(Halt::Trouble);
-        self.full = too_much.map(Halt::Full).or_else(trouble);
+        let interrupted = self
+            .interrupt
+            .is_some_and(|own| own.load(Ordering::Relaxed));
+        let interrupted = interrupted.then_some(Trouble::Interrupted);
+        let trouble = || self.link.trouble().cloned().or(interrupted);
+        self.full = too_much
+            .map(Halt::Full)
+            .or_else(|| trouble().map(Halt::Trouble));
     }
 
     /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it.

@@ -10,6 +10,7 @@ use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, Plann
 use crate::scenario::problem::Span;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::{self, Instant};
+use std::sync::atomic::AtomicBool;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -34,10 +35,21 @@ pub fn run<L: Language>(plan: &Plan<L>, link: &mut dyn Link) -> Outcome {
 
 /// Plays a plan on a link. The outcome tells of the first line that was not met.
 pub fn play<L: Language>(plan: &Plan<L>, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+    play_until(plan, link, at_mismatch, &AtomicBool::new(false))
+}
+
+/// The same, aborted once `interrupt` is set: for a link that does not look at it itself.
+pub(crate) fn play_until<L: Language>(
+    plan: &Plan<L>,
+    link: &mut dyn Link,
+    at_mismatch: AtMismatch,
+    interrupt: &AtomicBool,
+) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
     }
     let mut runner = Runner::new(plan, link, at_mismatch);
+    runner.interrupt = Some(interrupt);
     let result = runner.play();
     let result = runner.wind_up(result);
     let remarks = runner
@@ -74,6 +86,8 @@ pub struct Runner<'a, L: Language = DefaultBus> {
     pub(crate) link: &'a mut dyn Link,
     pub(crate) plan: &'a Plan<L>,
     at_mismatch: AtMismatch,
+    /// Ends the conversation when it is set.
+    pub(crate) interrupt: Option<&'a AtomicBool>,
     strict: bool,
     /// Why nothing more can be played: the recording is full, or the link is in trouble.
     pub(crate) full: Option<Halt>,
@@ -102,6 +116,7 @@ impl<'a, L: Language> Runner<'a, L> {
             link,
             plan,
             at_mismatch,
+            interrupt: None,
             strict: plan.strict,
             full: None,
             unseen: None,
