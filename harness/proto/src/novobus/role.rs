@@ -69,6 +69,15 @@ impl Role {
         }
     }
 
+    /// The drive that alone may change the byte: an address byte is changed by every drive on its way (ND21 9.3).
+    #[must_use]
+    pub const fn answering(self) -> Option<u8> {
+        match self {
+            Self::Address { .. } => None,
+            _ => self.drive(),
+        }
+    }
+
     /// The section of the ND21 manual with the rule for it, and the rule in a word.
     #[must_use]
     pub const fn rule(self) -> (&'static str, &'static str) {

@@ -170,7 +170,7 @@ impl Judge {
         let mut counts = vec![0; usize::from(self.size.drives()) + 1];
         let mut index = 0;
         for ((byte, _), role) in exchange.sent.iter().zip(&roles[self.sent.len()..]) {
-            let meant = role.drive().filter(|_| !self.model.any_in_error());
+            let meant = role.answering().filter(|_| !self.model.any_in_error());
             for out in around(&mut self.model, *byte, &mut counts, &exchange.harms) {
                 let Some(must) = self.model.must(out, *role) else {
                     continue;

@@ -104,7 +104,7 @@ impl From<&twin::Divergence> for Difference {
             rule: rule.to_owned(),
             ring: found.ring,
             drive: None,
-            meant: found.role.drive(),
+            meant: found.role.answering(),
             byte: Some(found.byte),
             time: found.what == Symptom::Time,
             about: found.to_string(),
