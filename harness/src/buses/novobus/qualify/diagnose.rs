@@ -163,8 +163,14 @@ fn name_among<E>(
     };
     let manual = Header::default();
     let (simulated, mut differed) = (seen.exactness.knows_cells, 0);
+    // What earlier scenarios have left in simulated drives grows with each.
+    let most = if simulated {
+        MOST_SIMULATED
+    } else {
+        usize::MAX
+    };
+    let mut differing: Vec<_> = seen.differing.iter().take(most).collect();
     // The shortest first: it refutes most, and costs least.
-    let mut differing: Vec<_> = seen.differing.iter().collect();
     differing.sort_by_key(|attempt| attempt.iter().map(|own| own.done.len()).sum::<usize>());
     for attempt in differing {
         if simulated && differed == MOST_SIMULATED {
