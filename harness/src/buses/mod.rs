@@ -2,6 +2,8 @@
 
 mod contents;
 #[cfg(test)]
+mod interrupt_tests;
+#[cfg(test)]
 mod live_tests;
 pub mod nordac;
 pub mod novobus;

@@ -430,28 +430,3 @@ pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scenario::verdict::Verdict;
-
-    /// A request of a session is broken off on drives of the scenario's own too, whatever the bus.
-    #[test]
-    fn an_interrupted_scenario_is_aborted() {
-        for text in [
-            "ring 3\nwait 1s\n",
-            "bus unitek\ndrive 1\nwait 1s\n",
-            "bus nordac\nslave 8\nwait 1s\n",
-        ] {
-            let source = Source::from_bytes("waits".to_owned(), text.as_bytes().to_vec());
-            let entry = Entry::fitting(source.expect("text"), None).expect("a scenario");
-            let play = |interrupt| {
-                let flag = AtomicBool::new(interrupt);
-                play_entry_until(&entry, AtMismatch::Stop, &flag).outcome
-            };
-            assert_eq!(play(false).verdict, Verdict::Passed, "{text}");
-            assert_eq!(play(true).verdict, Verdict::Aborted, "{text}");
-        }
-    }
-}
