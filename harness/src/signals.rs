@@ -35,6 +35,14 @@ fn flag(signals: impl Iterator<Item = c_int>) -> Arc<AtomicBool> {
     flag
 }
 
+/// Ends the program as Ctrl-C does, where a terminal gives it as a key.
+///
+/// # Errors
+/// The signal cannot be raised.
+pub(crate) fn interrupt() -> std::io::Result<()> {
+    signal_hook::low_level::raise(SIGINT)
+}
+
 /// The same without SIGINT: Ctrl-C ends what is under way, and not the program.
 pub(crate) fn interrupt_flag_without_ctrl_c() -> Arc<AtomicBool> {
     flag(ending().filter(|own| *own != SIGINT).chain([SIGTSTP]))

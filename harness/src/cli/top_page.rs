@@ -1,8 +1,9 @@
 //! `top --web`: the page of a bench in use. It only looks on.
 
 use super::failure::Failure;
-use crate::buses::commands::TopArguments;
-use crate::web::{LiveNews, LivePage, LivePicture, LiveScene, MAX_ROWS};
+use super::top::{Asked, TopReader, TopScene, TopView};
+use crate::top::{Heading, Snapshot, Top, TopEvent};
+use crate::web::{LiveNews, LivePage, LiveScene, MAX_ROWS};
 use std::time::{Duration, Instant};
 
 /// Why it takes no orders.
@@ -13,75 +14,105 @@ const READ_ONLY: &str = "This page only looks on: `top` reads drives, and a page
 const EVERY: Duration = Duration::from_millis(250);
 
 /// The page of a bench in use.
-pub(crate) struct TopPage {
+pub(super) struct TopPage {
     page: LivePage,
+    top: Top,
     opened: Instant,
     /// When the last news went out.
     last: Option<Instant>,
+    /// The events that it has told, with how often each had happened then.
+    told: Vec<TopEvent>,
 }
 
 impl TopPage {
-    /// Serves the page that `--web` asks for, if it does. Its tables have these heads.
+    /// Serves a page at a place, for other machines too if that is permitted.
     ///
     /// # Errors
     /// [`Failure`]: the address is not free, or other machines could reach it.
-    pub(crate) fn open(
-        arguments: &TopArguments,
-        title: String,
-        (stations, traffic): (&[&'static str], &[&'static str]),
-        picture: LivePicture,
-    ) -> Result<Option<Self>, Failure> {
-        let Some(place) = &arguments.web else {
-            return Ok(None);
-        };
+    pub(super) fn open(
+        place: &str,
+        allow_remote: bool,
+        heading: Heading,
+        scene: TopScene,
+    ) -> Result<Self, Failure> {
         let scene = LiveScene {
-            title,
-            stations: stations.to_vec(),
-            traffic: traffic.to_vec(),
-            picture: Some(picture),
+            title: scene.title,
+            stations: heading.form.heads(),
+            traffic: scene.traffic.to_vec(),
+            picture: Some(scene.picture),
             read_only: Some(READ_ONLY.to_owned()),
             ..LiveScene::default()
         };
-        let page = LivePage::open(place, arguments.allow_remote, &scene);
-        Ok(Some(Self {
+        let page = LivePage::open(place, allow_remote, &scene);
+        Ok(Self {
             page: page.map_err(|error| Failure::refused(error.to_string()))?,
+            top: Top::new(heading),
             opened: Instant::now(),
             last: None,
-        }))
+            told: Vec::new(),
+        })
     }
 
     /// The line of standard output that says where it is.
-    pub(crate) fn line(&self) -> String {
+    pub(super) fn line(&self) -> String {
         format!("page at {}\n", self.page.url())
     }
 
-    /// Whether a page is open: drives are read only then.
-    pub(crate) fn is_wanted(&mut self) -> bool {
+    /// The events that are new, or have happened again.
+    fn notes(&mut self, reading: &Snapshot) -> Vec<String> {
+        let news = reading.events.iter().filter(|own| !self.told.contains(own));
+        let note = |own: &TopEvent| {
+            let times = if own.count == 1 { "time" } else { "times" };
+            format!("{}, {} {times} so far", own.what, own.count)
+        };
+        let notes = news.map(note).collect();
+        self.told.clone_from(&reading.events);
+        notes
+    }
+}
+
+impl TopView for TopPage {
+    /// Drives are read, and what the bus carries is recorded, only while a page is open.
+    fn is_wanted(&mut self, reader: &mut dyn TopReader) -> bool {
         let wanted = self.page.feed().is_wanted();
-        if !wanted && self.last.take().is_some() {
-            self.page.feed().clear();
+        if !wanted {
+            reader.record(false);
+            if self.last.take().is_some() {
+                self.page.feed().clear();
+            }
         }
         wanted
     }
 
-    /// Whether nothing has been shown since a page was opened.
-    pub(crate) const fn just_opened(&self) -> bool {
-        self.last.is_none()
-    }
-
-    /// Whether news are due.
-    pub(crate) fn is_due(&self) -> bool {
-        self.last.is_none_or(|last| last.elapsed() >= EVERY)
-    }
-
-    /// Shows what was read, and the newest rows of the picture.
-    pub(crate) fn show(&mut self, mut news: LiveNews) {
+    fn show(&mut self, reader: &mut dyn TopReader, reading: &Snapshot) {
+        if self.last.is_some_and(|last| last.elapsed() < EVERY) {
+            return;
+        }
+        if self.last.is_none() {
+            // What was recorded is from before the page was opened.
+            reader.record(true);
+        }
         self.last = Some(Instant::now());
+        let mut news = reader.heard();
+        let mut notes = self.notes(reading);
+        notes.append(&mut news.notes);
+        self.top.take(reading.clone());
         let hidden = news.rows.len().saturating_sub(MAX_ROWS);
         news.rows.drain(..hidden);
-        news.left_out += hidden as u64;
-        let at = format!("{:.1} s", self.opened.elapsed().as_secs_f64());
-        let text = serde_json::to_string(&LiveNews { at, ..news });
+        let rows = self.top.rows().into_iter();
+        let news = LiveNews {
+            at: format!("{:.1} s", self.opened.elapsed().as_secs_f64()),
+            stations: rows.map(|row| row.cells.clone()).collect(),
+            left_out: news.left_out + hidden as u64,
+            notes,
+            ..news
+        };
+        let text = serde_json::to_string(&news);
         self.page.feed().publish(text.unwrap_or_default());
+    }
+
+    fn wait(&mut self, time: Duration) -> Option<Asked> {
+        std::thread::sleep(time);
+        None
     }
 }

@@ -84,9 +84,8 @@ impl Port {
         slcan.or(server).or(kernel)
     }
 
-    /// The keys of the adapters that are given: one, or none where the drives are simulated.
-    #[must_use]
-    pub fn adapters(&self) -> Vec<&'static str> {
+    /// The keys of the adapters that are given, and where these are: one, or none where the drives are simulated.
+    pub fn places(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let all = [
             ("slcan", &self.slcan),
             ("socketcand", &self.socketcand),
@@ -94,8 +93,14 @@ impl Port {
             ("serial", &self.serial),
             ("tcp", &self.tcp),
         ];
-        let given = all.into_iter().filter(|(_, place)| place.is_some());
-        given.map(|(key, _)| key).collect()
+        let given = all.into_iter();
+        given.filter_map(|(key, place)| Some((key, place.as_deref()?)))
+    }
+
+    /// The keys of the adapters that are given.
+    #[must_use]
+    pub fn adapters(&self) -> Vec<&'static str> {
+        self.places().map(|(key, _)| key).collect()
     }
 
     /// The other keys that are given and that only some buses have.

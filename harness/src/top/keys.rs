@@ -1,6 +1,7 @@
 //! Keys: what each does to the view.
 
-use crate::top::{KeyTarget, Top};
+use super::Top;
+use super::state::KeyTarget;
 
 /// The longest text to filter by, in characters.
 const MOST: usize = 60;
@@ -59,7 +60,7 @@ pub const HELP: [(&str, &str); 9] = [
     ("p", "pause: the page stands still, reading goes on"),
     ("Up, Down, PgUp, PgDn", "scroll; also k and j, Home and End"),
     ("?", "this help; any key closes it"),
-    ("c", "forget the disturbances shown so far"),
+    ("c", "clear the messages below the table"),
 ];
 
 impl Top {
@@ -106,7 +107,7 @@ impl Top {
             Key::Char('e') => self.only_errors = !self.only_errors,
             Key::Char('s') => self.sort = self.sort.next(),
             Key::Char('p') => self.pause(),
-            Key::Char('c') => self.forget_disturbances(),
+            Key::Char('c') => self.forget_events(),
             Key::Char('k') => self.scroll(Key::Up),
             Key::Char('j') => self.scroll(Key::Down),
             key => self.scroll(key),

@@ -3,8 +3,7 @@
 //! There is one screen a process, as there is one terminal.
 
 use super::keys::Key;
-use super::view;
-use crate::top::Top;
+use super::{Top, view};
 use ratatui_core::terminal::Terminal;
 use ratatui_crossterm::CrosstermBackend;
 use ratatui_crossterm::crossterm::cursor::Show;

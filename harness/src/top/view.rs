@@ -1,8 +1,9 @@
 //! The page: a pure function of the view's state and of the size of the terminal.
 
 use super::keys::HELP;
+use super::reading::{HeadLine, TopForm, TopRow};
+use super::state::{KeyTarget, Top};
 use crate::counted::counted;
-use crate::top::{KeyTarget, RingReading, Top, TopRow};
 use harness_proto::time::Span;
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
@@ -10,25 +11,10 @@ use ratatui_core::style::{Modifier, Style};
 use ratatui_core::terminal::Frame;
 use std::fmt::Write as _;
 
-/// Headings of the columns; the units are those of the drive's cells (ND21 14.5).
-pub(crate) const COLUMNS: [&str; 7] = [
-    "drive",
-    "state",
-    "shows",
-    "speed rpm",
-    "pos. turns",
-    "Aeff",
-    "error, status",
-];
-/// The least widths of the columns, but for the last, which takes what is left.
-const WIDTHS: [usize; 6] = [5, 5, 5, 9, 10, 6];
-/// Columns that give way in a narrow terminal, in this order, and how much of the last column they leave.
-const GIVE_WAY: [usize; 4] = [5, 4, 3, 2];
+/// What columns that give way leave of the last one.
 const LAST_WIDTH: usize = 16;
-/// The column in which what is left begins with words and not with numbers.
-const WORDS: [usize; 2] = [1, 6];
-/// Lines of disturbances at most, and how many lines a terminal has for each.
-const DISTURBANCES: usize = 4;
+/// Lines of events at most, and how many lines a terminal has for each.
+const EVENTS: usize = 4;
 const LINES_EACH: usize = 5;
 /// Rows of drives that the head makes room for.
 const LEAST_ROWS: usize = 4;
@@ -146,103 +132,89 @@ fn head(top: &Top) -> Vec<(String, Look)> {
         first.push_str("  paused");
     }
     let mut lines = vec![(first, Look::Bold)];
-    for (number, what) in (1..).zip(&top.heading.rings) {
-        lines.push((format!("ring {number}: {what}"), Look::Plain));
-        if let Some(ring) = reading.rings.get(number - 1) {
-            lines.push((traffic(ring), Look::Plain));
-            lines.push(errors(ring));
-        }
-    }
-    if reading.unplaced > 0 {
-        let unplaced = reading.unplaced;
-        let text = format!("  {unplaced} line errors told of without their bytes");
-        lines.push((text, Look::Error));
+    for part in 0..top.heading.parts.len().max(reading.parts.len()) {
+        let what = top.heading.parts.get(part);
+        lines.extend(what.map(|what| (what.clone(), Look::Plain)));
+        let read = reading.parts.get(part).into_iter().flatten();
+        lines.extend(read.map(|HeadLine { text, is_error }| {
+            let look = if *is_error { Look::Error } else { Look::Plain };
+            (text.clone(), look)
+        }));
     }
     lines.push((counts(top), Look::Plain));
     lines
 }
 
-fn traffic(ring: &RingReading) -> String {
-    format!(
-        "  {} bytes/s, {} telegrams/s, {} commands/s; the line is {}.{} % busy",
-        ring.bytes,
-        ring.telegrams,
-        ring.jobs,
-        ring.share / 10,
-        ring.share % 10
-    )
-}
-
-fn errors(ring: &RingReading) -> (String, Look) {
-    let own = &ring.counters;
-    let text = format!(
-        "  line errors {}, disturbed {}, corrected {}, commands repeated {}",
-        own.line_errors, own.disturbed, own.corrected, own.repeated
-    );
-    let sound = own.line_errors == 0 && own.disturbed == 0;
-    (text, if sound { Look::Plain } else { Look::Error })
-}
-
-/// How many drives are in which mode.
+/// How many drives are in which state.
 fn counts(top: &Top) -> String {
     let count = top.reading.drives.len();
-    let mut text = format!("{}:", counted(count, "drive"));
-    let modes = top.modes();
-    let some = modes.iter().filter(|(_, count)| *count > 0);
-    let words: Vec<_> = some.map(|(mode, n)| format!("{n} {mode}")).collect();
-    let _infallible = write!(text, " {}", words.join(", "));
-    text
+    let some = top.states().filter(|(_, count)| *count > 0);
+    let words: Vec<_> = some.map(|(state, n)| format!("{n} {state}")).collect();
+    let drives = counted(count, top.heading.form.drive);
+    format!("{drives}: {}", words.join(", "))
 }
 
 fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
     let rows = top.rows();
-    let widths: Vec<usize> = WIDTHS
+    let form = top.heading.form;
+    // The last column takes what is left.
+    let but_the_last = form.columns.len().saturating_sub(1);
+    let widths: Vec<usize> = form.columns[..but_the_last]
         .iter()
         .enumerate()
-        .map(|(column, least)| {
-            let of_rows = rows.iter().map(|row| row.cells[column].chars().count());
-            of_rows.max().unwrap_or(0).max(*least)
+        .map(|(place, column)| {
+            let of_rows = rows.iter().map(|row| cell(row, place).chars().count());
+            of_rows.max().unwrap_or(0).max(column.width)
         })
         .collect();
-    let shown = shown_columns(&widths, width);
-    let line = |cells: [&str; 7]| {
-        let padded = shown.iter().map(|column| {
-            let (cell, width) = (cells[*column], widths.get(*column).copied().unwrap_or(0));
-            match WORDS.contains(column) {
+    let shown = shown_columns(form, &widths, width);
+    let line = |cells: &[&str]| {
+        let padded = shown.iter().map(|place| {
+            let (cell, width) = (cells[*place], widths.get(*place).copied().unwrap_or(0));
+            match form.columns[*place].has_words {
                 true => format!("{cell:width$}"),
                 false => format!("{cell:>width$}"),
             }
         });
         padded.collect::<Vec<_>>().join("  ")
     };
-    let mut heading = line(COLUMNS);
+    let mut heading = line(&form.heads());
     let length = heading.chars().count();
     heading.extend(std::iter::repeat_n(' ', width.saturating_sub(length)));
     let mut lines = vec![(heading, Look::Reverse)];
     let shown = rows.iter().skip(top.first).take(room);
     lines.extend(shown.map(|row| {
-        let text = line(std::array::from_fn(|column| row.cells[column].as_str()));
+        let cells: Vec<_> = (0..form.columns.len())
+            .map(|place| cell(row, place))
+            .collect();
+        let text = line(&cells);
         (cut(text, width), look(row))
     }));
     if rows.is_empty() {
+        let drive = form.drive;
         let why = match (top.reading.drives.is_empty(), top.only_errors, &top.filter) {
-            (true, ..) => "no drive has been read yet".to_owned(),
-            (false, true, filter) if filter.is_empty() => "no drive is in error".to_owned(),
-            (false, true, filter) => format!("no drive in error has `{filter}` in its row"),
-            (false, false, filter) => format!("no drive has `{filter}` in its row"),
+            (true, ..) => format!("no {drive} has been read yet"),
+            (false, true, filter) if filter.is_empty() => format!("no {drive} is in error"),
+            (false, true, filter) => format!("no {drive} in error has `{filter}` in its row"),
+            (false, false, filter) => format!("no {drive} has `{filter}` in its row"),
         };
         lines.push((why, Look::Plain));
     }
     lines
 }
 
-/// The columns that a terminal has room for: all that leave enough for the error.
-fn shown_columns(widths: &[usize], width: usize) -> Vec<usize> {
-    let mut shown: Vec<usize> = (0..COLUMNS.len()).collect();
-    for gone in GIVE_WAY {
+/// What a row has in a column.
+fn cell(row: &TopRow, column: usize) -> &str {
+    row.cells.get(column).map_or("", String::as_str)
+}
+
+/// The columns that a terminal has room for: all that leave enough for the last one.
+fn shown_columns(form: &TopForm, widths: &[usize], width: usize) -> Vec<usize> {
+    let mut shown: Vec<usize> = (0..form.columns.len()).collect();
+    for gone in form.give_way {
         let before = shown.iter().filter_map(|column| widths.get(*column));
         if before.map(|own| own + 2).sum::<usize>() + LAST_WIDTH > width {
-            shown.retain(|column| *column != gone);
+            shown.retain(|column| column != gone);
         }
     }
     shown
@@ -266,28 +238,23 @@ fn look(row: &TopRow) -> Look {
 }
 
 fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
-    let several = top.heading.rings.len() > 1;
-    let mut all: Vec<_> = top.disturbances().collect();
-    let room = DISTURBANCES.min(height / LINES_EACH);
+    let mut all: Vec<_> = top.events().collect();
+    let room = EVENTS.min(height / LINES_EACH);
     // The latest first.
     all.sort_by_key(|one| std::cmp::Reverse(one.last));
     let mut lines: Vec<(String, Look)> = all
         .iter()
         .take(room)
         .map(|one| {
-            let ring = match several {
-                true => format!("ring {}: ", one.ring + 1),
-                false => String::new(),
-            };
             let times = match one.count {
                 1 => String::new(),
                 n => format!(" {n} times, last"),
             };
-            let text = format!("{ring}{}{times} at {}", one.what, clock(one.last));
+            let text = format!("{}{times} at {}", one.what, clock(one.last));
             // How often comes first where not all of it can be read.
             let text = match text.chars().count() <= width {
                 true => text,
-                false => format!("{ring}{} times: {}", one.count, one.what),
+                false => format!("{} times: {}", one.count, one.what),
             };
             (text, Look::Error)
         })

@@ -1,8 +1,9 @@
 //! Pages as plain text: the view is a function of what was read, of the keys and of the size.
 
 use harness::buses::novobus::driver::{Axis, State};
+use harness::buses::novobus::top::{DriveReading, FORM, RingReading};
 use harness::top::view::{page, render, text};
-use harness::top::{DriveReading, Heading, Key, Press, RingReading, Snapshot, Top};
+use harness::top::{HeadLine, Heading, Key, Press, Snapshot, Top};
 use harness_proto::nd21::bits::{flags, flags2, status};
 use harness_proto::novobus::master::Counters;
 use harness_proto::time::Span;
@@ -53,10 +54,20 @@ fn drive(ring: usize, number: u8, state: State, speed: f64) -> DriveReading {
     }
 }
 
+/// Puts what a drive showed in the place of what it showed before.
+fn put(reading: &mut Snapshot, drive: DriveReading) {
+    let place = usize::from(drive.axis.number());
+    reading.drives.insert(place, drive.row());
+}
+
 fn heading(rings: &[&str]) -> Heading {
+    let rings = (1..).zip(rings);
     Heading {
         rig: "lab-1".to_owned(),
-        rings: rings.iter().map(|ring| (*ring).to_owned()).collect(),
+        form: &FORM,
+        parts: rings
+            .map(|(number, what): (usize, _)| format!("ring {number}: {what}"))
+            .collect(),
     }
 }
 
@@ -80,30 +91,28 @@ fn ring(disturbed: u64) -> RingReading {
 fn four() -> Snapshot {
     let mut reading = Snapshot {
         at: at(3_725),
-        rings: vec![ring(3)],
+        parts: vec![ring(3).lines()],
         ..Snapshot::default()
     };
     let go = state(0, 0, flags2::OK | flags2::MONITORING, 0);
     // They come in any order.
-    reading.drive(drive(0, 2, go, 1_499.9));
-    reading.drive(drive(0, 0, state(status::STOP, flags::STOP, 0, 0), 0.0));
-    reading.drive(drive(
-        0,
-        3,
-        state(status::ERROR, flags::BLOCK, 0, 0x0508),
-        -12.5,
-    ));
-    reading.drive(drive(0, 1, state(status::BLOCK, flags::BLOCK, 0, 0), 0.0));
-    reading.disturbed(
-        0,
-        "the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned(),
+    put(&mut reading, drive(0, 2, go, 1_499.9));
+    put(
+        &mut reading,
+        drive(0, 0, state(status::STOP, flags::STOP, 0, 0), 0.0),
     );
+    put(
+        &mut reading,
+        drive(0, 3, state(status::ERROR, flags::BLOCK, 0, 0x0508), -12.5),
+    );
+    put(
+        &mut reading,
+        drive(0, 1, state(status::BLOCK, flags::BLOCK, 0, 0), 0.0),
+    );
+    reading.happened("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
     reading.at = at(3_730);
-    reading.disturbed(0, "answers come too late".to_owned());
-    reading.disturbed(
-        0,
-        "the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned(),
-    );
+    reading.happened("answers come too late".to_owned());
+    reading.happened("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
     reading
 }
 
@@ -117,7 +126,7 @@ fn of_four() -> Top {
 fn hundred() -> Top {
     let mut reading = Snapshot {
         at: at(61),
-        rings: vec![ring(0)],
+        parts: vec![ring(0).lines()],
         ..Snapshot::default()
     };
     for number in 0..100 {
@@ -135,7 +144,7 @@ fn hundred() -> Top {
         } else {
             50.0
         };
-        reading.drive(drive(0, number, own, speed));
+        put(&mut reading, drive(0, number, own, speed));
     }
     let mut top = Top::new(heading(&["100 drives, tcp lab:4001, 38400 8O1"]));
     top.take(reading);
@@ -183,7 +192,7 @@ fn a_page_of_a_very_small_terminal() {
     let mut reading = four();
     for number in 0..6 {
         for _ in 0..=number {
-            reading.disturbed(0, format!("what was disturbed in way {number}"));
+            reading.happened(format!("what was disturbed in way {number}"));
         }
     }
     let mut top = of_four();
@@ -236,10 +245,13 @@ fn the_help_names_every_key() {
 fn two_rings_of_which_little_is_known() {
     let mut top = Top::new(heading(&["2 drives, simulated", "1 drive, simulated"]));
     kept("nothing-80x24.txt", &drawn(&mut top, 80, 24));
+    let unplaced = HeadLine {
+        text: "  4 line errors told of without their bytes".to_owned(),
+        is_error: true,
+    };
     let mut reading = Snapshot {
         at: at(1),
-        rings: vec![ring(0), ring(1)],
-        unplaced: 4,
+        parts: vec![ring(0).lines(), ring(1).lines(), vec![unplaced]],
         ..Snapshot::default()
     };
     let nothing = DriveReading {
@@ -248,8 +260,8 @@ fn two_rings_of_which_little_is_known() {
         torque: None,
         ..drive(1, 0, state(status::RESET, 0, 0, 0x0FFF), 0.0)
     };
-    reading.drive(nothing);
-    reading.disturbed(1, "nothing comes back".to_owned());
+    put(&mut reading, nothing);
+    reading.happened("ring 2: nothing comes back".to_owned());
     top.take(reading);
     kept("two-rings-80x24.txt", &drawn(&mut top, 80, 24));
 }
@@ -290,9 +302,9 @@ fn only_drives_in_error() {
 /// A code without the error mode is shown: the display is dark then, but the cell holds it (ND21 11.8, 14.10.1).
 #[test]
 fn a_code_without_the_error_mode_is_an_error_that_the_display_does_not_show() {
-    let mut top = Top::default();
+    let mut top = Top::new(heading(&[]));
     let mut reading = Snapshot::default();
-    reading.drive(drive(0, 0, state(0, 0, 0, 0x0508), 0.0));
+    put(&mut reading, drive(0, 0, state(0, 0, 0, 0x0508), 0.0));
     top.take(reading);
     press(&mut top, "e");
     let row = &top.rows()[0];
@@ -364,7 +376,7 @@ fn a_pause_holds_the_page_and_misses_nothing() {
     let before = drawn(&mut top, 80, 24);
     assert!(before.contains("paused"));
     let mut later = four();
-    later.drive(drive(0, 0, state(0, 0, 0, 0), 777.0));
+    put(&mut later, drive(0, 0, state(0, 0, 0, 0), 777.0));
     top.take(later);
     assert_eq!(drawn(&mut top, 80, 24), before);
     press(&mut top, "p");
@@ -387,7 +399,7 @@ fn disturbances_are_counted_by_kind_and_can_be_forgotten() {
     assert!(!drawn(&mut top, 120, 40).contains("damaged"));
     let mut reading = four();
     reading.at = at(4_000);
-    reading.disturbed(0, "answers come too late".to_owned());
+    reading.happened("answers come too late".to_owned());
     top.take(reading);
     let page = drawn(&mut top, 120, 40);
     assert!(
@@ -396,8 +408,8 @@ fn disturbances_are_counted_by_kind_and_can_be_forgotten() {
     );
     // Kinds without an end are only counted.
     let mut many = Snapshot::default();
-    (0..1_000).for_each(|n| many.disturbed(0, format!("kind {n}")));
-    assert_eq!((many.disturbances.len(), many.others), (64, 936));
+    (0..1_000).for_each(|n| many.happened(format!("kind {n}")));
+    assert_eq!((many.events.len(), many.others), (64, 936));
     top.take(many);
     press(&mut top, "c");
     assert!(drawn(&mut top, 80, 24).contains("and 936 other disturbances"));
@@ -461,7 +473,7 @@ fn errors_are_seen_without_colours_too() {
 /// No size is too small, and none makes it panic.
 #[test]
 fn terminals_of_every_size() {
-    for mut top in [of_four(), hundred(), Top::default()] {
+    for mut top in [of_four(), hundred(), Top::new(heading(&[]))] {
         for width in [0, 1, 5, 20, 79, 300] {
             for height in [0, 1, 2, 3, 7, 12, 100] {
                 let area = Rect::new(0, 0, width, height);

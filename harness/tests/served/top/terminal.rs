@@ -2,6 +2,7 @@
 
 use super::tty::{Seen, Tty};
 use crate::ring::Served;
+use harness::buses::novobus::top::FORM;
 use harness::port::Endpoint;
 use harness::top::{Heading, Screen, Top};
 use rustix::process::{Pid, Signal, kill_process};
@@ -231,7 +232,8 @@ fn a_panic_leaves_the_terminal_as_it_was_and_its_message_to_be_read() {
         let mut screen = Screen::enter(true).expect("a terminal");
         let mut top = Top::new(Heading {
             rig: "of a test".to_owned(),
-            rings: Vec::new(),
+            form: &FORM,
+            parts: Vec::new(),
         });
         screen.draw(&mut top).expect("drawn");
         panic!("out of order");

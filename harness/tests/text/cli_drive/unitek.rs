@@ -204,7 +204,7 @@ fn drives_are_shown_in_rows() {
          1      yes    yes     released  0.0% (0.0 rpm)  0.526 turns  Ena N-I  none\n\
          2      yes    yes     released  0.0% (0.0 rpm)  0.526 turns  Ena N-I  none\n"
     );
-    refused("top --rig sim:unitek", 2, &["--once prints one page"]);
+    refused("top --rig sim:unitek", 2, &["use `top --once`"]);
 }
 
 #[test]

@@ -11,10 +11,13 @@ use crate::buses::nordac::value::{Cell, ReplyWord, parameter};
 use crate::capture::Piece;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
+use crate::cli::line_top::LineTop;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_line::{self, LineTop};
+use crate::cli::top::check as check_top;
+use crate::top::{TopColumn, TopForm, TopRow};
 use harness_proto::nordac::PpoType;
+use harness_proto::nordac::words::State;
 use serde_json::{Map, Value, json};
 
 /// What is shown of a slave that has a parameter channel: the heading, and the parameter.
@@ -80,12 +83,14 @@ fn value(found: &Found) -> String {
     }
 }
 
-fn look(driver: &mut Driver<'_>, slave: u8, ppo: PpoType) -> Result<Seen, Error> {
+/// Reads the process words of a slave, and some of what is shown of its parameters.
+fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Result<Seen, Error> {
+    let ppo = driver.join(slave)?;
     let words = [ReplyWord::Status, ReplyWord::Actual].map(Cell::Word);
     let words = find(driver, slave, &words)?;
     let mut parameters = Vec::new();
     if ppo.has_pkw() {
-        for (name, text) in SHOWN {
+        for (name, text) in SHOWN.into_iter().filter(|(name, _)| wanted(name)) {
             let Ok(own) = parameter(text) else {
                 continue;
             };
@@ -114,10 +119,7 @@ pub(super) fn info(
         let mut all = Vec::new();
         let mut exit = Exit::Passed;
         for slave in slaves {
-            let seen = driver
-                .join(slave)
-                .and_then(|ppo| look(&mut driver, slave, ppo));
-            match seen {
+            match look(&mut driver, slave, |_| true) {
                 Ok(seen) => all.push(seen),
                 Err(error @ Error::Link(_)) => return Err(error.into()),
                 Err(error) => exit = exit.max(Failure::from(error).tell(output)),
@@ -134,30 +136,25 @@ pub(super) fn info(
     })
 }
 
-/// Shows all slaves, a row each; with `--once` one page, and without it again and again until the program is interrupted.
+/// Shows all slaves, a row each.
 pub(super) fn top(
     bench: PortBench<'_, Inverters>,
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    top_line::check(arguments, output)?;
+    check_top(arguments, output)?;
     let as_what = Use::look("top");
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let slaves = select(&[Axes::All], session)?;
-        let title = format!("{}: inverters on PROFIBUS", session.rig().id());
         let mut reader = Reader::default();
         let view = LineTop {
-            title,
-            heading: HEADING,
-            carried: ["telegrams", "telegrams/s"],
+            what: "inverters on PROFIBUS",
+            form: &FORM,
+            traffic: &["from", "telegrams", "telegrams/s", "damaged"],
             picture: live::picture_of_port(&slaves),
-            read: &mut |session| {
-                let mut driver = driver(session);
-                let row = |slave: &u8| {
-                    let ppo = driver.join(*slave)?;
-                    Ok(row(&look(&mut driver, *slave, ppo)?))
-                };
-                slaves.iter().map(row).collect()
+            read: &mut |session, slave| {
+                let shown = |name: &str| FORM.columns.iter().any(|own| own.head == name);
+                Ok(row(&look(&mut driver(session), slave, shown)?))
             },
             rows: &mut |heard| {
                 let run = |piece| match piece {
@@ -173,30 +170,58 @@ pub(super) fn top(
     })
 }
 
-/// The heads of the columns of `top`.
-const HEADING: [&str; 7] = [
-    "slave",
-    "PPO",
-    "fault",
-    "frequency",
-    "HIW",
-    "heat sink",
-    "status",
-];
+/// The table of `top`. The states are those of NORDAC 3.3.
+static FORM: TopForm = TopForm {
+    drive: "slave",
+    columns: &[
+        TopColumn::words("slave", 5),
+        TopColumn::words("PPO", 4),
+        TopColumn::words("fault", 5),
+        TopColumn::words("frequency", 9),
+        TopColumn::words("HIW", 7),
+        TopColumn::words("heat sink", 9),
+        TopColumn::words("status", 0),
+    ],
+    give_way: &[1, 5, 4, 3],
+    states: &[
+        "not read",
+        "no state of the manual",
+        "fault",
+        "fault reaction active",
+        "quick stop active",
+        "not ready to start",
+        "start-disable",
+        "ready to start",
+        "ready for operation",
+        "operation enabled",
+    ],
+};
 
-/// A row a slave.
-fn row(seen: &Seen) -> [String; HEADING.len()] {
+fn row(seen: &Seen) -> TopRow {
     let mut words = seen.words.iter().map(Found::words);
     let (status, actual) = (words.next(), words.next());
-    [
-        seen.slave.to_string(),
-        seen.ppo.to_string(),
-        seen.of("fault"),
-        seen.of("frequency"),
-        actual.unwrap_or_default(),
-        seen.of("heat sink"),
-        status.unwrap_or_default(),
-    ]
+    let mut numbers = seen.words.iter().map(|own| own.number as u16);
+    let (zsw, hiw) = (numbers.next().unwrap_or(0), numbers.next());
+    let state = State::of_zsw(zsw);
+    let fault = seen.parameters.iter().find(|(name, _)| *name == "fault");
+    let in_error = matches!(state, Some(State::Fault | State::FaultReaction));
+    TopRow {
+        state: FORM.state(state.map_or("no state of the manual", State::name)),
+        in_error,
+        speed: hiw.map(|own| f64::from(own.cast_signed())),
+        error: fault
+            .and_then(|(_, own)| u32::try_from(own.number).ok())
+            .filter(|_| in_error),
+        cells: vec![
+            seen.slave.to_string(),
+            seen.ppo.to_string(),
+            seen.of("fault"),
+            seen.of("frequency"),
+            actual.unwrap_or_default(),
+            seen.of("heat sink"),
+            status.unwrap_or_default(),
+        ],
+    }
 }
 
 fn text(all: &[Seen]) -> String {

@@ -90,23 +90,23 @@ fn object(found: &CellFound<'_>) -> serde_json::Value {
 }
 
 /// A table with a heading; each column is as wide as what stands in it.
-pub(crate) fn columns<const N: usize>(heading: &[&str; N], rows: &[[String; N]]) -> String {
-    let width = |column: usize| {
-        let of_rows = rows.iter().map(|row| row[column].chars().count());
-        of_rows.chain([heading[column].len()]).max().unwrap_or(0)
-    };
-    let widths: [usize; N] = std::array::from_fn(width);
-    let line = |cells: [&str; N]| {
+pub(crate) fn columns(heading: &[&str], rows: &[impl AsRef<[String]>]) -> String {
+    let mut widths: Vec<_> = heading.iter().map(|own| own.len()).collect();
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row.as_ref()) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
         let padded: Vec<_> = cells
-            .iter()
-            .zip(widths)
+            .zip(&widths)
             .map(|(cell, width)| format!("{cell:width$}"))
             .collect();
         format!("{}\n", padded.join("  ").trim_end())
     };
-    let mut text = line(*heading);
+    let mut text = line(&mut heading.iter().copied());
     for row in rows {
-        text.push_str(&line(std::array::from_fn(|column| row[column].as_str())));
+        text.push_str(&line(&mut row.as_ref().iter().map(String::as_str)));
     }
     text
 }

@@ -8,10 +8,13 @@ use crate::buses::unitek::value::hex;
 use crate::capture::Piece;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
+use crate::cli::line_top::LineTop;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::top_line::{self, LineTop};
+use crate::cli::top::check as check_top;
+use crate::top::{TopColumn, TopForm, TopRow};
 use harness_proto::unitek::Register;
+use harness_proto::unitek::words::{ERRORS_NOT_READY, MODE_LOCK};
 use serde_json::{Map, Value, json};
 
 /// What is shown of a drive: the heading, and the register.
@@ -29,10 +32,32 @@ const SHOWN: [(&str, u8); 11] = [
     ("bus voltage", 0xEB),
 ];
 
-/// The heads of the columns of `top`.
-const HEADING: [&str; 8] = [
-    "drive", "ready", "enable", "mode", "speed", "position", "status", "errors",
-];
+/// The registers of `top`, in the order of its columns behind the drive's number.
+const OF_TOP: [u8; 7] = [0xE2, 0xE8, 0x51, 0x30, 0x6D, 0x40, 0x8F];
+
+/// The table of `top`.
+static FORM: TopForm = TopForm {
+    drive: "drive",
+    columns: &[
+        TopColumn::words("drive", 5),
+        TopColumn::words("ready", 5),
+        TopColumn::words("enable", 6),
+        TopColumn::words("mode", 8),
+        TopColumn::words("speed", 15),
+        TopColumn::words("position", 11),
+        TopColumn::words("status", 7),
+        TopColumn::words("errors", 0),
+    ],
+    give_way: &[5, 2, 1, 3],
+    states: &[
+        "not read",
+        "error",
+        "not ready",
+        "locked",
+        "not enabled",
+        "released",
+    ],
+};
 
 /// Lists drives.
 pub(super) fn info(
@@ -63,25 +88,24 @@ pub(super) fn info(
     )
 }
 
-/// Shows all drives, a row each; with `--once` one page, and without it again and again until the program is interrupted.
+/// Shows all drives, a row each.
 pub(super) fn top(
     bench: PortBench<'_, UnitekDrives>,
     arguments: &TopArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    top_line::check(arguments, output)?;
+    check_top(arguments, output)?;
     let look = Use::look("top");
     on(bench, &arguments.rig, look, output, |session, output| {
-        let registers = SHOWN.map(|(_, register)| Register::of(register));
-        let title = format!("{}: drives on CAN", session.rig().id());
+        let registers = OF_TOP.map(Register::of);
         let drives = session.axes().to_vec();
         let names = drives.iter().map(|own| format!("drive {}", own.node));
         let view = LineTop {
-            title,
-            heading: HEADING,
-            carried: ["frames", "frames/s"],
+            what: "drives on CAN",
+            form: &FORM,
+            traffic: &["from", "frames", "frames/s", "damaged"],
             picture: live::picture("bench", names),
-            read: &mut |session| Ok(rows(&find(session, &drives, &registers)?)),
+            read: &mut |session, drive| Ok(row(&find(session, &[drive], &registers)?)),
             rows: &mut |heard| {
                 let row = |piece: &Piece| match piece {
                     Piece::Frame(own) => Some(live::at_port(own, &drives)),
@@ -94,26 +118,35 @@ pub(super) fn top(
     })
 }
 
-/// A row a drive.
-fn rows(found: &[Found]) -> Vec<[String; HEADING.len()]> {
-    let row = |drive: &[Found]| {
-        let of = |register: u8| {
-            let found = drive.iter().find(|found| found.reply.register == register);
-            found.map_or_else(String::new, words)
-        };
-        let node = drive.first().map_or(0, |found| found.axis.node);
-        [
-            node.to_string(),
-            of(0xE2),
-            of(0xE8),
-            of(0x51),
-            of(0x30),
-            of(0x6D),
-            of(0x40),
-            of(0x8F),
-        ]
+/// The row of a drive of which the registers of `top` were read.
+fn row(found: &[Found]) -> TopRow {
+    let raw = |register: u8| {
+        let own = found.iter().find(|own| own.reply.register == register);
+        own.map_or(0, |own| own.reply.data.bits())
     };
-    found.chunks_exact(SHOWN.len()).map(row).collect()
+    let errors = raw(0x8F) & ERRORS_NOT_READY;
+    let state = if errors != 0 {
+        "error"
+    } else if raw(0xE2) & 1 == 0 {
+        "not ready"
+    } else if raw(0x51) & u32::from(MODE_LOCK) != 0 {
+        "locked"
+    } else if raw(0xE8) & 1 == 0 {
+        "not enabled"
+    } else {
+        "released"
+    };
+    let node = found.first().map_or(0, |found| found.axis.node);
+    let speed = found.iter().find(|own| own.reply.register == 0x30);
+    TopRow {
+        state: FORM.state(state),
+        in_error: errors != 0,
+        speed: speed.map(|own| own.reply.number() as f64),
+        error: Some(errors).filter(|errors| *errors != 0),
+        cells: std::iter::once(node.to_string())
+            .chain(found.iter().map(words))
+            .collect(),
+    }
 }
 
 /// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.

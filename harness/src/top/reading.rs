@@ -1,0 +1,159 @@
+//! What is read of a bench, and how its bus wants it to be shown.
+
+use harness_proto::time::Span;
+use std::collections::BTreeMap;
+
+/// Maximum number of kinds of events listed; further kinds are only counted.
+const MOST_KINDS: usize = 64;
+
+/// How drives of a bus are shown.
+#[derive(Debug, PartialEq, Eq)]
+pub struct TopForm {
+    /// What a drive is called, in the singular.
+    pub drive: &'static str,
+    /// The columns of the table. The first has the name of the drive, and the last takes the width that is left.
+    pub columns: &'static [TopColumn],
+    /// The columns that give way in a narrow terminal, by their places, in this order.
+    pub give_way: &'static [usize],
+    /// The states that a drive can be in, the most serious one first.
+    pub states: &'static [&'static str],
+}
+
+/// A column of the table.
+#[derive(Debug, PartialEq, Eq)]
+pub struct TopColumn {
+    /// Its heading, with the unit.
+    pub head: &'static str,
+    /// Its least width, in characters.
+    pub width: usize,
+    /// Whether it has words, which begin at its left end, and no numbers.
+    pub has_words: bool,
+}
+
+/// The heading of the page, which does not change.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Heading {
+    /// The bench's name.
+    pub rig: String,
+    /// How its drives are shown.
+    pub form: &'static TopForm,
+    /// What each of its rings or ports is: `ring 1: 3 drives, serial /dev/ttyUSB0, 38400 8O1`.
+    pub parts: Vec<String>,
+}
+
+/// A line above the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HeadLine {
+    /// What it says.
+    pub text: String,
+    /// Whether it tells of an error.
+    pub is_error: bool,
+}
+
+/// What a drive showed last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopRow {
+    /// Its state, by the place in [`TopForm::states`].
+    pub state: usize,
+    /// Whether it is in error.
+    pub in_error: bool,
+    /// Its actual speed, in a unit that all drives of the bench share.
+    pub speed: Option<f64>,
+    /// The code of its error, if it shows one.
+    pub error: Option<u32>,
+    /// What stands in the columns.
+    pub cells: Vec<String>,
+}
+
+/// Something that happened on the bench.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TopEvent {
+    /// What.
+    pub what: String,
+    /// How often.
+    pub count: u64,
+    /// When last.
+    pub last: Span,
+}
+
+/// Everything that was read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// How long the view has been on.
+    pub at: Span,
+    /// What was read of each part of the heading. Lines of a part that the heading does not have stand at the end.
+    pub parts: Vec<Vec<HeadLine>>,
+    /// The drives that have been read, by their places on the bench.
+    pub drives: BTreeMap<usize, TopRow>,
+    /// What happened, in the order of its first time.
+    pub events: Vec<TopEvent>,
+    /// Events of kinds for which there was no more room.
+    pub others: u64,
+}
+
+impl TopForm {
+    /// The headings of the columns.
+    #[must_use]
+    pub fn heads(&self) -> Vec<&'static str> {
+        self.columns.iter().map(|own| own.head).collect()
+    }
+
+    /// The place of a state; the most serious one for a state that is not in the list.
+    #[must_use]
+    pub fn state(&self, name: &str) -> usize {
+        let place = self.states.iter().position(|own| *own == name);
+        place.unwrap_or(0)
+    }
+}
+
+impl TopColumn {
+    /// A column of words.
+    #[must_use]
+    pub const fn words(head: &'static str, width: usize) -> Self {
+        Self {
+            head,
+            width,
+            has_words: true,
+        }
+    }
+
+    /// A column of numbers.
+    #[must_use]
+    pub const fn numbers(head: &'static str, width: usize) -> Self {
+        Self {
+            head,
+            width,
+            has_words: false,
+        }
+    }
+}
+
+impl HeadLine {
+    /// A line that tells of no error.
+    #[must_use]
+    pub const fn plain(text: String) -> Self {
+        Self {
+            text,
+            is_error: false,
+        }
+    }
+}
+
+impl Snapshot {
+    /// Notes what happened at [`Self::at`].
+    pub fn happened(&mut self, what: String) {
+        let last = self.at;
+        if let Some(known) = self.events.iter_mut().find(|known| known.what == what) {
+            known.count += 1;
+            known.last = last;
+        } else if self.events.len() < MOST_KINDS {
+            self.events.push(TopEvent {
+                what,
+                count: 1,
+                last,
+            });
+        } else {
+            self.others += 1;
+        }
+    }
+}
