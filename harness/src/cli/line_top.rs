@@ -27,6 +27,8 @@ pub(crate) struct LineTop<'v, D: HeldDrives> {
     pub(crate) picture: LivePicture,
     /// Reads a drive.
     pub(crate) read: &'v mut DriveReader<'v, D>,
+    /// Stops a drive without waiting until it stands; returns what was done.
+    pub(crate) stop: &'v mut DriveStopper<'v, D>,
     /// The rows of the picture for what was heard.
     pub(crate) rows: &'v mut dyn FnMut(Vec<Piece>) -> Vec<LiveRow>,
 }
@@ -34,6 +36,10 @@ pub(crate) struct LineTop<'v, D: HeldDrives> {
 /// Reads the row of a drive.
 type DriveReader<'v, D> =
     dyn FnMut(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<TopRow, Failure> + 'v;
+
+/// Stops a drive.
+type DriveStopper<'v, D> =
+    dyn FnMut(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<String, Failure> + 'v;
 
 impl<'v, D: HeldDrives> LineTop<'v, D> {
     /// Shows drives: with `--once` one page, and without it live.
@@ -123,13 +129,22 @@ impl<D: HeldDrives> TopReader for LineReader<'_, D> {
         let row = match (self.view.read)(self.session, *drive) {
             // The others are still shown.
             Err(Failure::Bus(Exit::Failed, why)) if !self.arguments.once => {
-                into.happened(why.clone());
+                into.disturbed(why.clone());
                 self.not_read(*drive, why)
             }
             other => other?,
         };
         into.drives.insert(first, row);
         Ok(1)
+    }
+
+    fn stop(&mut self, drive: usize) -> Result<String, Failure> {
+        (self.view.stop)(self.session, self.drives[drive])
+    }
+
+    fn named(&self, drives: &[usize]) -> String {
+        let drives: Vec<_> = drives.iter().map(|own| self.drives[*own]).collect();
+        D::named(&drives)
     }
 
     fn look(&mut self, into: &mut Snapshot) {

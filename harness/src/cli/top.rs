@@ -8,18 +8,19 @@ use super::failure::{Failure, exit_of_trouble};
 use super::output::Output;
 use super::top_page::TopPage;
 use crate::buses::commands::TopArguments;
+use crate::counted::counted;
 use crate::signals::{interrupt, interrupt_flag};
 use crate::top::screen::{ScreenInput, leave};
 use crate::top::{Heading, Press, Screen, Snapshot, Top};
 use crate::trouble::Trouble;
 use crate::web::{LiveNews, LivePicture};
 use harness_proto::time::{Instant, Span};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{
-    Receiver, RecvTimeoutError, SyncSender, TryRecvError, channel, sync_channel,
+    Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, channel, sync_channel,
 };
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Moment};
@@ -31,6 +32,8 @@ const MARKS: usize = 256;
 /// The longest step of the bus at a time, and how long a key may wait.
 const STEP: Span = Span::from_millis(50);
 const KEYS: Duration = Duration::from_millis(50);
+/// Maximum number of stopped drives that are named.
+const MOST_NAMED: usize = 4;
 /// As long as a bus needs to notice that it was interrupted.
 const NOTICE: Span = Span::from_millis(1);
 
@@ -56,6 +59,15 @@ pub(crate) trait TopReader {
     /// # Errors
     /// [`Failure`]: the drives cannot be read.
     fn read(&mut self, first: usize, into: &mut Snapshot) -> Result<usize, Failure>;
+
+    /// Stops a drive without waiting until it stands; returns what was done.
+    ///
+    /// # Errors
+    /// [`Failure`]: the drive did not take it, or the bench does not permit it.
+    fn stop(&mut self, drive: usize) -> Result<String, Failure>;
+
+    /// Drives in a sentence: `drives 1, 2`.
+    fn named(&self, drives: &[usize]) -> String;
 
     /// Looks at what the bus has carried and what happened there since the last call.
     fn look(&mut self, into: &mut Snapshot);
@@ -135,6 +147,8 @@ pub(super) enum Asked {
     Quit,
     /// The end, as by a signal.
     Interrupt,
+    /// That a drive is stopped, or all of them.
+    Stop(Option<usize>),
     /// The end, as the terminal is broken.
     Broken(std::io::Error),
 }
@@ -189,6 +203,34 @@ impl<'r> Work<'r> {
         self.reader.look(&mut self.reading);
     }
 
+    /// Stops a drive, or all of them. One that fails does not keep the others from it.
+    fn stop(&mut self, wanted: Option<usize>) -> Result<(), Failure> {
+        let drives = match wanted {
+            Some(drive) => drive..drive + 1,
+            None => 0..self.reader.drives(),
+        };
+        let mut done: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for drive in drives {
+            match self.reader.stop(drive) {
+                Ok(what) => done.entry(what).or_default().push(drive),
+                Err(
+                    Failure::Said(Exit::Usage, why) | Failure::Bus(Exit::Usage | Exit::Failed, why),
+                ) => self.reading.disturbed(why),
+                Err(other) => return Err(other),
+            }
+        }
+        self.reading.at = self.reader.now().since(self.start);
+        for (what, drives) in done {
+            let shown = self.reader.named(&drives[..drives.len().min(MOST_NAMED)]);
+            let others = match drives.len().saturating_sub(MOST_NAMED) {
+                0 => String::new(),
+                others => format!(" and {}", counted(others, "other")),
+            };
+            self.reading.done(format!("{shown}{others}: {what}"));
+        }
+        Ok(())
+    }
+
     /// Reads the drives repeatedly and runs the bus until the view is closed.
     fn pump(
         &mut self,
@@ -218,6 +260,11 @@ impl<'r> Work<'r> {
                 None => {}
                 Some(Asked::Quit) => return Ok(Exit::Passed),
                 Some(Asked::Interrupt) => interrupt()?,
+                Some(Asked::Stop(wanted)) => {
+                    self.stop(wanted)?;
+                    // What came of it is read at once.
+                    next = self.reader.now();
+                }
                 Some(Asked::Broken(error)) => {
                     // Nobody sees the drives any more: the end is that of a signal.
                     interrupt()?;
@@ -282,7 +329,7 @@ impl Desk {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
-            let end = desk(screen, Top::new(heading), &readings, &stopped);
+            let end = desk(screen, Top::new(heading), &readings, &stopped, &why);
             // The receiver is gone if the bus has ended by itself.
             let _ended = why.send(end);
         });
@@ -343,6 +390,7 @@ fn desk(
     mut top: Top,
     readings: &Receiver<Snapshot>,
     stop: &AtomicBool,
+    orders: &Sender<Asked>,
 ) -> Asked {
     let mut stale = true;
     loop {
@@ -367,10 +415,158 @@ fn desk(
                 Press::Stay => true,
                 Press::Quit => return Asked::Quit,
                 Press::Interrupt => return Asked::Interrupt,
+                Press::Stop(wanted) => {
+                    // The receiver is gone if the bus has ended by itself.
+                    let _ended = orders.send(Asked::Stop(wanted));
+                    true
+                }
             },
             Ok(ScreenInput::Redraw) => true,
             Ok(ScreenInput::Nothing) => false,
             Err(error) => return Asked::Broken(error),
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::top::TopRow;
+
+    /// Six drives of which the second one refuses to stop, and the third one breaks the link where it `breaks`.
+    struct Bench {
+        now: Instant,
+        breaks: bool,
+        stopped: Vec<usize>,
+        /// How often drives were read.
+        read: usize,
+    }
+
+    impl TopReader for Bench {
+        fn drives(&self) -> usize {
+            6
+        }
+
+        fn is_simulated(&self) -> bool {
+            false
+        }
+
+        fn now(&self) -> Instant {
+            self.now
+        }
+
+        fn run(&mut self, time: Span) -> Result<(), Failure> {
+            self.now += time;
+            Ok(())
+        }
+
+        fn read(&mut self, first: usize, into: &mut Snapshot) -> Result<usize, Failure> {
+            let row = TopRow {
+                state: usize::from(self.stopped.contains(&first)),
+                in_error: false,
+                speed: None,
+                error: None,
+                cells: vec![first.to_string()],
+            };
+            into.drives.insert(first, row);
+            self.read += 1;
+            Ok(1)
+        }
+
+        fn stop(&mut self, drive: usize) -> Result<String, Failure> {
+            match drive {
+                1 => return Err(Failure::refused("drive 1 may not be stopped")),
+                2 if self.breaks => {
+                    return Err(Failure::Bus(Exit::RigError, "the port is gone".to_owned()));
+                }
+                _ => self.stopped.push(drive),
+            }
+            Ok("stopped".to_owned())
+        }
+
+        fn named(&self, drives: &[usize]) -> String {
+            format!("{drives:?}")
+        }
+
+        fn look(&mut self, _into: &mut Snapshot) {}
+
+        fn record(&mut self, _on: bool) {}
+
+        fn heard(&mut self) -> LiveNews {
+            LiveNews::default()
+        }
+    }
+
+    /// A view whose user orders this, one after the other, each when all drives have been shown.
+    struct Orders(Vec<Asked>, Snapshot);
+
+    impl TopView for Orders {
+        fn is_wanted(&mut self, _reader: &mut dyn TopReader) -> bool {
+            true
+        }
+
+        fn show(&mut self, _reader: &mut dyn TopReader, reading: &Snapshot) {
+            self.1 = reading.clone();
+        }
+
+        fn wait(&mut self, _time: Duration) -> Option<Asked> {
+            match self.1.drives.len() {
+                6 if !self.0.is_empty() => Some(self.0.remove(0)),
+                _ => None,
+            }
+        }
+    }
+
+    fn pumped(bench: &mut Bench, orders: Vec<Asked>) -> (Result<Exit, Failure>, Snapshot) {
+        let mut view = Orders(orders, Snapshot::default());
+        let every = Span::from_millis(1_000);
+        let end = Work::new(bench).pump(every, &AtomicBool::new(false), &mut view);
+        (end, view.1)
+    }
+
+    fn bench(breaks: bool) -> Bench {
+        Bench {
+            now: Instant::START,
+            breaks,
+            stopped: Vec::new(),
+            read: 0,
+        }
+    }
+
+    /// A refusal is shown, and keeps no other drive from its stop; what came of it is read at once.
+    #[test]
+    fn all_drives_are_stopped_but_one_that_refuses() {
+        let mut own = bench(false);
+        let orders = vec![
+            Asked::Stop(None),
+            Asked::Stop(Some(2)),
+            Asked::Stop(Some(1)),
+            Asked::Quit,
+        ];
+        let (end, shown) = pumped(&mut own, orders);
+        assert!(matches!(end, Ok(Exit::Passed)), "{end:?}");
+        assert_eq!(own.stopped, [0, 2, 3, 4, 5, 2]);
+        let events: Vec<_> = shown
+            .events
+            .iter()
+            .map(|own| (own.what.as_str(), own.is_error, own.count))
+            .collect();
+        let expected = [
+            ("drive 1 may not be stopped", true, 2),
+            ("[0, 2, 3, 4] and 1 other: stopped", false, 1),
+            ("[2]: stopped", false, 1),
+        ];
+        assert_eq!(events, expected);
+        // Six drives at first; a second has not passed since.
+        assert!(own.read > 6 && own.now < Instant::START + Span::from_millis(1_000));
+    }
+
+    #[test]
+    fn a_lost_link_ends_the_view() {
+        let (end, _) = pumped(&mut bench(true), vec![Asked::Stop(None)]);
+        assert!(
+            matches!(end, Err(Failure::Bus(Exit::RigError, _))),
+            "{end:?}"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::Top;
 use super::state::KeyTarget;
 
-/// The longest text to filter by, in characters.
+/// The longest text that is typed, in characters.
 const MOST: usize = 60;
 
 /// A key, whatever terminal it comes from.
@@ -33,7 +33,7 @@ pub enum Key {
     End,
 }
 
-/// What becomes of the view.
+/// What becomes of the view, and what the user orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Press {
     /// It goes on.
@@ -42,14 +42,20 @@ pub enum Press {
     Quit,
     /// It was interrupted, as by a signal.
     Interrupt,
+    /// It goes on, and a drive is to be stopped, by its place on the bench; or all of them.
+    Stop(Option<usize>),
 }
 
 /// The keys and what they do, as the help shows them.
-pub const HELP: [(&str, &str); 9] = [
+pub const HELP: [(&str, &str); 10] = [
     ("q, Esc", "quit; the drives stay as they are"),
     (
         "Ctrl-C",
         "quit as by a signal: a bench with ports goes to its safe state",
+    ),
+    (
+        "x",
+        "stop a drive: its name and Enter; Enter alone stops all",
     ),
     (
         "/",
@@ -74,6 +80,7 @@ impl Top {
                 self.type_filter(key);
                 Press::Stay
             }
+            KeyTarget::Stop => self.type_drive(key),
             KeyTarget::Help => {
                 self.entry = KeyTarget::None;
                 Press::Stay
@@ -84,24 +91,54 @@ impl Top {
 
     fn type_filter(&mut self, key: Key) {
         match key {
-            Key::Char(c) if !c.is_control() && self.filter.chars().count() < MOST => {
-                self.filter.push(c);
-            }
-            Key::Backspace => {
-                self.filter.pop();
-            }
             Key::Enter => self.entry = KeyTarget::None,
             Key::Escape => {
                 self.filter.clear();
                 self.entry = KeyTarget::None;
             }
-            _ => self.scroll(key),
+            key => {
+                type_into(&mut self.filter, key);
+                self.scroll(key);
+            }
         }
+    }
+
+    fn type_drive(&mut self, key: Key) -> Press {
+        match key {
+            Key::Enter => {
+                if let Some(order) = self.stop_order() {
+                    self.entry = KeyTarget::None;
+                    // The page goes on, so that it shows what comes of the order.
+                    self.resume();
+                    return order;
+                }
+            }
+            Key::Escape => self.entry = KeyTarget::None,
+            key => {
+                type_into(&mut self.to_stop, key);
+                self.scroll(key);
+            }
+        }
+        Press::Stay
+    }
+
+    /// What Enter orders: all drives where no name has been typed. `None` while no drive has that name.
+    pub(crate) fn stop_order(&self) -> Option<Press> {
+        if self.to_stop.is_empty() {
+            return Some(Press::Stop(None));
+        }
+        let mut drives = self.reading.drives.iter();
+        let named = drives.find(|(_, row)| row.cells.first() == Some(&self.to_stop));
+        named.map(|(place, _)| Press::Stop(Some(*place)))
     }
 
     fn command(&mut self, key: Key) -> Press {
         match key {
             Key::Char('q') | Key::Escape => return Press::Quit,
+            Key::Char('x') => {
+                self.to_stop.clear();
+                self.entry = KeyTarget::Stop;
+            }
             Key::Char('/') => self.entry = KeyTarget::Filter,
             Key::Char('?' | 'h') => self.entry = KeyTarget::Help,
             Key::Char('e') => self.only_errors = !self.only_errors,
@@ -127,5 +164,16 @@ impl Top {
             _ => return,
         };
         self.keep_in_sight();
+    }
+}
+
+/// Adds a character to a text, or takes the last one away.
+fn type_into(text: &mut String, key: Key) {
+    match key {
+        Key::Char(c) if !c.is_control() && text.chars().count() < MOST => text.push(c),
+        Key::Backspace => {
+            text.pop();
+        }
+        _ => {}
     }
 }

@@ -70,6 +70,8 @@ pub struct TopRow {
 pub struct TopEvent {
     /// What.
     pub what: String,
+    /// Whether it is an error.
+    pub is_error: bool,
     /// How often.
     pub count: u64,
     /// When last.
@@ -140,8 +142,17 @@ impl HeadLine {
 }
 
 impl Snapshot {
-    /// Notes what happened at [`Self::at`].
-    pub fn happened(&mut self, what: String) {
+    /// Notes at [`Self::at`] that something was disturbed, or came to nothing.
+    pub fn disturbed(&mut self, what: String) {
+        self.happened(what, true);
+    }
+
+    /// Notes at [`Self::at`] that something was done.
+    pub fn done(&mut self, what: String) {
+        self.happened(what, false);
+    }
+
+    fn happened(&mut self, what: String, is_error: bool) {
         let last = self.at;
         if let Some(known) = self.events.iter_mut().find(|known| known.what == what) {
             known.count += 1;
@@ -149,6 +160,7 @@ impl Snapshot {
         } else if self.events.len() < MOST_KINDS {
             self.events.push(TopEvent {
                 what,
+                is_error,
                 count: 1,
                 last,
             });

@@ -47,6 +47,8 @@ pub(crate) enum KeyTarget {
     None,
     /// The text to filter by.
     Filter,
+    /// The name of a drive that is to be stopped.
+    Stop,
     /// The help is shown.
     Help,
 }
@@ -61,6 +63,7 @@ pub struct Top {
     /// Events up to this time are not shown.
     forgotten: Option<Span>,
     pub(crate) filter: String,
+    pub(crate) to_stop: String,
     pub(crate) only_errors: bool,
     pub(crate) sort: Sort,
     pub(crate) entry: KeyTarget,
@@ -80,6 +83,7 @@ impl Top {
             paused: None,
             forgotten: None,
             filter: String::new(),
+            to_stop: String::new(),
             only_errors: false,
             sort: Sort::default(),
             entry: KeyTarget::default(),
@@ -110,9 +114,15 @@ impl Top {
     }
 
     pub(crate) fn pause(&mut self) {
-        match self.paused.take() {
-            Some(later) => self.reading = later,
-            None => self.paused = Some(self.reading.clone()),
+        match self.is_paused() {
+            true => self.resume(),
+            false => self.paused = Some(self.reading.clone()),
+        }
+    }
+
+    pub(crate) fn resume(&mut self) {
+        if let Some(later) = self.paused.take() {
+            self.reading = later;
         }
         self.keep_in_sight();
     }

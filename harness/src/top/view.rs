@@ -1,6 +1,6 @@
 //! The page: a pure function of the view's state and of the size of the terminal.
 
-use super::keys::HELP;
+use super::keys::{HELP, Press};
 use super::reading::{HeadLine, TopForm, TopRow};
 use super::state::{KeyTarget, Top};
 use crate::counted::counted;
@@ -20,7 +20,7 @@ const LINES_EACH: usize = 5;
 const LEAST_ROWS: usize = 4;
 
 /// The keys in the last line, and what stands there where they have no room.
-const KEYS: &str = "  q quit  / filter  e errors  s sort  p pause  ? help";
+const KEYS: &str = "  q quit  x stop  / filter  s sort  p pause  ? help";
 const FEW_KEYS: &str = "  q quit  ? help";
 
 /// What a line looks like.
@@ -252,16 +252,21 @@ fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
             };
             let text = format!("{}{times} at {}", one.what, clock(one.last));
             // How often comes first where not all of it can be read.
-            let text = match text.chars().count() <= width {
-                true => text,
-                false => format!("{} times: {}", one.count, one.what),
+            let text = match one.count {
+                2.. if text.chars().count() > width => format!("{} times: {}", one.count, one.what),
+                _ => text,
             };
-            (text, Look::Error)
+            let look = if one.is_error {
+                Look::Error
+            } else {
+                Look::Plain
+            };
+            (text, look)
         })
         .collect();
     let hidden = all.iter().skip(room).map(|one| one.count).sum::<u64>() + top.reading.others;
     if hidden > 0 {
-        lines.push((format!("and {hidden} other disturbances"), Look::Error));
+        lines.push((format!("and {hidden} other messages"), Look::Error));
     }
     lines.push((status_line(top, width), Look::Reverse));
     lines
@@ -270,6 +275,15 @@ fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
 fn status_line(top: &Top, width: usize) -> String {
     if matches!(top.entry, KeyTarget::Filter) {
         return format!("filter: {}_  Enter keeps it, Esc takes it away", top.filter);
+    }
+    if matches!(top.entry, KeyTarget::Stop) {
+        let drive = top.heading.form.drive;
+        let enter = match top.stop_order() {
+            Some(Press::Stop(Some(_))) => format!("Enter stops this {drive}"),
+            Some(_) => format!("Enter stops all {drive}s"),
+            None => format!("no {drive} has this name"),
+        };
+        return format!("stop {drive}: {}_  {enter}, Esc goes back", top.to_stop);
     }
     let rows = top.rows().len();
     let last = (top.first + top.page).min(rows);

@@ -109,10 +109,10 @@ fn four() -> Snapshot {
         &mut reading,
         drive(0, 1, state(status::BLOCK, flags::BLOCK, 0, 0), 0.0),
     );
-    reading.happened("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
+    reading.disturbed("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
     reading.at = at(3_730);
-    reading.happened("answers come too late".to_owned());
-    reading.happened("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
+    reading.disturbed("answers come too late".to_owned());
+    reading.disturbed("the link from drive 2 to drive 1 is damaged (ND21 9.7)".to_owned());
     reading
 }
 
@@ -192,7 +192,7 @@ fn a_page_of_a_very_small_terminal() {
     let mut reading = four();
     for number in 0..6 {
         for _ in 0..=number {
-            reading.happened(format!("what was disturbed in way {number}"));
+            reading.disturbed(format!("what was disturbed in way {number}"));
         }
     }
     let mut top = of_four();
@@ -261,7 +261,7 @@ fn two_rings_of_which_little_is_known() {
         ..drive(1, 0, state(status::RESET, 0, 0, 0x0FFF), 0.0)
     };
     put(&mut reading, nothing);
-    reading.happened("ring 2: nothing comes back".to_owned());
+    reading.disturbed("ring 2: nothing comes back".to_owned());
     top.take(reading);
     kept("two-rings-80x24.txt", &drawn(&mut top, 80, 24));
 }
@@ -287,6 +287,34 @@ fn a_filter_is_typed_kept_and_taken_away() {
     (0..500).for_each(|_| press(&mut top, "x"));
     assert!(drawn(&mut top, 80, 24).contains(&"x".repeat(60)));
     assert!(!drawn(&mut top, 200, 24).contains(&"x".repeat(61)));
+}
+
+#[test]
+fn a_drive_is_stopped_by_its_name_and_all_by_none() {
+    let mut top = of_four();
+    press(&mut top, "px");
+    assert!(
+        drawn(&mut top, 80, 24).contains("stop drive: _  Enter stops all drives, Esc goes back")
+    );
+    // Letters are text here, and a name that no drive has orders nothing.
+    press(&mut top, "q7\n");
+    assert!(drawn(&mut top, 80, 24).contains("stop drive: q7_  no drive has this name"));
+    press(&mut top, "\u{8}\u{8}2");
+    assert!(drawn(&mut top, 80, 24).contains("stop drive: 2_  Enter stops this drive"));
+    assert!(top.is_paused());
+    assert_eq!(top.press(Key::Enter), Press::Stop(Some(2)));
+    assert!(!top.is_paused(), "it shows what comes of the order");
+    press(&mut top, "x3");
+    assert_eq!(top.press(Key::Escape), Press::Stay);
+    press(&mut top, "x");
+    assert_eq!(top.press(Key::Enter), Press::Stop(None));
+    // A drive that a filter hides is stopped too.
+    press(&mut top, "/TIME\nx0");
+    assert_eq!(top.press(Key::Enter), Press::Stop(Some(0)));
+    let mut reading = four();
+    reading.done("drive 0: software stop (ND21 12.6)".to_owned());
+    top.take(reading);
+    assert!(drawn(&mut top, 80, 24).contains("drive 0: software stop (ND21 12.6) at 01:02:10"));
 }
 
 #[test]
@@ -399,7 +427,7 @@ fn disturbances_are_counted_by_kind_and_can_be_forgotten() {
     assert!(!drawn(&mut top, 120, 40).contains("damaged"));
     let mut reading = four();
     reading.at = at(4_000);
-    reading.happened("answers come too late".to_owned());
+    reading.disturbed("answers come too late".to_owned());
     top.take(reading);
     let page = drawn(&mut top, 120, 40);
     assert!(
@@ -408,11 +436,11 @@ fn disturbances_are_counted_by_kind_and_can_be_forgotten() {
     );
     // Kinds without an end are only counted.
     let mut many = Snapshot::default();
-    (0..1_000).for_each(|n| many.happened(format!("kind {n}")));
+    (0..1_000).for_each(|n| many.disturbed(format!("kind {n}")));
     assert_eq!((many.events.len(), many.others), (64, 936));
     top.take(many);
     press(&mut top, "c");
-    assert!(drawn(&mut top, 80, 24).contains("and 936 other disturbances"));
+    assert!(drawn(&mut top, 80, 24).contains("and 936 other messages"));
 }
 
 #[test]

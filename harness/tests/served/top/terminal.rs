@@ -43,7 +43,7 @@ fn shows(seen: &Seen, drives: usize) -> bool {
 }
 
 #[track_caller]
-fn signal(tty: &Tty, signal: Signal) {
+pub(super) fn signal(tty: &Tty, signal: Signal) {
     let pid = Pid::from_child(&tty.child);
     kill_process(pid, signal).expect("a process");
 }
@@ -97,6 +97,10 @@ fn drives_are_shown_and_keys_obeyed() {
     // A lone escape is a key too, here one that takes the text away.
     tty.keys("/\x1b");
     tty.see("all drives", |seen| seen.has("1-3 of 3"));
+    tty.keys("x1\r");
+    tty.see("a stop", |seen| {
+        seen.has("2 go, 1 stop") && seen.has("drive 1: software stop (ND21 12.6) at 00:")
+    });
     tty.keys("?");
     tty.see("the help", |seen| seen.has("any key closes it"));
     tty.keys("x");

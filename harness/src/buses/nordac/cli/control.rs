@@ -323,6 +323,19 @@ fn refuse_motion(allowed: bool, command: &str, slaves: &[u8]) -> Result<(), Fail
     }
 }
 
+/// Sends OFF1 to a slave, without waiting until its motor stands (NORDAC 3.3).
+pub(super) fn send_off(session: &mut Session, slave: u8) -> Result<String, Failure> {
+    let words = [stw::READY, 0, 0, 0];
+    let mut driver = driver(session);
+    driver.join(slave)?;
+    refuse_denied(&driver, slave, words)?;
+    let _before_it_stands = driver.exchange(slave, words)?;
+    Ok(format!(
+        "STW {:04X}, OFF1: it stops on its ramp",
+        stw::READY
+    ))
+}
+
 /// Refuses words that the line denies, before the first is sent.
 fn refuse_denied(driver: &Driver<'_>, slave: u8, words: [u16; 4]) -> Result<(), Failure> {
     let mut image = Image::default();

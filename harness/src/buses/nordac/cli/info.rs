@@ -1,6 +1,7 @@
 //! `drivebench info` and `top` on NORDAC inverters: identity, state, fault, frequency, and what guards the motor.
 
 use super::bench::driver;
+use super::control::send_off;
 use super::read::{Found, find};
 use crate::buses::commands::{Axes, InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error};
@@ -156,6 +157,7 @@ pub(super) fn top(
                 let shown = |name: &str| FORM.columns.iter().any(|own| own.head == name);
                 Ok(row(&look(&mut driver(session), slave, shown)?))
             },
+            stop: &mut send_off,
             rows: &mut |heard| {
                 let run = |piece| match piece {
                     Piece::Telegram(from, octets) => Some(TelegramRun { from, octets }),

@@ -31,8 +31,8 @@ marked [hex] holds hexadecimal digits. A value without a meaning in the manual i
 whatever is shown. The values of a line are read one after another; its time is when the first one was asked for.";
 
 const TOP_KEYS: &str = "\
-Keys: q or Esc quit, / filter by text, e only drives in error, s sort, p pause, arrows and PgUp/PgDn scroll, ? help.
-The drives are only read. Ctrl-C, a signal or a lost port end in the safe state of the rig.";
+Keys: q or Esc quit, x stop a drive or all, / filter by text, e only drives in error, s sort, p pause, c clear messages,
+arrows and PgUp/PgDn scroll, ? help. Drives are only read, but for x. Ctrl-C, a signal or a lost port end in the safe state of the rig.";
 
 const SCOPE_JSON: &str = "\
 Only the high byte of a cell of two bytes is recorded (14.10.6.1); its value is shown with 00 as the low byte. Two signals are measured in turn (14.10.6.6).

@@ -1,6 +1,7 @@
 //! `drivebench top` on rings.
 
 use super::args::TopArguments;
+use super::axes;
 use super::rig::{self, OpenBench, RigName, Use};
 use super::top_page::HeardLinks;
 use crate::buses::novobus::driver::{Axis, State, Width};
@@ -188,11 +189,21 @@ impl TopReader for Reader<'_> {
         Ok(count)
     }
 
+    fn stop(&mut self, drive: usize) -> Result<String, Failure> {
+        self.bench.bus.stop(self.axes[drive])?;
+        Ok("software stop (ND21 12.6)".to_owned())
+    }
+
+    fn named(&self, drives: &[usize]) -> String {
+        let drives: Vec<_> = drives.iter().map(|own| self.axes[*own]).collect();
+        axes::named(&drives)
+    }
+
     fn look(&mut self, into: &mut Snapshot) {
         let bus = &self.bench.bus;
         for (ring, event) in bus.take_events() {
             if let Event::Disturbed { fault, .. } = event {
-                into.happened(match self.bench.rings() {
+                into.disturbed(match self.bench.rings() {
                     1 => fault.to_string(),
                     _ => format!("ring {}: {fault}", ring + 1),
                 });

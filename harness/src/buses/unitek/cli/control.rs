@@ -75,14 +75,17 @@ pub(super) fn stop(
     on(bench, &arguments.rig, as_what, output, |session, output| {
         let drives = select(&arguments.drives, session)?;
         each(session, &drives, output, |driver, axis| {
-            Ok(match driver.stop(axis)? {
-                Stopped::OnRamp => "its speed command is 0",
-                Stopped::Locked => {
-                    "it is locked and coasts: the rig's file permits no speed command"
-                }
-            })
+            driver.stop(axis).map(how)
         })
     })
+}
+
+/// How a drive was stopped.
+pub(super) const fn how(stopped: Stopped) -> &'static str {
+    match stopped {
+        Stopped::OnRamp => "its speed command is 0",
+        Stopped::Locked => "it is locked and coasts: the rig's file permits no speed command",
+    }
 }
 
 /// Locks drives: no torque.

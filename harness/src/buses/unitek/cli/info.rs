@@ -1,5 +1,6 @@
 //! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
 
+use super::control::how;
 use super::read::{Found, find};
 use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::unitek::live;
@@ -106,6 +107,7 @@ pub(super) fn top(
             traffic: &["from", "frames", "frames/s", "damaged"],
             picture: live::picture("bench", names),
             read: &mut |session, drive| Ok(row(&find(session, &[drive], &registers)?)),
+            stop: &mut |session, drive| Ok(how(session.driver().stop(drive)?).to_owned()),
             rows: &mut |heard| {
                 let row = |piece: &Piece| match piece {
                     Piece::Frame(own) => Some(live::at_port(own, &drives)),
