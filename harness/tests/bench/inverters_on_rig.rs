@@ -369,7 +369,11 @@ fn named(wrong: &str, section: &str, limits: &str) -> (Desk, String) {
 #[test]
 #[ignore = "takes a minute; .ci/nightly runs it"]
 fn what_changes_every_value_is_named() {
-    for wrong in ["answers-low-byte-first", "values-of-one-more"] {
+    for wrong in [
+        "answers-in-pwe1",
+        "answers-low-byte-first",
+        "values-of-one-more",
+    ] {
         named(wrong, "3.4.3", ALL);
     }
 }

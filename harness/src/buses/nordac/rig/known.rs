@@ -21,6 +21,8 @@ pub(super) struct Known {
     pub(super) slave: RigSlave,
     /// What the parameters read, by number and IND.
     pub(super) values: Values,
+    /// The whole PWE of each of these answers: a wrong slave may show a word in PWE1.
+    pub(super) shown: Values,
     /// How it behaves where the manual leaves that open, as far as a conversation has shown it.
     pub(super) properties: Properties,
     /// How it may behave as well, each with the words of the difference.
@@ -32,6 +34,7 @@ impl Known {
         Self {
             slave,
             values: BTreeMap::new(),
+            shown: BTreeMap::new(),
             properties: Properties::default(),
             open: candidates(Properties::default(), |_| true),
         }
@@ -70,8 +73,10 @@ impl Known {
         for parameter in all.filter(|own| !own.needs_posicon()) {
             for ind in indices(parameter) {
                 let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
-                if let Some(answer) = self.task(talk, task)? {
-                    self.values.insert((parameter.number, ind), answer);
+                let answer = self.answer(talk, task)?;
+                if let Some((answer, value)) = answer.and_then(|own| Some((own, value(own)?))) {
+                    self.values.insert((parameter.number, ind), value);
+                    self.shown.insert((parameter.number, ind), answer.pwe);
                 }
             }
         }
@@ -83,6 +88,11 @@ impl Known {
     /// # Errors
     /// The exchange fails.
     pub(super) fn task(&self, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<u32>, TalkError> {
+        Ok(self.answer(talk, task)?.and_then(value))
+    }
+
+    /// The answer to a task, whatever it says.
+    fn answer(&self, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<Pkw>, TalkError> {
         let (address, ppo) = (self.slave.address, self.ppo());
         let mut outputs = Image::default();
         // Another number or IND, or no task: a former answer is not taken for this one.
@@ -98,10 +108,7 @@ impl Known {
             if shown.ak() == 0 || (shown.number(), shown.ind) != (task.number(), task.ind) {
                 continue;
             }
-            return Ok(match shown.answer() {
-                Some(Answer::Error(_) | Answer::None) | None => None,
-                Some(answer) => Some(answer.pwe()),
-            });
+            return Ok(Some(shown));
         }
         Ok(None)
     }
@@ -113,6 +120,14 @@ impl Known {
         slave.properties = properties;
         slave.parameters.extend(stated(&self.values));
         slave
+    }
+}
+
+/// What an answer says that a parameter holds; `None` for a refusal.
+fn value(answer: Pkw) -> Option<u32> {
+    match answer.answer()? {
+        Answer::Error(_) | Answer::None => None,
+        own => Some(own.pwe()),
     }
 }
 

@@ -176,7 +176,7 @@ impl AttemptNote {
 
     /// What parameters of the slave at a place hold if it has a deviation that changes what they read; nothing where they hold what was read.
     ///
-    /// A guess is kept where it reads as the slave did: that the deviation exchanges something, adds something, or shows the other half.
+    /// A guess is kept where it reads as the slave did: that the deviation exchanges octets, adds something, or exchanges PWE1 and PWE2.
     pub(in crate::buses::nordac) fn behind(
         &self,
         place: usize,
@@ -192,7 +192,7 @@ impl AttemptNote {
             let mut talk = Talk::new(Box::new(&mut link), self.begun.patience);
             // What was read before an error counts.
             let _partly = again.read_all(&mut talk);
-            again.values
+            again.shown
         };
         let differing = |read: &Values, wanted: Values| -> Values {
             let differs = |(place, wanted): &(_, u32)| {
@@ -202,12 +202,12 @@ impl AttemptNote {
             wanted.into_iter().filter(differs).collect()
         };
         let first = reads(&Values::new());
-        let mut open = differing(&first, known.values.clone());
+        let mut open = differing(&first, known.shown.clone());
         let mut held = Values::new();
         for guess in [
             |_: u32, read: u32| read,
             |wanted: u32, read: u32| wanted.wrapping_add(wanted).wrapping_sub(read),
-            |wanted: u32, _: u32| wanted >> 16,
+            |wanted: u32, _: u32| wanted.rotate_right(16),
         ] {
             if open.is_empty() {
                 break;
