@@ -9,15 +9,23 @@ use std::process::Output;
 const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\nallow_motor_data = true\n\
                    allow_other_stations = true\nallow_unsupervised = true\n";
 
+/// One inverter.
+const ONE: &str = "drives = [{ address = 8, ppo = 1 }]\n";
+
 /// A rig with one simulated inverter, set up by lines.
 fn desk(setup: &str, limits: &str) -> Desk {
+    at_port(ONE, setup, limits)
+}
+
+/// A rig with simulated inverters at a port.
+fn at_port(port: &str, setup: &str, limits: &str) -> Desk {
     let setup: Vec<_> = setup
         .lines()
         .map(|line| format!("\"slave 8 {line}\""))
         .collect();
     let setup = setup.join(", ");
     Desk::of_file(&format!(
-        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"nordac\"\ndrives = [{{ address = 8, ppo = 1 }}]\n\
+        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"nordac\"\n{port}\
          [sim]\nbus = \"nordac\"\nsetup = [{setup}]\n[limits]\n{limits}"
     ))
 }
@@ -352,6 +360,22 @@ fn other_settings_of_the_bus_are_named() {
         assert!(about.contains(word), "{word}: {about}");
     }
     ended(&run(&desk("", ALL), &name), 0, "1 passed");
+}
+
+/// What an inverter without a parameter channel sends follows from parameters that are not known: a right one is not accused.
+#[test]
+fn an_inverter_that_cannot_be_read_is_not_accused() {
+    for ppo in [3, 4] {
+        let port = format!("drives = [{{ address = 8, ppo = {ppo} }}]\n");
+        let scenario = format!("nordac-3.1-ppo-{ppo}");
+        let output = run(&at_port(&port, "", ALL), &[&scenario]);
+        let why = "has no parameter channel: its parameters are not known";
+        assert!(said(&output).contains(why), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(5), "{}", said(&output));
+        let (output, _, deviations) = qualified(&at_port(&port, "", ALL));
+        assert_ne!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(deviations.starts_with("deviations: no"), "{deviations}");
+    }
 }
 
 /// Qualifies an inverter with a deviation: it is named, and no other one.

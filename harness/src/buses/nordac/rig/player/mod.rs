@@ -382,13 +382,14 @@ impl Player {
         let came = |came: Came| if exact { came } else { came.at_any_time() };
         for (known, seen) in all.iter_mut().zip(seen).filter(|_| settles) {
             let seen = came(seen);
-            let settled = settle::settle(|own| {
-                came(self.conversed(known, own, (&seen, exact))).agrees(&seen)
-            });
-            match settled {
-                Some(settled) => (known.properties, known.open) = settled,
+            let conversed = |own| came(self.conversed(known, own, (&seen, exact)));
+            // What a slave sends follows from parameters too, and without a parameter channel those are not known.
+            let is_read = known.ppo().has_pkw();
+            match is_read.then(|| settle::settle(|own| conversed(own).agrees(&seen))) {
+                None => {}
+                Some(Some(settled)) => (known.properties, known.open) = settled,
                 // Every value of every point stays open.
-                None => {
+                Some(None) => {
                     self.proven = exact && self.slaves.len() == 1;
                     self.unlike = Some(format!(
                         "slave {}: no right slave, whatever the manual leaves open, sends what it sent before the first scenario",
