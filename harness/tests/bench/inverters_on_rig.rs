@@ -378,6 +378,123 @@ fn an_inverter_that_cannot_be_read_is_not_accused() {
     }
 }
 
+/// Scenarios that need something of the rig's file.
+const NEEDY: [(&str, &str); 6] = [
+    ("second.scn", "slave 8 ppo 2\nstart 8 ppo 2\nexchange 8\n"),
+    ("enables.scn", "slave 8\nstart 8\nexchange 8 STW=047F\n"),
+    ("setpoint.scn", "slave 8\nstart 8\nexchange 8 HSW=20%\n"),
+    ("writes.scn", "slave 8\nstart 8\nwrite 8 1600 = 1\n"),
+    ("fast.scn", "rate 1500\nslave 8\nstart 8\n"),
+    ("two.scn", "slave 8\nslave 9\nstart 8\nstart 9\n"),
+];
+
+/// Plays some of them at a port, or built-in scenarios. Gives what is named that would let more be played.
+fn more_scenarios(port: &str, limits: &str, names: &[&str]) -> (Output, String) {
+    let desk = at_port(port, "", limits);
+    for (name, steps) in NEEDY {
+        let text = format!("title Needy\nsource nordac 3.1\nbus nordac\n{steps}");
+        with(&desk, name, &text);
+    }
+    let output = run(&desk, names);
+    let about = said(&output);
+    let mut lines = about.lines();
+    let more = lines.find_map(|own| own.strip_prefix("more scenarios with: "));
+    let more = more.unwrap_or_default().to_owned();
+    (output, more)
+}
+
+/// What would let a scenario be played stands at the end of a run, in the words of the rig's file.
+#[test]
+fn what_would_let_a_scenario_be_played_is_named() {
+    let without = |key: &str| ALL.replace(&format!("{key} = true\n"), "");
+    let and = |line: &str| format!("{ALL}{line}\n");
+    let third = "drives = [{ address = 8, ppo = 3 }]\n";
+    for (name, port, limits, named) in [
+        (
+            "second.scn",
+            ONE,
+            without("allow_bus_settings"),
+            "`allow_bus_settings` in [limits] (1)",
+        ),
+        (
+            "enables.scn",
+            ONE,
+            without("allow_unsupervised"),
+            "`allow_unsupervised` in [limits] (1)",
+        ),
+        (
+            "setpoint.scn",
+            ONE,
+            and("max_setpoint = \"10%\""),
+            "no `max_setpoint` in [limits] (1)",
+        ),
+        (
+            "setpoint.scn",
+            ONE,
+            and("max_frequency = \"5Hz\""),
+            "no `max_frequency` in [limits] (1)",
+        ),
+        (
+            "writes.scn",
+            ONE,
+            and("max_eeprom_writes = 0"),
+            "a higher `max_eeprom_writes` in [limits] (1)",
+        ),
+        (
+            "second.scn",
+            third,
+            String::new(),
+            "a drive `{ address = 8, ppo = 2 }` in [port.1] (1)",
+        ),
+    ] {
+        let (output, more) = more_scenarios(port, &limits, &[name]);
+        assert_eq!(more, named, "{}", said(&output));
+    }
+    let (output, more) = more_scenarios(ONE, "", &["second.scn", "fast.scn", "two.scn"]);
+    let named = "`allow_motion` and `allow_eeprom` and `allow_bus_settings` in [limits] and --allow-motion (1), \
+                 `rate = 1500` in [port.1] (1), a drive `{ address = 9, ppo = 1 }` in [port.1] (1)";
+    assert_eq!(more, named, "{}", said(&output));
+    // Not even a simulated rig has what only the simulator has, and no slave has the address of the bench's own master.
+    let none = ["nordac-2.6-link-lost", "nordac-2.5.1-address-2"];
+    let (output, more) = more_scenarios(ONE, ALL, &none);
+    assert_eq!(more, "`run` without --rig (1)", "{}", said(&output));
+}
+
+/// The same scenarios on the rigs that were named.
+#[test]
+fn a_rig_that_was_named_plays_the_scenario() {
+    for (port, limits, names, passed) in [
+        (
+            ONE,
+            ALL,
+            &["second.scn", "enables.scn", "setpoint.scn", "writes.scn"][..],
+            "4 passed",
+        ),
+        (
+            "drives = [{ address = 8, ppo = 2 }]\n",
+            "",
+            &["second.scn"],
+            "1 passed",
+        ),
+        (
+            "rate = 1500\ndrives = [{ address = 8, ppo = 1 }]\n",
+            "",
+            &["fast.scn"],
+            "1 passed",
+        ),
+        (
+            "drives = [{ address = 8, ppo = 1 }, { address = 9, ppo = 1 }]\n",
+            "",
+            &["two.scn"],
+            "1 passed",
+        ),
+    ] {
+        let (output, more) = more_scenarios(port, limits, names);
+        ended(&output, 0, passed);
+        assert_eq!(more, "", "{}", said(&output));
+    }
+}
+
 /// Qualifies an inverter with a deviation: it is named, and no other one.
 fn named(wrong: &str, section: &str, limits: &str) -> (Desk, String) {
     let desk = desk(&format!("deviates {wrong}"), limits);

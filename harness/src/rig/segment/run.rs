@@ -215,7 +215,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
             Err(skip) => return Ok(Played::skipped(skip)),
         };
         if let Some(skip) = self.player.not_begun(&own) {
-            return Ok(Played::skipped(skip));
+            return Ok(Played::skipped(skip.on_port()));
         }
         let real = !self.session.rig().is_simulated();
         let most = attempts_of(self.session.rig(), real, false);

@@ -46,6 +46,10 @@ pub enum Why {
 pub enum Unlock {
     /// A change of this setting in the rig's `[limits]`.
     Limit(LimitSetting),
+    /// A change of a setting in the rig's `[limits]` that only some buses have, as one says it.
+    PortLimit(&'static str),
+    /// Another setting of the rig's `[port.1]`, as its file has it.
+    Port(String),
     /// A tap at this link.
     Tap(String),
     /// An interposer at this link.
@@ -58,6 +62,8 @@ pub enum Unlock {
     SecondRing,
     /// Drives that are simulated in the program.
     Simulated,
+    /// No rig: simulated drives of which no record must show everything.
+    NoRig,
     /// A rig with this bus.
     Bus(Bus),
 }
@@ -93,6 +99,15 @@ impl Skip {
         self.unlocks.extend(more);
         if self.unlocks.contains(&Unlock::Simulated) {
             self.unlocks = [Unlock::Simulated].into();
+        }
+        self
+    }
+
+    /// The same on a rig with a port, where not even simulated drives show what only the simulator has.
+    #[must_use]
+    pub(crate) fn on_port(mut self) -> Self {
+        if self.unlocks.remove(&Unlock::Simulated) {
+            self.unlocks.insert(Unlock::NoRig);
         }
         self
     }
@@ -168,25 +183,33 @@ pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
     };
     let settings: Vec<_> = unlocks.iter().filter_map(setting).collect();
     let everything = |all: &[LimitSetting]| all.iter().all(|own| settings.contains(own));
-    let limits = match everything(&LimitSetting::PERMISSIONS) {
+    let mut limits = match everything(&LimitSetting::PERMISSIONS) {
         true => vec!["every permission".to_owned()],
         false => settings.iter().map(LimitSetting::to_string).collect(),
     };
-    let limits = (!limits.is_empty()).then(|| format!("{} in [limits]", limits.join(" and ")));
+    limits.extend(unlocks.iter().filter_map(Unlock::port_limit));
+    let limits = within("limits", &limits);
+    let port: Vec<_> = unlocks.iter().filter_map(Unlock::port).collect();
+    let port = within("port.1", &port);
     let motion = settings.contains(&LimitSetting::Motion);
     let option = motion.then(|| "--allow-motion".to_owned());
     let taps = at_places("tap", unlocks.iter().filter_map(Unlock::tap));
     let interposers = at_places("interposer", unlocks.iter().filter_map(Unlock::interposer));
-    let others = unlocks
-        .iter()
-        .filter(|own| setting(own).is_none() && own.tap().is_none() && own.interposer().is_none());
+    let others = unlocks.iter().filter(|own| !own.is_grouped());
     let all = limits
         .into_iter()
         .chain(option)
+        .chain(port)
         .chain(taps)
         .chain(interposers)
         .chain(others.map(Unlock::to_string));
     all.collect::<Vec<_>>().join(" and ")
+}
+
+/// `` `rate = 500` and `drives = [...]` in [port.1] ``.
+fn within(table: &str, settings: &[String]) -> Option<String> {
+    let some = !settings.is_empty();
+    some.then(|| format!("{} in [{table}]", settings.join(" and ")))
 }
 
 /// The most links that are named one by one.
@@ -205,6 +228,32 @@ fn at_places<'a>(what: &str, places: impl Iterator<Item = &'a str>) -> Option<St
 }
 
 impl Unlock {
+    /// Whether [`together`] names it with others of its kind.
+    const fn is_grouped(&self) -> bool {
+        matches!(
+            self,
+            Self::Limit(_)
+                | Self::PortLimit(_)
+                | Self::Port(_)
+                | Self::Tap(_)
+                | Self::Interposer(_)
+        )
+    }
+
+    fn port_limit(&self) -> Option<String> {
+        match self {
+            Self::PortLimit(setting) => Some((*setting).to_owned()),
+            _ => None,
+        }
+    }
+
+    fn port(&self) -> Option<String> {
+        match self {
+            Self::Port(setting) => Some(setting.clone()),
+            _ => None,
+        }
+    }
+
     fn tap(&self) -> Option<&str> {
         match self {
             Self::Tap(place) => Some(place),
@@ -224,6 +273,8 @@ impl fmt::Display for Unlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Limit(setting) => write!(f, "{setting} in [limits]"),
+            Self::PortLimit(setting) => write!(f, "{setting} in [limits]"),
+            Self::Port(setting) => write!(f, "{setting} in [port.1]"),
             Self::Tap(place) => write!(f, "a tap at {place}"),
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
@@ -233,6 +284,7 @@ impl fmt::Display for Unlock {
             },
             Self::SecondRing => f.write_str("a second ring"),
             Self::Simulated => f.write_str("a simulated rig"),
+            Self::NoRig => f.write_str("`run` without --rig"),
             Self::Bus(bus) => write!(f, "a rig with the bus `{}`", name(*bus)),
         }
     }

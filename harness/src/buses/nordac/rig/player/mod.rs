@@ -8,6 +8,7 @@
 mod judge;
 mod note;
 mod ready;
+mod unlock;
 
 pub(in crate::buses::nordac) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
 
@@ -17,7 +18,6 @@ use super::observed::{Came, Observed};
 use super::profile::Profiled;
 use super::settle::{self, Assumed};
 use super::talk::{Talk, TalkError};
-use crate::buses::LimitSetting;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::language::{Nordac, syntax};
 use crate::buses::nordac::simulate::{self, Bench};
@@ -29,7 +29,7 @@ use crate::scenario::parse::parse;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::outcome::Unready;
-use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
+use crate::scenario::run::{AtMismatch, Outcome, Skip, Why, lacks, play};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
@@ -87,7 +87,7 @@ struct Other<'o> {
 /// A scenario played on the model.
 struct Rehearsal {
     outcome: Outcome,
-    denied: Option<(String, Vec<LimitSetting>)>,
+    denied: Option<String>,
     /// The slave that has a fault at the end.
     faulted: Option<u8>,
     /// What came from the first telegram on that makes the slaves ready.
@@ -212,38 +212,6 @@ impl Player {
 
     /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
     pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
-        let bench = &own.plan.setup;
-        for slave in &bench.slaves {
-            let listed = self.slaves.iter().find(|rig| rig.address == slave.address);
-            let why = match listed {
-                None => format!("the rig has no slave {}", slave.address),
-                Some(rig) if rig.ppo.is_some_and(|ppo| !self.may_switch(ppo, slave.ppo)) => {
-                    format!(
-                        "slave {} of the rig is set to another PPO type than that of the scenario, {}; the bench switches 1622 with `allow_motion`, \
-                     `allow_eeprom` and `allow_bus_settings`, if it can switch it back through a parameter channel",
-                        slave.address,
-                        slave.ppo.number()
-                    )
-                }
-                Some(_) if slave.posicon => {
-                    format!(
-                        "slave {} of the scenario has the option PosiCon",
-                        slave.address
-                    )
-                }
-                Some(_) => continue,
-            };
-            return Some(Why::OtherDrives(why).into());
-        }
-        let stated = own.scenario.header.rate.is_some();
-        if stated && bench.rate != self.rate {
-            let why = format!(
-                "the rig's line has {} kbit/s, that of the scenario {}",
-                self.rate.name(),
-                bench.rate.name()
-            );
-            return Some(Why::OtherDrives(why).into());
-        }
         lacks(&own.plan, &self.replay(&[], Span::ZERO))
     }
 
@@ -259,11 +227,9 @@ impl Player {
     /// Whether a slave may be switched from one PPO type to the other for a scenario, and back. Other settings of the bus go with it: who
     /// controls the inverter may start a motor.
     fn may_switch(&self, from: PpoType, to: PpoType) -> bool {
-        let limits = &self.limits;
-        let permitted = limits.motion && limits.eeprom && limits.bus_settings;
         // A simulated slave is switched on anew for each attempt.
         let back = self.restarts || to.has_pkw();
-        from == to || permitted && from.has_pkw() && back
+        from == to || may_switch_settings(&self.limits) && from.has_pkw() && back
     }
 
     /// One attempt over a link: reads the slaves, rehearses, makes them ready, plays and judges. With what was received before the
@@ -328,17 +294,12 @@ impl Player {
             return (AttemptCourse::Unanswered(error), false);
         }
         link.noted.begin_fresh();
-        if let Some(slave) = self.slaves_of(own).find(|slave| !slave.ppo().has_pkw()) {
-            let why = format!(
-                "slave {} is set to PPO type {}, which has no parameter channel: its parameters are not known",
-                slave.slave.address,
-                slave.ppo().number()
-            );
-            return (AttemptCourse::Skipped(Why::OtherDrives(why).into()), false);
-        }
         let switches = match again.map_or_else(|| self.rehearsed(own), Ok) {
             Ok(switches) => switches,
-            Err(skip) => return (AttemptCourse::Skipped(skip), false),
+            Err(why) => {
+                let skip = Skip::from(why).and(self.unlocks(own));
+                return (AttemptCourse::Skipped(skip), false);
+            }
         };
         let ready = self.prepare(own, link, switches);
         self.before = Some(link.noted.received());
@@ -349,15 +310,6 @@ impl Player {
         link.take_late();
         let outcome = play(&own.plan, link, AtMismatch::Stop);
         (AttemptCourse::Played(Box::new(outcome)), switches)
-    }
-
-    /// The slaves that a scenario names.
-    fn slaves_of<'p>(&'p self, own: &'p Own) -> impl Iterator<Item = &'p Known> {
-        let named = |known: &&Known| {
-            let mut slaves = own.plan.setup.slaves.iter();
-            slaves.any(|slave| slave.address == known.slave.address)
-        };
-        self.known().iter().filter(named)
     }
 
     /// Reads the slaves, the first time, and `settles` what the manual leaves open.
@@ -482,9 +434,10 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    fn rehearsed(&self, own: &Own) -> Result<bool, Skip> {
-        if let Some(why) = self.other_properties(own) {
-            return Err(Why::OtherDrives(why).into());
+    fn rehearsed(&self, own: &Own) -> Result<bool, Why> {
+        let other = self.other_port(own).or_else(|| self.other_properties(own));
+        if let Some(why) = other {
+            return Err(Why::OtherDrives(why));
         }
         let with = |switches| Other {
             switches,
@@ -497,45 +450,67 @@ impl Player {
                 Some(slave) => Err(left_in_fault(slave)),
             };
         }
-        let may = self.slaves_of(own).all(|known| {
-            let wanted = own.plan.setup.slaves.iter();
-            let mut wanted = wanted.filter(|slave| slave.address == known.slave.address);
-            wanted.all(|slave| self.may_switch(known.ppo(), slave.ppo))
-        });
-        let limits = &self.limits;
-        let permitted = limits.motion && limits.eeprom && limits.bus_settings;
-        if may && permitted && self.rehearse(own, &self.limits, with(true)).passes() {
+        let permitted = may_switch_settings(&self.limits);
+        if permitted && self.rehearse(own, &self.limits, with(true)).passes() {
             return Ok(true);
         }
-        let Some((why, settings)) = first.denied else {
-            let all = Limits {
-                motion: true,
-                eeprom: true,
-                bus_settings: true,
-                ..self.limits
-            };
-            if may && !permitted && self.rehearse(own, &all, with(true)).passes() {
-                let why = "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
-                    --allow-motion, `allow_eeprom` and `allow_bus_settings`";
-                return Err(Why::OtherDrives(why.to_owned()).into());
-            }
+        if let Some(why) = first.denied {
+            return Err(Why::Denied(why));
+        }
+        let all = Limits {
+            motion: true,
+            eeprom: true,
+            bus_settings: true,
+            ..self.limits
+        };
+        let why = if !permitted && self.rehearse(own, &all, with(true)).passes() {
+            "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
+             --allow-motion, `allow_eeprom` and `allow_bus_settings`"
+                .to_owned()
+        } else {
             let finding = first.outcome.finding.map(|own| own.message);
             let remark = first.outcome.remarks.into_iter().next();
             let found = finding.or(remark).unwrap_or_default();
-            let why = format!("a right slave with the same parameters does not meet it: {found}");
-            return Err(Why::OtherDrives(why).into());
+            format!("a right slave with the same parameters does not meet it: {found}")
         };
-        // What the common settings would permit.
-        let mut limits = self.limits;
-        for setting in &settings {
-            permit(&mut limits, *setting);
+        Err(Why::OtherDrives(why))
+    }
+
+    /// What of the line and of the addresses and PPO types of its slaves is another than the scenario has, and is not switched.
+    fn other_port(&self, own: &Own) -> Option<String> {
+        let bench = &own.plan.setup;
+        for slave in &bench.slaves {
+            let address = slave.address;
+            let mut known = self.known().iter();
+            let Some(known) = known.find(|own| own.slave.address == address) else {
+                return Some(format!("the rig has no slave {address}"));
+            };
+            if !self.may_switch(known.ppo(), slave.ppo) {
+                return Some(format!(
+                    "slave {address} of the rig is set to another PPO type than that of the scenario, {}; the bench switches 1622 with `allow_motion`, \
+                     `allow_eeprom` and `allow_bus_settings`, if it can switch it back through a parameter channel",
+                    slave.ppo.number()
+                ));
+            }
+            if !known.ppo().has_pkw() {
+                return Some(format!(
+                    "slave {address} is set to PPO type {}, which has no parameter channel: its parameters are not known",
+                    known.ppo().number()
+                ));
+            }
+            if slave.posicon {
+                return Some(format!(
+                    "slave {address} of the scenario has the option PosiCon"
+                ));
+            }
         }
-        let plays = self.rehearse(own, &limits, with(false)).passes();
-        let unlocks: BTreeSet<_> = settings.into_iter().map(Unlock::Limit).collect();
-        let skip = Skip::from(Why::Denied(why));
-        Err(match plays {
-            true => skip.and(unlocks),
-            false => skip,
+        let other = own.scenario.header.rate.is_some() && bench.rate != self.rate;
+        other.then(|| {
+            format!(
+                "the rig's line has {} kbit/s, that of the scenario {}",
+                self.rate.name(),
+                bench.rate.name()
+            )
         })
     }
 
@@ -594,7 +569,7 @@ impl Player {
             drive.is_some_and(|own| own.inverter().state() == State::Fault)
         });
         let denied = match link.trouble() {
-            Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
+            Some(Trouble::Denied(why)) => Some(why.clone()),
             _ => None,
         };
         Rehearsal {
@@ -611,20 +586,14 @@ impl Player {
     }
 }
 
-/// A scenario behind which an inverter has a fault is not begun where the bench may not acknowledge it: it would stay for the scenarios behind.
-fn left_in_fault(slave: u8) -> Skip {
-    let why = format!(
-        "it leaves slave {slave} with a fault, and to acknowledge one needs `allow_motion` in the rig's [limits] and --allow-motion"
-    );
-    Skip::from(Why::Denied(why)).and(BTreeSet::from([Unlock::Limit(LimitSetting::Motion)]))
+/// Whether the settings of the bus may be switched for a scenario: who controls an inverter may start its motor.
+const fn may_switch_settings(limits: &Limits) -> bool {
+    limits.motion && limits.eeprom && limits.bus_settings
 }
 
-/// Permits what a setting denies.
-const fn permit(limits: &mut Limits, setting: LimitSetting) {
-    match setting {
-        LimitSetting::Motion => limits.motion = true,
-        LimitSetting::Eeprom => limits.eeprom = true,
-        LimitSetting::MaxSpeed => limits.highest = None,
-        _ => {}
-    }
+/// A scenario behind which an inverter has a fault is not begun where the bench may not acknowledge it: it would stay for the scenarios behind.
+fn left_in_fault(slave: u8) -> Why {
+    Why::Denied(format!(
+        "it leaves slave {slave} with a fault, and to acknowledge one needs `allow_motion` in the rig's [limits] and --allow-motion"
+    ))
 }
