@@ -71,6 +71,16 @@ impl Desk {
         self.folder.path().join(name)
     }
 
+    /// Permits more in the rig's file, where `[limits]` stands last.
+    fn permit(&self, more: &[&str]) {
+        let path = self.path("desk.toml");
+        let mut text = std::fs::read_to_string(&path).expect("a rig");
+        for own in more {
+            text += &format!("allow_{own} = true\n");
+        }
+        std::fs::write(&path, text).expect("room");
+    }
+
     pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
         command
@@ -284,10 +294,7 @@ fn a_served_inverter_is_qualified() {
 #[test]
 fn switched_settings_are_set_back_after_a_signal() {
     let desk = Desk::of("tcp", "", "slave 8\nslave 8 parameter 1621 = 2\n");
-    let path = desk.path("desk.toml");
-    let text = std::fs::read_to_string(&path).expect("a rig");
-    let more = "allow_eeprom = true\nallow_bus_settings = true\n";
-    std::fs::write(&path, text + more).expect("room");
+    desk.permit(&["eeprom", "bus_settings"]);
     let local =
         "title Local\nsource nordac 2.5.1\nbus nordac\nslave 8\nstart 8\nexchange 8 -> ZSW=09xx\n";
     std::fs::write(desk.path("local.scn"), local).expect("room");
@@ -331,13 +338,7 @@ fn switched_settings_are_set_back_after_a_signal() {
 #[test]
 fn a_fault_and_a_pause_accuse_no_slave() {
     let desk = Desk::new("tcp", "");
-    let path = desk.path("desk.toml");
-    let text = std::fs::read_to_string(&path).expect("a file");
-    let text = text.replace(
-        "allow_motion = true\n",
-        "allow_motion = true\nallow_eeprom = true\nallow_motor_data = true\n",
-    );
-    std::fs::write(&path, text).expect("room");
+    desk.permit(&["eeprom", "motor_data"]);
     let pause = desk.run("run --rig desk.toml nordac-en-1-too-long");
     ended(&pause, 5, "makes a pause behind a telegram");
     let both = "nordac-open-timeout-exactly-expires nordac-open-zsw8-always";
@@ -349,4 +350,33 @@ fn a_fault_and_a_pause_accuse_no_slave() {
     let said = said(&played);
     assert!(said.contains("passed nordac-open-zsw8-always"), "{said}");
     assert!(!said.contains("failed nordac"), "{said}");
+}
+
+/// A right slave fails no scenario where the rig permits everything but the EEPROM: what needs it is skipped, and says so. A scenario that is
+/// named is the user's mistake then.
+#[test]
+fn without_the_eeprom_no_scenario_fails() {
+    let desk = Desk::new("tcp", "");
+    desk.permit(&["bus_settings", "motor_data", "other_stations"]);
+    let played = desk.run("run --filter nordac-3.3-transition --rig desk.toml --allow-motion");
+    let text = said(&played);
+    let verdicts = |verdict: &str| {
+        let named = format!("{verdict} nordac-3.3-transition");
+        text.lines().filter(|own| own.starts_with(&named)).count()
+    };
+    assert_eq!(verdicts("failed"), 0, "{text}");
+    assert!(verdicts("passed") > 0, "{text}");
+    // A computer that stands still makes an attempt inconclusive.
+    let code = match verdicts("inconclusive") {
+        0 => 0,
+        _ => 5,
+    };
+    let denied = "needs `allow_eeprom` in the rig's [limits]";
+    let denials = text.lines().filter(|own| own.contains(denied)).count();
+    assert!(denials > 0, "{text}");
+    let more = format!("`allow_eeprom` in [limits] ({denials})");
+    ended(&played, code, &more);
+    ended(&played, code, SAFE);
+    let named = desk.run("run nordac-3.3-transition-9-10 --rig desk.toml --allow-motion");
+    ended(&named, 2, denied);
 }
