@@ -506,16 +506,21 @@ fn named(wrong: &str, section: &str, limits: &str) -> (Desk, String) {
     (desk, deviations)
 }
 
-/// Deviations that change what every parameter reads: the slave holds something else than was read of it.
+/// Deviations that change what every parameter reads, where the slave holds something else than was read of it; and those that ignore something
+/// beside those that only do not show it.
 #[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
-fn what_changes_every_value_is_named() {
-    for wrong in [
-        "answers-in-pwe1",
-        "answers-low-byte-first",
-        "values-of-one-more",
+#[ignore = "takes some minutes; .ci/nightly runs it"]
+fn more_wrong_inverters_are_named() {
+    for (wrong, section) in [
+        ("answers-in-pwe1", "3.4.3"),
+        ("answers-low-byte-first", "3.4.3"),
+        ("values-of-one-more", "3.4.3"),
+        ("no-sync", "EN 2"),
+        ("hides-sync", "EN 2"),
+        ("one-parameter-set", "3.2.1"),
+        ("set-not-shown", "3.2.2"),
     ] {
-        named(wrong, "3.4.3", ALL);
+        named(wrong, section, ALL);
     }
 }
 
