@@ -9,10 +9,11 @@
 //! Each part was played on drives of its own, so each is judged by its own record. All else is made from the parts, and `verify` makes it again.
 
 use super::derive::{CaseReport, Derived, Settled, case_reports, plain, suite};
-use super::files::{self, CAPTURES, JUNIT, PAGE, REPORT, SCENARIOS, SIGNATURE, SUMS, sum};
+use super::files::{self, JUNIT, PAGE, REPORT, SUMS, sum};
 use super::folder::EvidenceError;
 use super::junit::{JunitCase, junit};
-use super::record::{PartItem, RecordLine};
+use super::read_parts::{PARTS, ReadPart, copy, entries, failed, parts_of, place, read};
+use super::record::PartItem;
 use super::reports::{file, moved};
 use super::signature::Signer;
 use super::verify::{Opened, Verified, scenarios, verify};
@@ -29,9 +30,6 @@ use std::path::{Path, PathBuf};
 
 /// The record of a merged folder.
 pub const MERGE: &str = "merge.json";
-/// The folder of the parts.
-const PARTS: &str = "parts";
-
 /// What the parts of a run come to.
 #[derive(Clone, Debug)]
 pub struct Merged {
@@ -58,13 +56,6 @@ struct Made {
     page: String,
     /// The version of the program that played the parts.
     program: String,
-}
-
-/// A part that was read.
-struct ReadPart {
-    path: PathBuf,
-    partition: Partition,
-    opened: Opened,
 }
 
 /// Merges the folders of parts into a new folder.
@@ -183,192 +174,6 @@ pub(super) fn derive_merged(path: &Path) -> Result<Derived, EvidenceError> {
 pub(super) fn opened_parts(path: &Path) -> Result<Vec<Opened>, EvidenceError> {
     let parts = parts_of(path)?.into_iter();
     Ok(parts.map(|part| part.opened).collect())
-}
-
-/// Where a part stands in a merged folder.
-fn place(path: &Path, number: u32) -> PathBuf {
-    path.join(PARTS).join(number.to_string())
-}
-
-/// The names in a folder, in order.
-fn entries(path: &Path) -> Result<Vec<String>, EvidenceError> {
-    let all = fs::read_dir(path).map_err(failed(path))?;
-    let mut names = Vec::new();
-    for entry in all {
-        names.push(
-            entry
-                .map_err(failed(path))?
-                .file_name()
-                .to_string_lossy()
-                .into_owned(),
-        );
-    }
-    names.sort();
-    Ok(names)
-}
-
-fn failed(path: &Path) -> impl Fn(std::io::Error) -> EvidenceError {
-    move |error| EvidenceError::File {
-        path: path.display().to_string(),
-        error,
-    }
-}
-
-/// Copies the files of a folder of evidence.
-fn copy(from: &Path, to: &Path) -> Result<(), EvidenceError> {
-    for folder in ["", SCENARIOS, CAPTURES] {
-        let path = to.join(folder);
-        fs::create_dir_all(&path).map_err(failed(&path))?;
-    }
-    let mut names = files::names(from);
-    names.extend([SUMS, SIGNATURE].map(str::to_owned));
-    for name in names.iter().filter(|name| from.join(name).exists()) {
-        let bytes = files::read(from, name).map_err(failed(&from.join(name)))?;
-        fs::write(to.join(name), bytes).map_err(failed(&to.join(name)))?;
-    }
-    Ok(())
-}
-
-/// Reads folders that are to be parts of one run, in the order of their numbers.
-fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> {
-    let mut parts: Vec<ReadPart> = Vec::new();
-    for path in folders {
-        let opened = Opened::folder(path)?;
-        let Some(partition) = opened.header.partition() else {
-            return Err(EvidenceError::Merge(format!(
-                "{} is no part of a run: its record has no partition; `run --partition slice:M/N --evidence FOLDER` writes one",
-                path.display()
-            )));
-        };
-        let own = ReadPart {
-            path: path.clone(),
-            partition,
-            opened,
-        };
-        if own.opened.header.qualified {
-            return Err(EvidenceError::Merge(format!(
-                "{} is of `qualify`: each part of a qualification stands for itself, with a profile of its own; only parts of `run` are merged",
-                path.display()
-            )));
-        }
-        if let Some(first) = parts.first() {
-            own.is_of_one_run_with(first)?;
-        }
-        if let Some(other) = parts.iter().find(|other| other.partition == partition) {
-            return Err(EvidenceError::Merge(format!(
-                "{} and {} are both {partition}; name each part once",
-                other.path.display(),
-                path.display()
-            )));
-        }
-        parts.push(own);
-    }
-    parts.sort_by_key(|own| own.partition.number);
-    match parts.is_empty() {
-        true => Err(EvidenceError::Merge("there is no part".to_owned())),
-        false => Ok(parts),
-    }
-}
-
-impl ReadPart {
-    /// What must be the same in all parts of a run: the name of each fact, and what it is here.
-    fn fingerprint(&self) -> Vec<(&'static str, String)> {
-        let header = &self.opened.header;
-        let part = header.part.as_ref();
-        let names: Vec<_> = header.capabilities.iter().map(|own| own.name()).collect();
-        vec![
-            ("version of drivebench", header.program.clone()),
-            ("schema", header.schema.to_string()),
-            ("spread", self.partition.spread.name().to_owned()),
-            ("number of parts", self.partition.of.to_string()),
-            ("rig", self.opened.rig.id().to_owned()),
-            (
-                "sum of the rig's file",
-                sum(self.opened.rig.text.as_bytes()),
-            ),
-            (
-                "filter",
-                part.and_then(|own| own.filter.clone())
-                    .unwrap_or_else(|| "none".to_owned()),
-            ),
-            (
-                "corpus",
-                part.map_or_else(String::new, |own| own.corpus.clone()),
-            ),
-            (
-                "purpose",
-                if header.qualified { "qualify" } else { "run" }.to_owned(),
-            ),
-            ("list of capabilities", names.join(", ")),
-            ("rate", header.rate.bits_per_second().to_string()),
-            (
-                "choice of drives",
-                match header.own_rings {
-                    true => "simulated drives for each scenario",
-                    false => "those of the rig",
-                }
-                .to_owned(),
-            ),
-            (
-                "sum of the profile that the rig's file names",
-                self.opened
-                    .rig
-                    .profile
-                    .as_ref()
-                    .map_or_else(|| "none".to_owned(), |own| sum(own.text.as_bytes())),
-            ),
-        ]
-    }
-
-    fn is_of_one_run_with(&self, first: &Self) -> Result<(), EvidenceError> {
-        let both = first.fingerprint().into_iter().zip(self.fingerprint());
-        let mut differing = both.filter(|((_, theirs), (_, own))| theirs != own);
-        match differing.next() {
-            None => Ok(()),
-            Some(((what, theirs), (_, own))) => Err(EvidenceError::Merge(format!(
-                "{} and {} are no parts of one run: the {what} is {theirs} in the first and {own} in the second",
-                first.path.display(),
-                self.path.display()
-            ))),
-        }
-    }
-
-    fn scenarios(&self) -> &[PartItem] {
-        self.opened
-            .header
-            .part
-            .as_ref()
-            .map_or(&[], |own| &own.scenarios)
-    }
-}
-
-/// The parts of a merged folder.
-fn parts_of(path: &Path) -> Result<Vec<ReadPart>, EvidenceError> {
-    let folder = path.join(PARTS);
-    let names = entries(&folder)?;
-    let all: Vec<_> = names.iter().map(|name| folder.join(name)).collect();
-    if let Some(link) = all
-        .iter()
-        .find(|own| !fs::symlink_metadata(own).is_ok_and(|own| own.is_dir()))
-    {
-        return Err(EvidenceError::Merge(format!(
-            "{} is not a folder",
-            link.display()
-        )));
-    }
-    let parts = read(&all)?;
-    match parts
-        .iter()
-        .find(|own| place(path, own.partition.number) != own.path)
-    {
-        None => Ok(parts),
-        Some(own) => Err(EvidenceError::Merge(format!(
-            "{} holds {}, which belongs into {PARTS}/{}",
-            own.path.display(),
-            own.partition,
-            own.partition.number
-        ))),
-    }
 }
 
 /// A scenario of the whole run.
@@ -534,23 +339,6 @@ fn facts(merged: &Merged, first: &ReadPart) -> Vec<(&'static str, String)> {
     ];
     facts.extend(merged.missing.iter().map(|own| ("Incomplete", own.clone())));
     facts
-}
-
-impl ReadPart {
-    fn end(&self) -> Option<Option<bool>> {
-        match self.opened.lines.last() {
-            Some(RecordLine::End { safe, .. }) => Some(*safe),
-            _ => None,
-        }
-    }
-
-    fn has_ended(&self) -> bool {
-        self.end().is_some() && self.path.join(SUMS).exists()
-    }
-
-    fn is_unsafe(&self) -> bool {
-        self.end() == Some(Some(false))
-    }
 }
 
 fn record(merged: &Merged, parts: &[ReadPart]) -> String {

@@ -32,6 +32,7 @@ mod names;
 mod part;
 mod qualified;
 mod read;
+mod read_parts;
 mod record;
 mod reports;
 mod rerun;
