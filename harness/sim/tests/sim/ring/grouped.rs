@@ -258,7 +258,7 @@ fn grouped_drives_do_what_each_does_by_itself() {
 }
 
 #[test]
-#[ignore = "takes about 45 minutes; .ci/nightly runs it"]
+#[ignore = "takes 11 minutes of processor time; .ci/nightly runs it"]
 fn grouped_drives_do_what_each_does_in_a_million_rings() {
     let test = "grouped_drives_do_what_each_does_in_a_million_rings -- --ignored";
     play(1_000_000, test);
