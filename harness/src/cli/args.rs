@@ -121,7 +121,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Make one folder of evidence of the parts of a run, or add the counts of campaigns.
     ///
-    /// The exit code is that of the whole run, or of the whole campaigns. It is 5 if a part is missing.
+    /// Parts of `qualify` become one qualification. The exit code is that of the whole run, or of the whole campaigns. It is 5 if a part is
+    /// missing and nothing failed.
     Merge(MergeArguments),
     /// Write the reports of a run again from its evidence folder.
     Report(ReportArguments),
@@ -254,7 +255,8 @@ pub struct QualifyArguments {
     /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
-    /// Play one part of the selected scenarios, slice:M/N or hash:M/N, and everything that a qualification plays besides.
+    /// Play one part of the selected scenarios, slice:M/N or hash:M/N, and everything that a qualification plays besides. `merge` makes one
+    /// qualification of the parts.
     #[arg(long, value_name = "PART")]
     pub partition: Option<Partition>,
     /// The folder for the evidence, which must be new or empty; by default evidence-RIG-DATE.

@@ -3,6 +3,7 @@
 use super::exit::Exit;
 use super::merge_counts::merge_counts;
 use super::output::Output;
+use super::run_rig::worse;
 use super::tally::counts;
 use crate::counted::counted;
 use crate::evidence::{Merged, merge as join};
@@ -13,7 +14,7 @@ use std::path::PathBuf;
 /// For `merge`.
 #[derive(Clone, Debug, Args)]
 pub struct MergeArguments {
-    /// The evidence folders of the parts of a run, or the files that `campaign --output` wrote.
+    /// The evidence folders of the parts of a run or of a qualification, or the files that `campaign --output` wrote.
     #[arg(value_name = "FOLDER", required = true)]
     pub folders: Vec<PathBuf>,
     /// The folder for the merged evidence, which must be new or empty, and which `verify` checks; or the file for the added counts.
@@ -59,13 +60,21 @@ pub(crate) fn merge(arguments: &MergeArguments, output: &mut Output) -> std::io:
         merged.took,
         there.len()
     ))?;
+    if let Some((text, _)) = &merged.deviations {
+        output.result(text)?;
+    }
     output.say(&format!("evidence in {}\n", arguments.output.display()));
     Ok(exit(&merged, &verdicts, arguments.require_all))
 }
 
-/// The exit code of the whole run, as `run` has it. A part that is missing leaves a failure a failure, and makes all else incomplete.
+/// The exit code of the whole run, as `run` and `qualify` have it. A part that is missing leaves a failure a failure, and makes all else incomplete.
 fn exit(merged: &Merged, verdicts: &[Verdict], require_all: bool) -> Exit {
-    match Exit::of(verdicts, require_all) {
+    let scenarios = Exit::of(verdicts, require_all);
+    let all = match &merged.deviations {
+        Some((_, verdict)) => worse(scenarios, Exit::of(&[*verdict], false)),
+        None => scenarios,
+    };
+    match all {
         _ if !merged.safe => Exit::NotSafe,
         Exit::Passed | Exit::Incomplete if merged.named_denied => Exit::Usage,
         Exit::Passed | Exit::NothingSelected if !merged.missing.is_empty() => Exit::Incomplete,

@@ -72,6 +72,17 @@ pub(super) struct CaseReport {
     pub(super) shown: ShownScenario,
 }
 
+impl CaseReport {
+    /// Shows of which part it is: another part has played a scenario of the same name.
+    pub(super) fn name_part(&mut self, part: &str) {
+        let name = format!("{} (part {part})", self.settled.name);
+        let rest = self.junit.name.strip_prefix(&self.settled.name);
+        self.junit.name = format!("{name}{}", rest.unwrap_or_default());
+        self.shown.rename(&name);
+        self.settled.name = name;
+    }
+}
+
 /// What the reports say of each scenario of a folder, in its order; `number` gives the number of a section by its place.
 pub(super) fn case_reports(
     path: &Path,
@@ -255,6 +266,11 @@ impl Settled {
         self.verdict == Verdict::Skipped && first.is_some_and(|own| own.starts_with(words))
     }
 
+    /// Whether the same came of another attempt at the scenario, whatever time it took.
+    pub(super) fn says_the_same_as(&self, other: &Self) -> bool {
+        (self.verdict, &self.finding) == (other.verdict, &other.finding)
+    }
+
     /// What there is to say beside the verdict.
     pub(super) fn messages(&self) -> impl Iterator<Item = &String> {
         self.finding.iter().chain(&self.remarks)
@@ -378,12 +394,13 @@ fn show(
     )
 }
 
+/// What stands above `deviations.txt` on the page, and above `profile.toml`.
+pub(super) const DEVIATIONS_HEADING: &str = "Coverage and deviations";
+pub(super) const PROFILE_HEADING: &str = "Profile";
+
 /// What a qualification found, of its own files: what was compared, deviations, profile.
 fn found(path: &Path) -> Vec<(&'static str, String)> {
-    let files = [
-        ("Coverage and deviations", DEVIATIONS),
-        ("Profile", PROFILE),
-    ];
+    let files = [(DEVIATIONS_HEADING, DEVIATIONS), (PROFILE_HEADING, PROFILE)];
     let found = files.into_iter().filter_map(|(heading, file)| {
         let text = files::read_text(path, file).ok()?;
         Some((heading, text))

@@ -5,22 +5,24 @@
 //! | `merge.json` | which parts there are, which are missing, and what came of each scenario |
 //! | `parts/N` | the folder of part N as it was |
 //! | `junit.xml`, `report.txt`, `report.html` | the verdicts of all parts in the order of the whole run |
+//! | `profile.toml`, `deviations.txt` | of a qualification: what all parts come to |
 //!
 //! Each part was played on drives of its own, so each is judged by its own record. All else is made from the parts, and `verify` makes it again.
 
-use super::derive::{CaseReport, Derived, Settled, case_reports, plain, suite};
-use super::files::{self, JUNIT, PAGE, REPORT, SUMS, sum};
+use super::derive::{DEVIATIONS_HEADING, Derived, PROFILE_HEADING, plain, suite};
+use super::files::{self, DEVIATIONS, JUNIT, PAGE, PROFILE, REPORT, SUMS, sum};
 use super::folder::EvidenceError;
-use super::junit::{JunitCase, junit};
+use super::gather::{Gathering, Row};
+use super::junit::junit;
+use super::qualified::compare;
 use super::read_parts::{PARTS, ReadPart, copy, entries, failed, parts_of, place, read};
-use super::record::PartItem;
 use super::reports::{file, moved};
 use super::signature::Signer;
-use super::verify::{Opened, Verified, scenarios, verify};
-use crate::counted::counted;
+use super::verify::{Opened, Verified, verify};
 use crate::partition::Partition;
 use crate::regular;
-use crate::report::html::{Head, ShownScenario, run};
+use crate::report::html::{Head, run};
+use crate::rig::segment::Qualified;
 use crate::scenario::run::DENIED;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -33,7 +35,7 @@ pub const MERGE: &str = "merge.json";
 /// What the parts of a run come to.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// The name and the verdict of each scenario, in the order of the whole run.
+    /// The name and the verdict of each selected scenario, in the order of the whole run.
     pub verdicts: Vec<(String, Verdict)>,
     /// How long they took on the line.
     pub took: Span,
@@ -45,6 +47,8 @@ pub struct Merged {
     pub named_denied: bool,
     /// Whether no part has left its drives in a state that is not known to be safe.
     pub safe: bool,
+    /// Of a qualification: which deviations there are and what was compared, and the verdict on the drives.
+    pub deviations: Option<(String, Verdict)>,
 }
 
 /// The files of a merged folder.
@@ -54,6 +58,7 @@ struct Made {
     junit: String,
     report: String,
     page: String,
+    qualified: Option<Qualified>,
     /// The version of the program that played the parts.
     program: String,
 }
@@ -105,7 +110,10 @@ pub fn merge(parts: &[PathBuf], output: &Path) -> Result<Merged, EvidenceError> 
         (PAGE, &made.page),
         (MERGE, &made.record),
     ];
-    for (name, text) in texts {
+    let qualified = made.qualified.as_ref();
+    let found = qualified.map(|own| (DEVIATIONS, &own.deviations));
+    let profile = qualified.and_then(|own| Some((PROFILE, own.profile.as_ref()?)));
+    for (name, text) in texts.into_iter().chain(found).chain(profile) {
         let path = output.join(name);
         regular::write_text(&path, text).map_err(failed(&path))?;
     }
@@ -148,9 +156,15 @@ pub fn verify_merged(
             file(path, PAGE, |_| made.page.clone()),
         ];
         verified.files.extend(wrong.into_iter().flatten());
+        let wrong = made.qualified.iter().flat_map(|own| compare(path, own));
+        verified.files.extend(wrong);
     }
+    let of_qualification = [PROFILE, DEVIATIONS];
     for name in entries(path)? {
-        if ![MERGE, REPORT, JUNIT, PAGE, PARTS].contains(&name.as_str()) {
+        let name = name.as_str();
+        let known = [MERGE, REPORT, JUNIT, PAGE, PARTS].contains(&name)
+            || made.qualified.is_some() && of_qualification.contains(&name);
+        if !known {
             verified
                 .files
                 .push(format!("{name} is not a file of a merged run"));
@@ -176,88 +190,11 @@ pub(super) fn opened_parts(path: &Path) -> Result<Vec<Opened>, EvidenceError> {
     Ok(parts.map(|part| part.opened).collect())
 }
 
-/// A scenario of the whole run.
-struct Row {
-    settled: Settled,
-    junit: JunitCase,
-    /// `None` for one that was not run.
-    shown: Option<ShownScenario>,
-}
-
-impl From<CaseReport> for Row {
-    fn from(report: CaseReport) -> Self {
-        Self {
-            settled: report.settled,
-            junit: report.junit,
-            shown: Some(report.shown),
-        }
-    }
-}
-
-/// The scenarios of the whole run, gathered part by part.
-struct Gathering<'g> {
-    path: &'g Path,
-    rig: &'g str,
-    all: &'g [PartItem],
-    /// By their places.
-    rows: BTreeMap<usize, Row>,
-    missing: Vec<String>,
-}
-
-impl Gathering<'_> {
-    /// Takes the scenarios of a part that is there; `own` has their places.
-    fn part(&mut self, part: &ReadPart, own: &[usize]) -> Result<(), EvidenceError> {
-        let judged = part.opened.judged(&scenarios(&part.path))?;
-        let number = |at: usize| own.get(at).map_or(0, |place| place + 1);
-        let made = case_reports(&part.path, &part.opened, &judged, &number)?;
-        let played = made.len();
-        let planned = own.iter().map(|place| &self.all[*place].name);
-        let names = made.iter().map(|report| &report.settled.name);
-        if played > own.len() || !planned.zip(names).all(|(planned, name)| planned == name) {
-            return Err(EvidenceError::Merge(format!(
-                "{}: its cases are not the scenarios of {} of its list",
-                part.path.display(),
-                part.partition
-            )));
-        }
-        for (place, report) in own.iter().zip(made) {
-            self.rows.insert(*place, report.into());
-        }
-        if !part.has_ended() || played < own.len() {
-            self.missing.push(format!(
-                "part {} did not come to its end: {} not run",
-                part.partition,
-                counted(own.len() - played, "scenario")
-            ));
-        }
-        self.not_run(
-            &own[played..],
-            &format!("part {} ended before it", part.partition),
-        );
-        Ok(())
-    }
-
-    /// Takes the scenarios of a part that is not there. A part without any is not missed.
-    fn no_part(&mut self, partition: Partition, own: &[usize]) {
-        if !own.is_empty() {
-            let count = counted(own.len(), "scenario");
-            self.missing
-                .push(format!("part {partition} is missing: {count} not run"));
-        }
-        self.not_run(own, &format!("part {partition} is missing"));
-    }
-
-    fn not_run(&mut self, places: &[usize], why: &str) {
-        for place in places {
-            let settled = Settled::not_run(&self.all[*place].name, why);
-            let row = Row {
-                junit: settled.case(self.path, self.rig),
-                settled,
-                shown: None,
-            };
-            self.rows.insert(*place, row);
-        }
-    }
+/// What a qualification found, as the page shows it.
+fn found(qualified: &Qualified) -> Vec<(&'static str, String)> {
+    let profile = qualified.profile.clone().map(|own| (PROFILE_HEADING, own));
+    let deviations = (DEVIATIONS_HEADING, qualified.deviations.clone());
+    std::iter::once(deviations).chain(profile).collect()
 }
 
 /// Makes the files of a merged folder from its parts.
@@ -270,13 +207,7 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
         let owner = first.partition.owner(place, &item.name);
         places.entry(owner).or_default().push(place);
     }
-    let mut gathering = Gathering {
-        path,
-        rig,
-        all,
-        rows: BTreeMap::new(),
-        missing: Vec::new(),
-    };
+    let mut gathering = Gathering::of(path, first);
     for (number, own) in &places {
         let place = parts.binary_search_by_key(number, |part| part.partition.number);
         match place {
@@ -290,7 +221,13 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
             ),
         }
     }
-    let Gathering { rows, missing, .. } = gathering;
+    let qualified = gathering.qualified()?;
+    let Gathering {
+        rows,
+        behind,
+        missing,
+        ..
+    } = gathering;
     let denied =
         |(place, row): (&usize, &Row)| all[*place].named && row.settled.begins_with(DENIED);
     let merged = Merged {
@@ -305,14 +242,17 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
         missing,
         named_denied: rows.iter().any(denied),
         safe: !parts.iter().any(ReadPart::is_unsafe),
+        deviations: qualified
+            .as_ref()
+            .map(|own| (own.deviations.clone(), own.verdict)),
     };
     let head = Head {
-        found: Vec::new(),
+        found: qualified.as_ref().map_or_else(Vec::new, found),
         title: "drivebench: scenarios on a rig, merged of parts",
         facts: facts(&merged, first),
     };
     let (mut settled, mut cases, mut shown) = (Vec::new(), Vec::new(), Vec::new());
-    for row in rows.into_values() {
+    for row in rows.into_values().chain(behind) {
         settled.push(row.settled);
         cases.push(row.junit);
         shown.extend(row.shown);
@@ -322,6 +262,7 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
         junit: junit(&suite(rig), &cases),
         report: plain(rig, &settled),
         page: run(&head, shown),
+        qualified,
         program: first.opened.header.program.clone(),
         merged,
     })

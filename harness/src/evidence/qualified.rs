@@ -93,17 +93,17 @@ fn difference(path: &Path, file: &str, made: &str) -> Option<String> {
 
 /// A scenario as it was played.
 #[derive(Clone)]
-struct Case {
-    name: String,
+pub(super) struct Case {
+    pub(super) name: String,
     /// The sum of its text.
-    sum: String,
-    played: Played,
+    pub(super) sum: String,
+    pub(super) played: Played,
     /// Whether the rig's line was lost in it, or the like.
-    ends_the_run: bool,
+    pub(super) ends_the_run: bool,
 }
 
 /// The scenarios of a record in order.
-fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>, String> {
+pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>, String> {
     let mut left = judged;
     let mut pending = 0;
     let mut cases = VecDeque::new();
@@ -151,14 +151,19 @@ fn not_played(verdict: &str, remarks: &[String]) -> Played {
     }
 }
 
-/// What a record comes to. Where it has `ended`, nothing may be played behind its last scenario.
-fn qualified(opened: &Opened, mut cases: VecDeque<Case>, ended: bool) -> Result<Qualified, Stop> {
-    let header = &opened.header;
-    let drives = header.drives.first().copied().unwrap_or(1);
-    let reached = reached(&opened.rig, header);
-    let long: Vec<_> = thorough(drives).unwrap_or_default();
+/// Whether the long conversations are among the scenarios of a record.
+pub(super) fn is_thorough(opened: &Opened, cases: &VecDeque<Case>) -> bool {
+    let drives = opened.header.drives.first().copied().unwrap_or(1);
+    let long = thorough(drives).unwrap_or_default();
     let long = long.first().map(|entry| sum(entry.source.text.as_bytes()));
-    let mut course = Qualification::new(QualificationFacts {
+    long.is_some_and(|long| cases.iter().any(|case| case.sum == long))
+}
+
+/// A qualification like that of a record, of which nothing was noted yet.
+pub(super) fn course(opened: &Opened, thorough: bool, began: String) -> Qualification {
+    let header = &opened.header;
+    let reached = reached(&opened.rig, header);
+    Qualification::new(QualificationFacts {
         rig: opened.rig.clone(),
         byte_time: header.rate.byte_time(),
         exactness: header.exactness,
@@ -167,9 +172,16 @@ fn qualified(opened: &Opened, mut cases: VecDeque<Case>, ended: bool) -> Result<
             .into_iter()
             .filter_map(|(ring, place)| (ring == 0).then_some(place))
             .collect(),
-        began: header.started.clone(),
-        thorough: long.is_some_and(|long| cases.iter().any(|case| case.sum == long)),
-    });
+        began,
+        thorough,
+    })
+}
+
+/// What a record comes to. Where it has `ended`, nothing may be played behind its last scenario.
+fn qualified(opened: &Opened, mut cases: VecDeque<Case>, ended: bool) -> Result<Qualified, Stop> {
+    let header = &opened.header;
+    let thorough = is_thorough(opened, &cases);
+    let mut course = course(opened, thorough, header.started.clone());
     let selected = header.selected.as_ref().map_or(0, Vec::len);
     let mut over = false;
     for case in cases.drain(..selected.min(cases.len())) {

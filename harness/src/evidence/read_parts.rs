@@ -69,7 +69,7 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> 
         let opened = Opened::folder(path)?;
         let Some(partition) = opened.header.partition() else {
             return Err(EvidenceError::Merge(format!(
-                "{} is no part of a run: its record has no partition; `run --partition slice:M/N --evidence FOLDER` writes one",
+                "{} is no part of a run: its record has no partition; `run` or `qualify` with `--partition slice:M/N --evidence FOLDER` writes one",
                 path.display()
             )));
         };
@@ -78,12 +78,6 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<Vec<ReadPart>, EvidenceError> 
             partition,
             opened,
         };
-        if own.opened.header.qualified {
-            return Err(EvidenceError::Merge(format!(
-                "{} is of `qualify`: each part of a qualification stands for itself, with a profile of its own; only parts of `run` are merged",
-                path.display()
-            )));
-        }
         if let Some(first) = parts.first() {
             own.is_of_one_run_with(first)?;
         }
@@ -120,6 +114,10 @@ impl ReadPart {
                 sum(self.opened.rig.text.as_bytes()),
             ),
             (
+                "purpose",
+                if header.qualified { "qualify" } else { "run" }.to_owned(),
+            ),
+            (
                 "filter",
                 part.and_then(|own| own.filter.clone())
                     .unwrap_or_else(|| "none".to_owned()),
@@ -127,10 +125,6 @@ impl ReadPart {
             (
                 "corpus",
                 part.map_or_else(String::new, |own| own.corpus.clone()),
-            ),
-            (
-                "purpose",
-                if header.qualified { "qualify" } else { "run" }.to_owned(),
             ),
             ("list of capabilities", names.join(", ")),
             ("rate", header.rate.bits_per_second().to_string()),

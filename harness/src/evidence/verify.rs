@@ -291,7 +291,7 @@ impl Opened {
     }
 
     /// Judges every attempt on a rig with a port again.
-    fn judged_on_segment(
+    pub(super) fn judged_on_segment(
         &self,
         judge: &mut dyn SegmentJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,

@@ -7,7 +7,7 @@ use crate::rig::Rig;
 use crate::rig::profile::{Profile, ProfileLines};
 use crate::rig::segment::Qualified;
 use crate::scenario::verdict::Verdict;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The most deviations that are listed where several explain everything.
 const MOST_TOLD: usize = 8;
@@ -44,6 +44,9 @@ pub(crate) struct Attempted {
     pub(crate) exact: bool,
     /// How many frames or telegrams were received.
     pub(crate) received: usize,
+    /// Whether another part of the qualification has played the same conversation before, with the same verdict: it is judged, and not
+    /// counted again.
+    pub(crate) repeats: bool,
 }
 
 /// What the attempts say of the drives.
@@ -91,12 +94,63 @@ pub(crate) struct Point<'p> {
     pub(crate) value: Result<String, String>,
 }
 
+/// The points as all parts of a qualification have shown them, and the contradictions between parts in sentences. Every part has the same points
+/// in the same order. A value counts where other parts have shown none.
+fn agreed<'p>(parts: Vec<Vec<Point<'p>>>) -> (Vec<Point<'p>>, Vec<String>) {
+    let values = |place: usize| -> BTreeSet<String> {
+        let shown = parts.iter().filter_map(|part| part.get(place));
+        shown.filter_map(|own| own.value.clone().ok()).collect()
+    };
+    let all: Vec<_> = (0..parts.first().map_or(0, Vec::len)).map(values).collect();
+    let mut points = parts.into_iter().next().unwrap_or_default();
+    let mut contradictions = Vec::new();
+    for (own, mut values) in points.iter_mut().zip(all) {
+        if values.len() > 1 {
+            let values: Vec<_> = values.into_iter().collect();
+            let differ = format!("its values differ from part to part: {}", values.join(", "));
+            contradictions.push(format!("{}, {}: {differ}", own.drive, own.name));
+            own.value = Err(differ);
+        } else if let Some(value) = values.pop_first() {
+            own.value = Ok(value);
+        }
+    }
+    (points, contradictions)
+}
+
+/// Which attempts of the parts of a qualification, one behind the other, repeat what a part before has played: they have the same name and
+/// the same verdict.
+pub(crate) fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<bool> {
+    let mut before = BTreeSet::new();
+    let mut all = Vec::new();
+    for part in parts {
+        let own: Vec<_> = part.iter().map(&of).collect();
+        all.extend(own.iter().map(|own| before.contains(own)));
+        before.extend(own);
+    }
+    all
+}
+
 /// The profile of drives: every point that the manual leaves open, of each drive.
-pub(crate) fn profile<'p>(
-    (rig, began): (&Rig, &str),
-    drives: usize,
-    points: impl Iterator<Item = Point<'p>>,
-) -> Profile<ProfileLines> {
+pub(crate) struct Profiled {
+    /// It; `None` where the drives were not asked.
+    profile: Option<Profile<ProfileLines>>,
+    /// The contradictions between the parts of a qualification, in sentences.
+    contradictions: Vec<String>,
+}
+
+/// The profile of the drives of a rig, by the points that each part of a qualification has shown; none where it has not asked the drives.
+pub(crate) fn profile((rig, began): (&Rig, &str), mut parts: Vec<Vec<Point<'_>>>) -> Profiled {
+    parts.retain(|points| !points.is_empty());
+    let asked = !parts.is_empty();
+    let (points, contradictions) = agreed(parts);
+    Profiled {
+        profile: asked.then(|| of_points((rig, began), points)),
+        contradictions,
+    }
+}
+
+fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<ProfileLines> {
+    let drives = rig.port().map_or(0, |port| port.drives.len());
     let mut profile = Profile {
         schema: 1,
         rig: rig.id().to_owned(),
@@ -123,25 +177,30 @@ pub(crate) fn profile<'p>(
 /// names. `whole` if everything was played.
 pub(crate) fn qualified<A: Attempts>(
     all: &A,
-    profile: Option<Profile<ProfileLines>>,
+    profiled: Profiled,
     frames: &str,
     known: &[String],
     whole: bool,
 ) -> Qualified {
+    let Profiled {
+        profile,
+        contradictions,
+    } = profiled;
     let attempts = all.attempts();
     let named = named(all, &attempts);
     let settled = profile.as_ref().map_or(0, |own| own.property.len());
     let open = profile.as_ref().map_or(0, |own| own.open.len());
-    let verdicts = |verdict| attempts.iter().filter(move |own| own.verdict == verdict);
+    let counted_once = || attempts.iter().enumerate().filter(|own| !own.1.repeats);
+    let verdicts = |verdict| counted_once().filter(move |own| own.1.verdict == verdict);
     let failed = verdicts(Verdict::Failed).count();
     let passed = verdicts(Verdict::Passed).count();
     let unclear = |(place, own): &(usize, &Attempted)| {
         let settled = [Verdict::Passed, Verdict::Failed, Verdict::Skipped];
         !(settled.contains(&own.verdict) || own.exact && all.is_right(*place))
     };
-    let inconclusive = attempts.iter().enumerate().filter(unclear).count();
-    let tried = attempts.len() - verdicts(Verdict::Skipped).count();
-    let received: usize = attempts.iter().map(|own| own.received).sum();
+    let inconclusive = counted_once().filter(unclear).count();
+    let tried = counted_once().count() - verdicts(Verdict::Skipped).count();
+    let received: usize = counted_once().map(|own| own.1.received).sum();
     let mut text = match &named {
         Named::Explained(all) if all.is_empty() => {
             "deviations: the drives differ from the model, and no single known deviation explains it\n".to_owned()
@@ -151,6 +210,10 @@ pub(crate) fn qualified<A: Attempts>(
             .take(MOST_TOLD)
             .map(|own| format!("deviation: {own}\n"))
             .collect(),
+        Named::None if !contradictions.is_empty() => {
+            "deviations: not known; the parts of the qualification show drives that differ\n"
+                .to_owned()
+        }
         Named::None if inconclusive > 0 || tried == 0 || !whole => {
             "deviations: not known; no drive is known to be at fault, but not everything was compared and equal\n".to_owned()
         }
@@ -178,6 +241,9 @@ pub(crate) fn qualified<A: Attempts>(
             "each of these explains everything received: this does not tell which one it is\n",
         );
     }
+    for own in &contradictions {
+        text.push_str(&format!("  {own}\n"));
+    }
     text.push_str(&format!(
         "compared: {passed} of {} passed, {failed} failed, {inconclusive} inconclusive; {} received; {settled} of {} settled\n",
         counted(tried, "attempt"),
@@ -194,7 +260,9 @@ pub(crate) fn qualified<A: Attempts>(
             _ if failed > 0 => Verdict::Failed,
             Named::Explained(all) if all.len() == 1 => Verdict::Failed,
             Named::Explained(_) => Verdict::Inconclusive,
-            Named::None if inconclusive > 0 || !whole => Verdict::Inconclusive,
+            Named::None if inconclusive > 0 || !whole || !contradictions.is_empty() => {
+                Verdict::Inconclusive
+            }
             Named::None => Verdict::Passed,
         },
     }
@@ -237,11 +305,16 @@ mod tests {
             accuses: verdict == Verdict::Failed,
             exact: false,
             received: 3,
+            repeats: false,
         }
     }
 
     fn deviations(table: &Table) -> (String, Verdict) {
-        let own = qualified(table, None, "frame", &[], true);
+        let profiled = Profiled {
+            profile: None,
+            contradictions: Vec::new(),
+        };
+        let own = qualified(table, profiled, "frame", &[], true);
         (own.deviations, own.verdict)
     }
 
@@ -290,5 +363,76 @@ mod tests {
         ]));
         assert!(own.0.starts_with("deviations: not known"), "{}", own.0);
         assert_eq!(own.1, Verdict::Inconclusive);
+    }
+
+    fn point(value: Result<&str, &str>) -> Point<'static> {
+        Point {
+            drive: "drive 1".to_owned(),
+            name: "event-edges",
+            section: "5.2".to_owned(),
+            value: value.map(str::to_owned).map_err(str::to_owned),
+        }
+    }
+
+    /// A part that has shown nothing contradicts no other; a contradiction is not settled by a third part.
+    #[test]
+    fn a_value_that_differs_from_part_to_part_is_open() {
+        let agreed = |values: &[Result<&str, &str>]| {
+            let parts = values.iter().map(|own| vec![point(*own)]);
+            let (points, contradictions) = agreed(parts.collect());
+            (points[0].value.clone(), contradictions.len())
+        };
+        let (both, open) = (Ok("both"), Err("not asked"));
+        assert_eq!(agreed(&[open, both]), (Ok("both".to_owned()), 0));
+        assert_eq!(agreed(&[both, open]), (Ok("both".to_owned()), 0));
+        assert_eq!(agreed(&[both, both]), (Ok("both".to_owned()), 0));
+        let (value, contradictions) = agreed(&[both, Ok("rising"), open, both]);
+        let differ = "its values differ from part to part: both, rising";
+        assert_eq!((value, contradictions), (Err(differ.to_owned()), 1));
+    }
+
+    /// Drives that are right by themselves and differ from part to part are not said to be right.
+    #[test]
+    fn parts_that_contradict_each_other_are_never_passed() {
+        let passed = Table(vec![(attempted(Verdict::Passed), true, &["one"])]);
+        let profiled = Profiled {
+            profile: None,
+            contradictions: vec!["drive 1, event-edges: they differ".to_owned()],
+        };
+        let own = qualified(&passed, profiled, "frame", &[], true);
+        let expected = "deviations: not known; the parts of the qualification show drives that differ\n  drive 1, event-edges: they differ\n";
+        assert!(own.deviations.starts_with(expected), "{}", own.deviations);
+        assert_eq!(own.verdict, Verdict::Inconclusive);
+    }
+
+    /// A part of wrong drives and a part of right ones: no deviation explains both.
+    #[test]
+    fn no_deviation_explains_a_right_and_a_wrong_drive() {
+        let (passed, failed) = (attempted(Verdict::Passed), attempted(Verdict::Failed));
+        let own = deviations(&Table(vec![(passed, true, &[]), (failed, false, &["one"])]));
+        let expected =
+            "deviations: the drives differ from the model, and no single known deviation";
+        assert!(own.0.starts_with(expected), "{}", own.0);
+        assert_eq!(own.1, Verdict::Failed);
+    }
+
+    /// What a second part has played again is judged, and counted once; another verdict is counted.
+    #[test]
+    fn what_parts_repeat_is_counted_once() {
+        let of = |own: &(&str, Verdict)| (own.0.to_owned(), own.1);
+        let (passed, failed) = (("state", Verdict::Passed), ("state", Verdict::Failed));
+        let own = repeats(&[vec![passed, passed], vec![passed, failed]], of);
+        assert_eq!(own, [false, false, true, false]);
+        let again = Attempted {
+            repeats: true,
+            ..attempted(Verdict::Passed)
+        };
+        let both = Table(vec![
+            (attempted(Verdict::Passed), true, &[]),
+            (again, true, &[]),
+        ]);
+        let own = deviations(&both);
+        let counts = "compared: 1 of 1 attempt passed, 0 failed, 0 inconclusive; 3 frames received";
+        assert!(own.0.contains(counts), "{}", own.0);
     }
 }

@@ -9,6 +9,7 @@ mod evidence;
 mod explore;
 mod inverters_on_rig;
 mod merge;
+mod merge_qualified;
 mod named;
 mod on_can;
 mod on_can_qualify;

@@ -1,4 +1,4 @@
-//! Campaigns, fuzz runs and qualifications that are spread over machines.
+//! Campaigns and fuzz runs that are spread over machines.
 
 use crate::program::{Desk, ended, said};
 use serde_json::Value;
@@ -254,40 +254,5 @@ fn a_partition_of_other_commands_is_m_of_n() {
         &desk.run(&["campaign", "--partition", "slice:1/3"]),
         2,
         "--output",
-    );
-}
-
-/// A part of a qualification stands for itself: it is evidence, and is not merged.
-#[test]
-#[ignore = "takes half a minute; .ci/nightly runs it"]
-fn a_part_of_a_qualification_stands_for_itself() {
-    let desk = desk();
-    let scenarios = ["9.2-bad-sync-bytes", "10.1-read-byte"];
-    let own = [
-        "qualify",
-        "--rig",
-        "sim:1",
-        "--evidence",
-        "part",
-        "--partition",
-        "slice:1/2",
-    ];
-    let output = desk.run(&[&own[..], &scenarios].concat());
-    assert!(
-        matches!(output.status.code(), Some(0 | 5)),
-        "{}",
-        said(&output)
-    );
-    let played = said(&output);
-    assert!(
-        played.contains("9.2-bad-sync-bytes") && !played.contains("10.1-read-byte "),
-        "{played}"
-    );
-    let verified = desk.run(&["verify", "part"]);
-    ended(&verified, 0, "0 things wrong");
-    ended(
-        &merge(&desk, &["part"], "out"),
-        2,
-        "each part of a qualification stands for itself",
     );
 }

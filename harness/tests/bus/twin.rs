@@ -140,7 +140,12 @@ fn probes_tell_properties() {
             let value = hypothesis.name.clone();
             let header = hypothesis.header.clone();
             let answer = answered(3, &probe, EXACT, &header);
-            let settled = Answer::Settled { value, header };
+            let span = None;
+            let settled = Answer::Settled {
+                value,
+                header,
+                span,
+            };
             assert_eq!(answer, settled, "{}", probe.property);
         }
     }
@@ -166,7 +171,12 @@ fn a_time_out_is_told_from_the_wait_behind_it() {
                 lines[1] = all("time-out-wait", wait);
                 let value = format!("{time_out}ms");
                 let header = header(&lines);
-                found == Answer::Settled { value, header }
+                found
+                    == Answer::Settled {
+                        value,
+                        header,
+                        span: None,
+                    }
             };
             let alike = (10..=20).filter(|ms| same(*ms) == same(time_out));
             let sum = time_out + wait;
@@ -234,7 +244,8 @@ fn what_a_drive_leaves_open_is_settled() {
         ("i2t-time", 15_000, 14_990, 15_010),
     ];
     for (property, is, from, to) in times {
-        let Answer::Settled { value, header } = asked(property, &format!("{is}ms"), READY) else {
+        let Answer::Settled { value, header, .. } = asked(property, &format!("{is}ms"), READY)
+        else {
             panic!("{property} = {is} is not settled");
         };
         let (low, high) = value.split_once(" to ").expect("a span");

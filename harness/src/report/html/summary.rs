@@ -45,6 +45,14 @@ pub struct ShownScenario {
     pub(crate) section: Section,
 }
 
+impl ShownScenario {
+    /// Shows it under another name.
+    pub(crate) fn rename(&mut self, name: &str) {
+        name.clone_into(&mut self.row.name);
+        name.clone_into(&mut self.section.heading);
+    }
+}
+
 impl Row {
     pub(crate) fn of(played: &ScenarioView<'_>) -> Self {
         Self {

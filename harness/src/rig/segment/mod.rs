@@ -137,7 +137,10 @@ pub(crate) trait SegmentJudge {
         Vec::new()
     }
 
-    /// What the attempts judged so far come to; see [`SegmentRun::qualified`].
+    /// The attempts behind are those of another part of a qualification: nothing is known of its drives.
+    fn begin_part(&mut self);
+
+    /// What the attempts of all parts judged so far come to; see [`SegmentRun::qualified`].
     fn qualified(&mut self, _began: &str, _whole: bool) -> Option<Qualified> {
         None
     }

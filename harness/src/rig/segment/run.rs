@@ -64,8 +64,8 @@ pub(crate) trait PortPlayer: Sized {
         Vec::new()
     }
 
-    /// What the attempts so far come to; see [`SegmentRun::qualified`].
-    fn qualified(&self, _rig: &Rig, _began: &str, _whole: bool) -> Option<Qualified> {
+    /// What the attempts of these players come to, one for each part of a qualification; see [`SegmentRun::qualified`].
+    fn qualified(_parts: &[&Self], _rig: &Rig, _began: &str, _whole: bool) -> Option<Qualified> {
         None
     }
 }
@@ -245,7 +245,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
     }
 
     fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
-        self.player.qualified(self.session.rig(), began, whole)
+        P::qualified(&[&self.player], self.session.rig(), began, whole)
     }
 
     fn notes(&mut self) -> Vec<String> {
@@ -282,6 +282,8 @@ pub(crate) struct PortJudge<P: PortPlayer> {
     player: P,
     /// The simulated rig, from the first attempt on.
     run: Option<PortRun<P>>,
+    /// What has played the parts before.
+    before: Vec<P>,
 }
 
 impl<P: PortPlayer> PortJudge<P> {
@@ -293,6 +295,7 @@ impl<P: PortPlayer> PortJudge<P> {
             run: None,
             player: P::new(rig, allow_motion, qualifies),
             rig: rig.clone(),
+            before: Vec::new(),
         }
     }
 
@@ -345,11 +348,17 @@ impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
         P::conversations(&self.rig)
     }
 
+    fn begin_part(&mut self) {
+        let fresh = P::new(&self.rig, self.allow_motion, self.qualifies);
+        let player = std::mem::replace(&mut self.player, fresh);
+        let player = self.run.take().map_or(player, |run| run.player);
+        self.before.push(player);
+    }
+
     fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
-        match &mut self.run {
-            Some(run) => run.qualified(began, whole),
-            None => self.player.qualified(&self.rig, began, whole),
-        }
+        let last = self.run.as_ref().map_or(&self.player, |run| &run.player);
+        let parts: Vec<&P> = self.before.iter().chain([last]).collect();
+        P::qualified(&parts, &self.rig, began, whole)
     }
 
     fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {

@@ -3,7 +3,7 @@
 use super::known::{Known, Values, value_of};
 use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
 use super::{RigSlave, slaves};
-use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified};
+use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified, repeats};
 use crate::rig::Rig;
 use crate::rig::segment::Qualified;
 use crate::scenario::source::Source;
@@ -166,20 +166,32 @@ pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
     slaves.iter().flat_map(of_slave).collect()
 }
 
-/// What the attempts of a player come to.
-pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Qualified {
-    let notes = player.notes().iter();
-    let notes: Vec<_> = notes.filter(|own| own.shows_something()).collect();
-    let mut known = player.known().to_vec();
-    for place in 0..known.len() {
-        settle(&mut known, place, &notes);
-    }
-    let points = points(&known, player.limits());
-    let profile = (!known.is_empty()).then(|| profile((rig, began), known.len(), points));
+/// What the attempts of these players come to, one for each part of a qualification.
+pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) -> Qualified {
+    let notes = parts.iter().map(|player| {
+        let notes = player.notes().iter();
+        let notes = notes.filter(|own| own.shows_something());
+        notes.collect::<Vec<_>>()
+    });
+    let notes: Vec<_> = notes.collect();
+    let known = parts.iter().zip(&notes).map(|(player, notes)| {
+        let mut known = player.known().to_vec();
+        for place in 0..known.len() {
+            settle(&mut known, place, notes);
+        }
+        (known, player.limits())
+    });
+    let known: Vec<_> = known.collect();
+    let shown = known.iter().map(|(known, limits)| points(known, limits));
+    let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let named: Vec<_> = named.collect();
+    let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
+    let part = |(place, own): (usize, &Vec<_>)| vec![place; own.len()];
     let notes = AttemptNotes {
-        notes,
+        parts: notes.iter().enumerate().flat_map(part).collect(),
+        notes: notes.concat(),
+        repeats,
         behind: RefCell::default(),
     };
     qualified(&notes, profile, "telegram", &named, whole)
@@ -220,8 +232,12 @@ fn points<'p>(slaves: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
 /// The attempts of a qualification.
 struct AttemptNotes<'n> {
     notes: Vec<&'n AttemptNote>,
-    /// What parameters of the slave at a place hold, if it has the deviation with this name and that changes what they read.
-    behind: RefCell<BTreeMap<(usize, &'static str), Values>>,
+    /// Of which part each of them is.
+    parts: Vec<usize>,
+    /// Which of them repeat what another part has played.
+    repeats: Vec<bool>,
+    /// What parameters of the slave at a place hold in a part, if it has the deviation with this name and that changes what they read.
+    behind: RefCell<BTreeMap<(usize, usize, &'static str), Values>>,
 }
 
 /// A deviation of the slave at a place.
@@ -261,11 +277,13 @@ impl Attempts for AttemptNotes<'_> {
     }
 
     fn attempts(&self) -> Vec<Attempted> {
-        let attempted = self.notes.iter().map(|own| Attempted {
+        let attempted = self.notes.iter().zip(&self.repeats);
+        let attempted = attempted.map(|(own, repeats)| Attempted {
             verdict: own.verdict,
             accuses: own.accuses,
             exact: own.exact,
             received: own.telegrams,
+            repeats: *repeats,
         });
         attempted.collect()
     }
@@ -281,8 +299,8 @@ impl Attempts for AttemptNotes<'_> {
             return true;
         }
         let mut behind = self.behind.borrow_mut();
-        let held = behind.entry((own.place, own.deviation.name));
-        // Parameters are read once, so that every attempt knows the same.
+        let held = behind.entry((self.parts[attempt], own.place, own.deviation.name));
+        // Parameters are read once in a part, so that every attempt knows the same.
         let held = held.or_insert_with(|| note.behind(own.place, own.deviation));
         !held.is_empty() && note.is_explained_by(wrong, held)
     }

@@ -139,7 +139,7 @@ impl PortPlayer for Player {
         conversations(rig)
     }
 
-    fn qualified(&self, rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
-        Some(qualify(self, rig, began, whole))
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
+        Some(qualify(parts, rig, began, whole))
     }
 }

@@ -76,7 +76,6 @@ impl Findings {
 
     /// Notes the outcome of a scenario.
     pub(super) fn note(&mut self, name: &str, played: &Played) {
-        let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
             self.skipped += 1;
             return;
@@ -88,10 +87,40 @@ impl Findings {
             self.bytes += comparison.compared.saturating_sub(own);
             self.own += own;
         }
-        let differs = last.comparisons.iter().any(|own| own.divergence.is_some());
+        match self.why_open(played, last) {
+            None => {
+                self.equal += 1;
+                self.alike.push(last.conversations.clone());
+            }
+            Some(why) => self.note_unequal(name, why, played, last),
+        }
+    }
+
+    /// Notes a conversation that another part has played, and whose bytes or verdict are not those of the first part. It is not counted again.
+    pub(super) fn note_other_part(&mut self, name: &str, played: &Played) {
+        let Some(last) = played.last_played() else {
+            self.open.push(format!("{name}: not played there"));
+            return;
+        };
+        self.note_attempts(name, played);
+        match self.why_open(played, last) {
+            None => self.alike.push(last.conversations.clone()),
+            Some(why) => self.note_unequal(name, why, played, last),
+        }
+    }
+
+    fn note_unequal(&mut self, name: &str, why: &str, played: &Played, last: &Attempt) {
+        let flaky = played.outcome.verdict == Verdict::Flaky;
+        self.unsettled += usize::from(differs(last) || flaky);
+        self.open.push(format!("{name}: {why}"));
+    }
+
+    /// Why a scenario was not compared to its end, or not equal; `None` where it was both.
+    fn why_open(&self, played: &Played, last: &Attempt) -> Option<&'static str> {
+        let differs = differs(last);
         let left_out = last.comparisons.iter().any(|own| own.left_out);
         let whole = last.comparisons.len() == last.conversations.len() && !left_out;
-        let why = match verdict {
+        Some(match played.outcome.verdict {
             Verdict::Skipped => "the drives could not be made ready",
             Verdict::Inconclusive if last.is_silenced() => {
                 "the computer was late or left the line silent before the first byte that differs (ND21 9.9)"
@@ -111,14 +140,8 @@ impl Findings {
             Verdict::Passed | Verdict::Marginal if !whole => {
                 "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)"
             }
-            Verdict::Passed | Verdict::Marginal => {
-                self.equal += 1;
-                self.alike.push(last.conversations.clone());
-                return;
-            }
-        };
-        self.unsettled += usize::from(differs || verdict == Verdict::Flaky);
-        self.open.push(format!("{name}: {why}"));
+            Verdict::Passed | Verdict::Marginal => return None,
+        })
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
@@ -165,10 +188,6 @@ impl Findings {
     /// nothing.
     pub(super) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
         let last = played.last_played().and_then(Attempt::sound)?;
-        let differs = |attempt: &Attempt| {
-            let mut comparisons = attempt.comparisons.iter();
-            comparisons.any(|own| own.divergence.is_some())
-        };
         let found = match (differs(last), self.sighting(last)) {
             (true, Some(sighting)) => Some(sighting.meant),
             (true, None) => Some(Meant::Nobody),
@@ -279,7 +298,7 @@ impl Findings {
         if self.differ() && named.is_none() {
             let _infallible = writeln!(
                 text,
-                "deviations: the drives differ from the model; the run ended before an explanation was looked for: {count}"
+                "deviations: the drives differ from the model; no explanation was looked for, because not everything was played: {count}"
             );
         } else if let Some(named) = named.filter(|_| self.differ()) {
             let (culprit, named) = agreed(self.culprit(), named);
@@ -376,6 +395,12 @@ impl Findings {
             counted(self.probes, "probe")
         )
     }
+}
+
+/// Whether a byte of an attempt differs from the model's.
+fn differs(attempt: &Attempt) -> bool {
+    let mut comparisons = attempt.comparisons.iter();
+    comparisons.any(|own| own.divergence.is_some())
 }
 
 #[cfg(test)]

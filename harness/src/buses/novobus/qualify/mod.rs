@@ -7,6 +7,7 @@ mod eeprom;
 mod exchange;
 mod findings;
 mod hypothesis;
+mod parts;
 mod pinned;
 mod probes;
 mod qualification;

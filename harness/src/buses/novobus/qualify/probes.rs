@@ -66,6 +66,24 @@ pub struct Probe {
     pub of_silent: Option<Entry>,
 }
 
+impl Probe {
+    /// The drive that it asks; `None` where it asks the whole ring.
+    pub(super) const fn drive(&self) -> Option<u8> {
+        match self.asked {
+            Asked::Drive(drive, _) => Some(drive),
+            Asked::Ring => None,
+        }
+    }
+
+    /// The property, and whose.
+    pub(super) fn name(&self) -> String {
+        let of = self
+            .drive()
+            .map_or_else(String::new, |drive| format!(" of drive {drive}"));
+        format!("{}{of}", self.property)
+    }
+}
+
 /// The property that says whether a drive is silent while it tests itself: it is asked before the others of a drive.
 pub(super) const SELF_TEST_BUS: &str = "self-test-bus";
 

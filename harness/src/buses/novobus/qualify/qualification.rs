@@ -7,6 +7,7 @@ use super::delays::{DELAYS, held_back};
 use super::diagnose::{deviating_masters, name};
 use super::eeprom::{dumps, marches};
 use super::findings::Findings;
+use super::parts::{Asking, Parts};
 use super::pinned::questions;
 use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
 use super::settle::{Answer, answer, silence};
@@ -43,6 +44,19 @@ pub(crate) trait Bench {
 
     /// Whether nothing more may be played.
     fn over(&mut self) -> bool;
+
+    /// The other parts of a qualification that was split: each has played the same, on drives of its own.
+    fn others(&mut self) -> &mut [Self]
+    where
+        Self: Sized,
+    {
+        &mut []
+    }
+
+    /// Which part it is, where there are several.
+    fn part(&self) -> String {
+        String::new()
+    }
 
     /// A fresh twin of the drives, set up as the rig's file and this header say.
     ///
@@ -111,6 +125,9 @@ pub(crate) struct Qualification {
     ill: bool,
     /// The drives that are silent while they test themselves (11.8).
     silent: BTreeSet<u8>,
+    parts: Parts,
+    /// Whether a part is missing, or has not been played to its end.
+    lacks_a_part: bool,
 }
 
 /// The value of [`SELF_TEST_BUS`] of such a drive.
@@ -126,6 +143,8 @@ impl Qualification {
             assumed: Header::default(),
             ill: false,
             silent: BTreeSet::new(),
+            parts: Parts::default(),
+            lacks_a_part: false,
             facts,
         }
     }
@@ -135,6 +154,14 @@ impl Qualification {
         self.findings.note(name, played);
         self.ill = played.shows_an_ill_rig();
         self.assume(played);
+    }
+
+    /// Notes what parts of a qualification have not played, in sentences. How one of them ended is not held against the others.
+    pub(crate) fn note_missing(&mut self, missing: &[String]) {
+        let missing = missing.iter().cloned();
+        missing.for_each(|own| self.findings.note_open(own));
+        self.lacks_a_part = true;
+        self.ill = false;
     }
 
     /// Takes over the choices with which a scenario was compared, for what is asked of the ring later.
@@ -161,18 +188,39 @@ impl Qualification {
             let deviations = self.deviations(bench, Some(&Header::default()));
             return Ok(self.qualified(None, deviations));
         }
+        if !bench.others().is_empty() {
+            self.parts.keep();
+        }
         let mut ended = self.converse(bench)?;
+        self.on_others(bench, |own, other| own.converse(other).map(|_ended| ()))?;
         let (profile, settled) = self.profile(bench)?;
         if !ended {
             self.ask_ring(bench)?;
             self.exchange_roles(bench)?;
         }
         ended |= bench.over();
-        if ended {
+        if ended && !self.lacks_a_part {
             self.findings.note_open(ENDED.to_owned());
         }
+        ended |= self.lacks_a_part;
         let deviations = self.deviations(bench, (!ended).then_some(&settled));
         Ok(self.qualified(Some(profile), deviations))
+    }
+
+    /// Does something with what each of the other parts has played.
+    fn on_others<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        mut act: impl FnMut(&mut Self, &mut B) -> Result<(), B::Stop>,
+    ) -> Result<(), B::Stop> {
+        for other in bench.others() {
+            self.parts.follow(Some(other.part()));
+            if !other.over() {
+                act(self, other)?;
+            }
+        }
+        self.parts.follow(None);
+        Ok(())
     }
 
     fn qualified(&self, profile: Option<Profile>, deviations: String) -> Qualified {
@@ -216,7 +264,8 @@ impl Qualification {
         let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
         let held = last.map(|own| held_back(self.drives, self.facts.byte_time, own));
         for own in held.into_iter().flatten() {
-            self.findings.note_held_back(own.to_string());
+            let what = self.parts.named(&own.to_string());
+            self.findings.note_held_back(what);
         }
     }
 
@@ -228,7 +277,15 @@ impl Qualification {
     ) -> Result<Option<Played>, B::Stop> {
         let played = bench.play(entry)?;
         bench.show(entry, &played)?;
-        self.findings.note(entry.short_name(), &played);
+        let name = entry.short_name();
+        match (self.parts.repeats(name, &played), &self.parts.other) {
+            (true, _) => {}
+            (false, None) => self.findings.note(name, &played),
+            (false, Some(_)) => {
+                let name = self.parts.named(name);
+                self.findings.note_other_part(&name, &played);
+            }
+        }
         self.assume(&played);
         Ok((!bench.over()).then_some(played))
     }
@@ -348,12 +405,10 @@ impl Qualification {
             }
             let section = format!("nd21 {}", probe.section);
             let property = probe.property;
-            let whose = match probe.asked {
-                Asked::Drive(drive, _) => format!("drive {drive}: "),
-                Asked::Ring => String::new(),
-            };
-            match self.ask(bench, &probe, &known)? {
-                Asking::Settled { value, header } => {
+            let whose = probe.drive();
+            let whose = whose.map_or_else(String::new, |drive| format!("drive {drive}: "));
+            match self.ask_all(bench, &probe, &known)? {
+                Asking::Settled { value, header, .. } => {
                     bench.tell(&format!("{property} ({section}): {whose}{value}\n"))?;
                     match probe.asked {
                         Asked::Ring => known = known.and(&header),
@@ -366,13 +421,35 @@ impl Qualification {
                     }
                     profile.settle(property, &section, &format!("{whose}{value}"), &header);
                 }
-                Asking::Open(why) => {
+                Asking::NotDone(why) | Asking::Open(why) => {
                     bench.tell(&format!("{property} ({section}): {whose}{why}\n"))?;
                     profile.leave_open(property, &format!("{whose}{why}"));
                 }
             }
         }
         Ok((profile, known))
+    }
+
+    /// Asks a probe in every part.
+    fn ask_all<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        probe: &Probe,
+        known: &Header,
+    ) -> Result<Asking, B::Stop> {
+        let mut all = vec![self.ask(bench, probe, known)?];
+        self.on_others(bench, |own, other| {
+            all.push(own.ask(other, probe, known)?);
+            Ok(())
+        })?;
+        let agreed = Asking::agreed(probe.property, probe.drive(), all);
+        Ok(agreed.unwrap_or_else(|values| {
+            let differ = format!("its values differ from part to part: {values}");
+            let name = probe.name();
+            self.findings
+                .note_open(format!("the probe of {name}: {differ}"));
+            Asking::Open(differ)
+        }))
     }
 
     /// Asks a probe, and notes that it was asked.
@@ -386,26 +463,33 @@ impl Qualification {
             Ok(answer) => answer,
             Err(why) => return Ok(Asking::Open(format!("not asked: {why}"))),
         };
-        self.findings.note_probe();
-        Ok(Asking::Open(match answer {
-            Answer::Settled { value, header } => return Ok(Asking::Settled { value, header }),
-            Answer::NoDifference => {
-                "every value explains the bytes received: the drive was not in a state that shows the property".to_owned()
-            }
-            Answer::NotDone(time) => {
-                format!("longer than {time}: not finished when asked for the last time")
-            }
+        if self.parts.other.is_none() {
+            self.findings.note_probe();
+        }
+        Ok(match answer {
+            Answer::Settled {
+                value,
+                header,
+                span,
+            } => Asking::Settled {
+                value,
+                header,
+                span,
+            },
+            Answer::NoDifference => Asking::Open(
+                "every value explains the bytes received: the drive was not in a state that shows the property".to_owned(),
+            ),
+            Answer::NotDone(time) => Asking::NotDone(format!(
+                "longer than {time}: not finished when asked for the last time"
+            )),
             Answer::Unexplained => {
                 let why = "no value explains the bytes received";
-                let of = match probe.asked {
-                    Asked::Drive(drive, _) => format!(" of drive {drive}"),
-                    Asked::Ring => String::new(),
-                };
+                let name = self.parts.named(&probe.name());
                 self.findings
-                    .note_open(format!("the probe of {}{of}: {why}", probe.property));
-                why.to_owned()
+                    .note_open(format!("the probe of {name}: {why}"));
+                Asking::Open(why.to_owned())
             }
-        }))
+        })
     }
 
     /// Plays a probe, and again where no value explains it. The inner error says why it cannot be asked.
@@ -449,6 +533,9 @@ impl Qualification {
                 conversations.push(attempt.conversations.clone());
                 last.push((entry.short_name(), played));
             }
+            if self.parts.repeats_probe(&conversations) {
+                return Ok(Ok(Answer::NoDifference));
+            }
             let twin = |header: &Header| bench.twin(&known.and(header));
             match answer(probe, self.drives, &conversations, exactness, &twin) {
                 Ok(Answer::Unexplained) => {}
@@ -489,12 +576,4 @@ impl Qualification {
         let answer = last.map(|own| silence(property, place, own, self.facts.byte_time));
         Ok(Ok(answer.unwrap_or(Answer::Unexplained)))
     }
-}
-
-/// What came of asking a probe.
-enum Asking {
-    /// A value, and the header that makes it.
-    Settled { value: String, header: Header },
-    /// None, and why.
-    Open(String),
 }

@@ -26,6 +26,8 @@ pub enum Answer {
         value: String,
         /// What makes a simulated drive behave so.
         header: Header,
+        /// Of a time: the shortest and the longest that explain every byte, in tenths of a millisecond.
+        span: Option<(u64, u64)>,
     },
     /// Every value explains every byte.
     NoDifference,
@@ -63,6 +65,7 @@ pub fn answer<E>(
                 return Ok(Answer::Settled {
                     value: hypothesis.name.clone(),
                     header: hypothesis.header.clone(),
+                    span: None,
                 });
             }
         }
@@ -108,10 +111,7 @@ fn of_the_drive<E>(
             Bracket::Between(from, to) if to == tenths(longest) => {
                 Answer::NotDone(written(from).to_string())
             }
-            Bracket::Between(from, to) => Answer::Settled {
-                value: format!("{} to {}", written(from), written(to)),
-                header: header(time(from.midpoint(to))),
-            },
+            Bracket::Between(from, to) => between(property, drive, from, to),
             Bracket::Anything => Answer::NoDifference,
             Bracket::Nothing => Answer::Unexplained,
         });
@@ -128,9 +128,20 @@ fn of_the_drive<E>(
         [what] => Answer::Settled {
             value: what.value(),
             header: header(what.clone()),
+            span: None,
         },
         _ => Answer::NoDifference,
     })
+}
+
+/// A time of a drive, in tenths of a millisecond. A simulated drive gets the middle.
+pub(super) fn between(property: &str, drive: u8, from: u64, to: u64) -> Answer {
+    let time = SetupKind::time(property, written(from.midpoint(to)));
+    Answer::Settled {
+        value: format!("{} to {}", written(from), written(to)),
+        header: Setup::new(DriveRange::one(0, drive), time).into(),
+        span: Some((from, to)),
+    }
 }
 
 /// How long a drive of a ring of `drives` was silent behind its reset (ND21 11.8): between the last SYNCO that was lost and the first that came
@@ -156,14 +167,7 @@ pub(super) fn silence(
     let since = |place: usize| tenths(times[place].since(began));
     let last = reset + lost;
     match roles.get(last + 1) {
-        Some(Role::Idle) => {
-            let (from, to) = (since(last), since(last + 1));
-            let time = SetupKind::time(property, written(from.midpoint(to)));
-            Answer::Settled {
-                value: format!("{} to {}", written(from), written(to)),
-                header: Setup::new(DriveRange::one(0, drive), time).into(),
-            }
-        }
+        Some(Role::Idle) => between(property, drive, since(last), since(last + 1)),
         _ => Answer::NotDone(written(since(last.min(roles.len() - 1))).to_string()),
     }
 }

@@ -3,7 +3,7 @@
 use super::Axis;
 use super::known::Known;
 use super::player::{CONVERSATION, DriveIs, Note, Player};
-use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified};
+use crate::qualify::segment::{Attempted, Attempts, Point, profile, qualified, repeats};
 use crate::rig::Rig;
 use crate::rig::segment::Qualified;
 use crate::scenario::source::Source;
@@ -113,22 +113,28 @@ pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
     axes.iter().flat_map(of_drive).collect()
 }
 
-/// What the attempts of a player come to.
-pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Qualified {
-    let notes: Vec<_> = player
-        .notes()
-        .iter()
-        .filter(|own| own.shows_something())
-        .collect();
-    let mut known = player.known().to_vec();
-    for place in 0..known.len() {
-        settle(&mut known, place, &notes);
-    }
-    let points = points(&known, player.limits());
-    let profile = (!known.is_empty()).then(|| profile((rig, began), known.len(), points));
+/// What the attempts of these players come to, one for each part of a qualification.
+pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) -> Qualified {
+    let notes = parts.iter().map(|player| {
+        let notes = player.notes().iter();
+        let notes = notes.filter(|own| own.shows_something());
+        notes.collect::<Vec<_>>()
+    });
+    let notes: Vec<_> = notes.collect();
+    let known = parts.iter().zip(&notes).map(|(player, notes)| {
+        let mut known = player.known().to_vec();
+        for place in 0..known.len() {
+            settle(&mut known, place, notes);
+        }
+        (known, player.limits())
+    });
+    let known: Vec<_> = known.collect();
+    let shown = known.iter().map(|(known, limits)| points(known, limits));
+    let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
+    let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
     qualified(
-        &Notes(notes),
+        &Notes(notes.concat(), repeats),
         profile,
         "frame",
         &named.collect::<Vec<_>>(),
@@ -173,8 +179,8 @@ fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
     })
 }
 
-/// The attempts of a qualification.
-struct Notes<'n>(Vec<&'n Note>);
+/// The attempts of a qualification, and which of them repeat what another part has played.
+struct Notes<'n>(Vec<&'n Note>, Vec<bool>);
 
 /// A deviation of the drive at a place.
 struct Deviates {
@@ -209,11 +215,12 @@ impl Attempts for Notes<'_> {
     }
 
     fn attempts(&self) -> Vec<Attempted> {
-        let attempted = self.0.iter().map(|own| Attempted {
+        let attempted = self.0.iter().zip(&self.1).map(|(own, repeats)| Attempted {
             verdict: own.verdict,
             accuses: own.accuses,
             exact: own.exact,
             received: own.frames,
+            repeats: *repeats,
         });
         attempted.collect()
     }

@@ -139,8 +139,8 @@ impl PortPlayer for Player {
         conversations(&rig.port().map(axes).unwrap_or_default())
     }
 
-    fn qualified(&self, rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
-        Some(qualify(self, rig, began, whole))
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
+        Some(qualify(parts, rig, began, whole))
     }
 }
 

@@ -10,6 +10,7 @@ use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swa
 use crate::library::Entry;
 use crate::qualify::{Bench, Qualification, QualificationFacts};
 use crate::rig::Played;
+use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
 
@@ -17,6 +18,18 @@ use crate::scenario::verdict::Verdict;
 struct Watched<'r, 's> {
     run: &'r mut Run<'s>,
     failed: Vec<String>,
+    /// Those of the other parts.
+    others: Vec<Self>,
+}
+
+impl<'r, 's> Watched<'r, 's> {
+    const fn new(run: &'r mut Run<'s>) -> Self {
+        Self {
+            run,
+            failed: Vec::new(),
+            others: Vec::new(),
+        }
+    }
 }
 
 impl Bench for Watched<'_, '_> {
@@ -35,6 +48,14 @@ impl Bench for Watched<'_, '_> {
 
     fn over(&mut self) -> bool {
         false
+    }
+
+    fn others(&mut self) -> &mut [Self] {
+        &mut self.others
+    }
+
+    fn part(&self) -> String {
+        "slice:2/2".to_owned()
     }
 
     fn twin(&self, header: &Header) -> Result<Twin, Problems> {
@@ -58,10 +79,7 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
     let mut run = Run::new(&mut session).expect("a run");
     run.repeat();
     let facts = QualificationFacts::of(&mut run, String::new(), false);
-    let mut watched = Watched {
-        run: &mut run,
-        failed: Vec::new(),
-    };
+    let mut watched = Watched::new(&mut run);
     let mut said = match Qualification::new(facts).settle(&mut watched) {
         Ok(found) => {
             let named = found.deviations.lines();
@@ -174,6 +192,53 @@ fn by_hand() {
         _ => found(drives, (seed, one_in), cases),
     });
     assert_eq!(all.collect::<Vec<_>>(), NOTHING);
+}
+
+/// What two parts of a qualification come to whose drives are set up like this, on a computer that is never late.
+fn of_parts(drives: [&str; 2]) -> Qualified {
+    let rig = rig("");
+    let sessions = drives.map(|own| session(&rig, own, Stalls::new(1, 0)));
+    let [mut one, mut other] = sessions.map(|own| own.expect("a ring that opens"));
+    let mut runs = [&mut one, &mut other].map(|own| Run::new(own).expect("a run"));
+    runs.iter_mut().for_each(Run::repeat);
+    let [one, other] = &mut runs;
+    let facts = QualificationFacts::of(one, String::new(), false);
+    let mut watched = Watched::new(one);
+    watched.others.push(Watched::new(other));
+    let qualified = Qualification::new(facts).settle(&mut watched);
+    qualified.expect("rings that are played to the end")
+}
+
+/// Parts whose drives are not the same: what one of them shows is never taken back by the other.
+#[test]
+fn parts_that_contradict_each_other_are_never_passed() {
+    let wrong = "drive 1 deviates read-long-reversed";
+    for drives in [["", wrong], [wrong, ""]] {
+        let found = of_parts(drives);
+        let text = &found.deviations;
+        assert_eq!(found.verdict, Verdict::Failed, "{text}");
+        assert!(!text.contains("deviations: none"), "{text}");
+    }
+    let other = "drive 0..last property read-long = as-printed";
+    let found = of_parts(["", other]);
+    let text = &found.deviations;
+    assert_eq!(found.verdict, Verdict::Inconclusive, "{text}");
+    assert!(text.starts_with("deviations: not known"), "{text}");
+    let differ = "the probe of read-long: its values differ from part to part: ";
+    assert!(text.contains(differ), "{text}");
+    let profile = found.profile.expect("a profile");
+    assert!(
+        profile.contains("its values differ from part to part"),
+        "{profile}"
+    );
+}
+
+#[test]
+fn parts_of_like_drives_agree() {
+    let found = of_parts(["", ""]);
+    let text = &found.deviations;
+    assert_eq!(found.verdict, Verdict::Passed, "{text}");
+    assert!(text.starts_with("deviations: none;"), "{text}");
 }
 
 #[test]
