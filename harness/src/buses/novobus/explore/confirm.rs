@@ -70,7 +70,7 @@ impl Confirmation<'_> {
     }
 
     /// Checks whether the drive that the telegram addresses is to blame. If another drive on the byte's way is to blame, the same
-    /// conversation with the drives' roles exchanged differs at that byte too. An address byte is another one then: it blames nobody.
+    /// conversation with the drives' roles exchanged differs at that byte too. An address byte is another one then: it blames no drive.
     fn blame(
         &mut self,
         finding: &mut Finding,
