@@ -93,7 +93,14 @@ impl Bench {
         ended(&merged, code, words);
         assert_eq!(self.deviations("merged"), self.deviations("whole"));
         assert_eq!(self.profile("merged"), self.profile("whole"));
-        let report = |folder| self.text(folder, "report.txt");
+        // What a wrong drive does in a scenario depends on what was played before it, of which a part plays less.
+        let report = |folder| {
+            let text = self.text(folder, "report.txt");
+            let lines = text
+                .lines()
+                .filter(|line| code == 0 || !line.starts_with(' '));
+            lines.map(|line| format!("{line}\n")).collect::<String>()
+        };
         assert_eq!(report("merged"), report("whole"));
         ended(&self.desk.run(&["verify", "merged"]), 0, "0 things wrong");
     }
@@ -141,6 +148,7 @@ impl Bench {
 }
 
 #[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn right_drives_of_a_ring_have_no_deviations() {
     let bench = Bench::ring("");
     bench.equals_one_machine(0, "deviations: none; every byte is");
@@ -149,6 +157,7 @@ fn right_drives_of_a_ring_have_no_deviations() {
 
 /// ND21 10.1: the deviation shows in the second part alone, which the first part does not know.
 #[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn a_deviation_that_one_part_shows_is_named() {
     let bench = Bench::ring("\"drive 1 deviates last-word-refused\"");
     bench.equals_one_machine(1, "deviation: drive 1: last-word-refused (ND21 10.1)");
@@ -177,14 +186,17 @@ fn parts_on_frames_equal_one_machine() {
     bench.is_open_without_a_part();
 }
 
+/// The first part alone does not know the deviation.
 #[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
 fn parts_on_frames_name_the_deviation_of_one_machine() {
     let wrong = Bench::frames("\"drive 1 deviates interval-one-more\"");
     wrong.equals_one_machine(1, "deviation: drive 1: interval-one-more (UNITEK 5.2)");
+    let first = wrong.text("1", "deviations.txt");
+    assert!(first.starts_with("deviations: none;"), "{first}");
 }
 
 #[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn parts_on_octets_equal_one_machine() {
     let bench = Bench::octets("");
     bench.equals_one_machine(0, "deviations: none; everything received is");
@@ -192,7 +204,7 @@ fn parts_on_octets_equal_one_machine() {
 }
 
 #[test]
-#[ignore = "takes a minute; .ci/nightly runs it"]
+#[ignore = "takes two minutes; .ci/nightly runs it"]
 fn parts_on_octets_name_the_deviation_of_one_machine() {
     let wrong = Bench::octets("\"slave 8 deviates any-ident\"");
     wrong.equals_one_machine(1, "deviation: slave 8: any-ident (NORDAC EN 2)");
