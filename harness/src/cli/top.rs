@@ -255,7 +255,11 @@ impl<'r> Work<'r> {
                 let trouble = Trouble::Interrupted;
                 return Err(Failure::Bus(exit_of_trouble(&trouble), trouble.to_string()));
             }
-            let idle = self.idle(if wanted { next } else { Instant::NEVER })?;
+            let idle = match wanted {
+                true => self.idle(next)?,
+                false if self.reader.is_simulated() => self.stand_still(),
+                false => self.idle(Instant::NEVER)?,
+            };
             match view.wait(idle) {
                 None => {}
                 Some(Asked::Quit) => return Ok(Exit::Passed),
@@ -273,6 +277,14 @@ impl<'r> Work<'r> {
                 }
             }
         }
+    }
+
+    /// Virtual time does not pass while no page is open. Returns how long to wait in real time.
+    fn stand_still(&mut self) -> Duration {
+        let passed = Duration::from_nanos(self.reader.now().since(self.start).as_nanos());
+        let now = Moment::now();
+        self.begun = now.checked_sub(passed).unwrap_or(now);
+        KEYS
     }
 
     /// Runs the bus until the next drives are due, and returns how long to wait in real time: virtual time must not run ahead of the
