@@ -437,4 +437,25 @@ mod tests {
         assert!(!other.is_like(&read("value").expect("one")));
         assert!(read("anything").is_err());
     }
+
+    /// ND21 9.3: every drive on its way changes an address byte, so that the drive that is addressed need not be wrong.
+    #[test]
+    fn an_address_byte_is_meant_for_no_drive_alone() {
+        let drive = Some(0);
+        let meant = |role| {
+            let found = twin::Divergence {
+                ring: 0,
+                byte: 2,
+                what: Symptom::Value,
+                expected: None,
+                received: None,
+                role,
+                step: None,
+                drive: None,
+            };
+            Difference::from(&found).meant
+        };
+        assert_eq!(meant(Role::Address { drive }), None);
+        assert_eq!(meant(Role::ProcessData { drive }), drive);
+    }
 }
