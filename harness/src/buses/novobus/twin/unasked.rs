@@ -122,6 +122,14 @@ impl Sent<'_> {
         first
     }
 
+    /// The place behind the bytes that have come before the next byte of the master's, from an unasked one on.
+    fn end_of_race(&self, heard: &[Heard], first: usize) -> usize {
+        let (from, _) = heard[first];
+        let next = self.all.partition_point(|start| *start <= from);
+        let before = |(at, _): &Heard| self.all.get(next).is_none_or(|next| at < next);
+        first + heard[first..].partition_point(before)
+    }
+
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
     /// `None` where the model sends none: no drive may then (ND21 9.9).
     pub(crate) fn judge(
@@ -131,37 +139,35 @@ impl Sent<'_> {
         tolerance: Span,
     ) -> Option<Race> {
         let expected = &answer.bytes[..];
-        let model = answer.unasked;
-        let (due, _) = expected[model?];
+        let model = answer.unasked?;
+        let (due, _) = expected[model];
         let ring = self.first(received, due - tolerance);
-        let first = match (model, ring) {
-            (Some(model), Some(ring)) => model.min(ring),
-            (one, other) => one.or(other)?,
-        };
-        let in_both = model == ring;
+        let first = ring.map_or(model, |ring| ring.min(model));
+        let in_both = ring == Some(model);
         let here = match (expected.get(first), received.get(first)) {
             (Some(_), None) => Some(Symptom::Missing),
             (None, Some(_)) => Some(Symptom::Surplus),
             // A byte of the master's came first in one of them. Close together, that is chance.
             (Some((due, _)), Some((at, _))) if !in_both && apart(*due, *at) > tolerance => {
-                match model == Some(first) {
+                match model == first {
                     true => Some(Symptom::Missing),
                     false => Some(Symptom::Surplus),
                 }
             }
             _ => None,
         };
+        // The drives of a model that deviates may spell out other numbers than those of the ring.
+        let mut spelled = [false; 256];
+        spelled[..usize::from(size.drives())].fill(true);
+        for (_, byte) in &expected[model..self.end_of_race(expected, model)] {
+            spelled[usize::from(byte.byte)] |= byte.error.is_none();
+        }
         let foreign = || {
-            let (from, _) = received.get(first).filter(|_| ring == Some(first))?;
-            let until = self
-                .all
-                .get(self.all.partition_point(|start| start <= from));
-            let foreign = |(at, byte): &Heard| {
-                let before = until.is_none_or(|until| at < until);
-                before && (byte.error.is_some() || byte.byte >= size.drives())
-            };
-            let offset = received[first..].iter().position(foreign)?;
-            Some((first + offset, Symptom::Value))
+            let first = ring.filter(|ring| *ring == first)?;
+            let race = &received[first..self.end_of_race(received, first)];
+            let foreign =
+                |(_, byte): &Heard| byte.error.is_some() || !spelled[usize::from(byte.byte)];
+            Some((first + race.iter().position(foreign)?, Symptom::Value))
         };
         Some(Race {
             first,
@@ -215,5 +221,45 @@ mod tests {
         };
         assert!(!excused(received.len() - 1));
         assert!(excused(0), "a zero that is not expected stands before it");
+    }
+
+    /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
+    #[test]
+    fn a_model_that_deviates_may_spell_out_more_drives_than_there_are() {
+        let heard = |bytes: &[u8]| -> Vec<Heard> {
+            let timed = (1..).zip(bytes);
+            timed
+                .map(|(place, byte)| {
+                    (
+                        Instant::START + Span::from_millis(place),
+                        Received::good(*byte),
+                    )
+                })
+                .collect()
+        };
+        let race = |model: &[u8], ring: &[u8]| {
+            let sent = Sent {
+                answered: &[],
+                all: &[],
+                way: Span::ZERO,
+            };
+            let answer = TwinBytes {
+                bytes: heard(model),
+                unasked: Some(0),
+            };
+            let size = RingSize::new(3).expect("a size");
+            let race = sent.judge(size, (&answer, &heard(ring)), Span::from_millis(20));
+            race.expect("a race").fault
+        };
+        assert_eq!(race(&[0, 0, 1, 2], &[0, 1, 1, 2]), None);
+        assert_eq!(
+            race(&[0, 0, 1, 2], &[0, 1, 3, 3]),
+            Some((2, Symptom::Value))
+        );
+        assert_eq!(race(&[0, 0, 1, 3], &[0, 1, 3, 3]), None);
+        assert_eq!(
+            race(&[0, 0, 1, 3], &[0, 1, 3, 4]),
+            Some((3, Symptom::Value))
+        );
     }
 }
