@@ -57,6 +57,9 @@ pub struct Sighting {
     sent: Sent,
     /// How many bytes are sent until the difference is seen and the telegram is complete.
     count: usize,
+    /// The same with an address byte in every telegram, where the one of the byte has a short address: another drive may take a short
+    /// address for its own (9.2).
+    long: Option<(Sent, usize)>,
 }
 
 impl Sighting {
@@ -104,6 +107,13 @@ impl Sighting {
         let addressed = (first..=index).filter_map(|at| sent.addressed(at));
         let addressed = addressed.collect();
         let count = end.max(index + 1).min(sent.bytes.len());
+        let long = is_short
+            .then(|| sent.with_addresses(count, drives))
+            .flatten();
+        let meant = match long {
+            None if is_short => Meant::Nobody,
+            _ => meant,
+        };
         let (sent, count) = match meant {
             Meant::Own(drive) => sent.shortened(count, drive),
             _ => (sent, count),
@@ -121,6 +131,7 @@ impl Sighting {
             is_short,
             count,
             sent,
+            long,
         })
     }
 
@@ -140,7 +151,7 @@ impl Sighting {
 pub struct Trial {
     /// The drive that the byte belonged to in the attempt.
     pub meant: Meant,
-    /// The offset of the addresses and the result, one for each other drive.
+    /// The offset of the addresses and the result, one for each other drive. An offset of 0 is the attempt without short addresses.
     pub steps: Vec<(u8, Option<Meant>)>,
 }
 
@@ -172,8 +183,16 @@ pub fn exchange<E>(
             continue;
         }
         let mut steps = Vec::new();
-        for step in 1..drives.min(MOST_EXCHANGED) {
-            let text = sighting.sent.exchanged(sighting.count, drives, step);
+        let (sent, count, offsets) = match &sighting.long {
+            Some((long, count)) => (long, *count, 0..drives.min(MOST_EXCHANGED)),
+            None => (
+                &sighting.sent,
+                sighting.count,
+                1..drives.min(MOST_EXCHANGED),
+            ),
+        };
+        for step in offsets.clone() {
+            let text = sent.exchanged(count, drives, step);
             let Some(text) = text else { break };
             let source = Source {
                 name: format!("{}{name}-by-{step}", super::EXCHANGED),
@@ -185,7 +204,7 @@ pub fn exchange<E>(
             let Some(found) = ask(&entry)? else { break };
             steps.push((step, found));
         }
-        if !steps.is_empty() && steps.len() + 1 == usize::from(drives.min(MOST_EXCHANGED)) {
+        if !steps.is_empty() && steps.len() == offsets.len() {
             let meant = sighting.meant;
             trials.push(Trial { meant, steps });
         }
@@ -241,7 +260,10 @@ pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial], pinned: &[Pinned]) 
             .filter(|trial| trial.meant == Meant::Own(first));
         let alone = |trial: &Trial| {
             let mut steps = trial.steps.iter();
-            steps.all(|(_, found)| found.is_none_or(|found| found == Meant::Own(first)))
+            steps.all(|(step, found)| match found {
+                None => *step != 0,
+                Some(found) => *found == Meant::Own(first),
+            })
         };
         let tried = own_trials.clone().next().is_some();
         let blamed = owners.len() == 1 && tried && own_trials.all(alone);
@@ -368,10 +390,14 @@ impl Sent {
             return (Meant::Nobody, index + 1);
         };
         let end = start + header.telegram_length();
-        let drive = match (header.addressing(), self.roles.get(start + 1)) {
-            (Addressing::AddressFollows, Some(Role::Address { drive: Some(drive) })) => *drive,
-            // The telegrams before decide which drive a short address means.
-            _ => return (Meant::Nobody, end),
+        let first = match header.addressing() {
+            Addressing::AddressFollows => start + 2,
+            Addressing::SameDrive => start + 1,
+            // Which drive is the next one depends on two drives.
+            Addressing::NextDrive => return (Meant::Nobody, end),
+        };
+        let Some(drive) = self.roles.get(start + 1).and_then(|role| role.drive()) else {
+            return (Meant::Nobody, end);
         };
         let whole = self.bytes[..=index]
             .iter()
@@ -379,9 +405,11 @@ impl Sent {
             .all(|(_, whole)| *whole);
         let idle = |own: &(u8, bool)| own.0 == SYNCO;
         let meant = match index {
-            _ if !whole || index < start + 2 => Meant::Nobody,
+            _ if !whole || index < first => Meant::Nobody,
             _ if index < end => Meant::Own(drive),
-            _ if self.bytes[end..=index].iter().all(idle) => Meant::Behind(drive),
+            _ if first == start + 2 && self.bytes[end..=index].iter().all(idle) => {
+                Meant::Behind(drive)
+            }
             _ => Meant::Nobody,
         };
         (meant, end)
@@ -421,6 +449,10 @@ mod tests {
         let own = Meant::Own(1);
         let alone = trial(own, &[(1, None), (2, None)]);
         assert_eq!(blamed(&[own, own], std::slice::from_ref(&alone)), Some(1));
+        // A short address is meant for it only where it differs with an address byte too.
+        let long = |found| trial(own, &[(0, found), (1, None), (2, None)]);
+        assert_eq!(blamed(&[own], &[long(Some(own))]), Some(1));
+        assert_eq!(blamed(&[own], &[long(None)]), None);
         // It is met in another place of the conversation, too.
         let again = trial(own, &[(1, Some(own)), (2, None)]);
         assert_eq!(blamed(&[own], &[again]), Some(1));

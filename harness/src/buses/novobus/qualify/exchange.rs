@@ -1,7 +1,7 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
-use crate::buses::novobus::language::syntax::{Fault, Header, LinkEnds, RingStep};
+use crate::buses::novobus::language::syntax::{self, Fault, LinkEnds, RingStep};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
@@ -11,10 +11,11 @@ use crate::scenario::write::Text;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::{Addressing, SyncByte};
+use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// Bytes on a line at most.
 const BYTES_A_LINE: usize = 24;
@@ -164,6 +165,45 @@ impl Sent {
         Some(kept)
     }
 
+    /// The first `count` bytes with an address byte in place of each short address, and how many they are then; `None` where a telegram
+    /// has no byte that needs an address, or a fault is meant for a byte that would have another number.
+    pub(super) fn with_addresses(&self, count: usize, drives: u8) -> Option<(Self, usize)> {
+        let mut own = Self::default();
+        let mut index = 0;
+        for piece in &self.pieces {
+            match piece {
+                Piece::Byte if index == count => break,
+                Piece::Byte => {
+                    let (byte, whole) = self.bytes[index];
+                    let (byte, address) = match (self.roles[index], SyncByte::decode(byte)) {
+                        (Role::Sync, Ok(SyncByte::Telegram(header)))
+                            if header.addressing() != Addressing::AddressFollows =>
+                        {
+                            let drive = self.roles.get(index + 1)?.drive()?;
+                            let (process_data, length) =
+                                (header.process_data(), header.net_length());
+                            let header =
+                                Header::new(Addressing::AddressFollows, process_data, length);
+                            let sync = SyncByte::Telegram(header.ok()?).encode();
+                            (sync, Some(drive.wrapping_sub(drives)))
+                        }
+                        _ => (byte, None),
+                    };
+                    for byte in iter::once(byte).chain(address) {
+                        own.pieces.push(Piece::Byte);
+                        own.bytes.push((byte, whole));
+                    }
+                    index += 1;
+                }
+                Piece::Gap(gap) => own.gap(*gap),
+                Piece::Fault(..) => return None,
+            }
+        }
+        own.roles = roles(RingSize::new(u64::from(drives)).ok()?, &own.bytes);
+        let count = own.bytes.len();
+        Some((own, count))
+    }
+
     /// The text of a scenario that sends the first `count` bytes again, each telegram `step` addresses on in a ring of `drives`. `None` where it
     /// would be another conversation: a short address does not go on from the last drive to the first, and what an EEPROM holds is not
     /// exchanged, apart from the cells of the customer.
@@ -242,7 +282,7 @@ impl Sent {
     fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
         let title = format!("The same conversation, each telegram {step} addresses on");
         let mut text: Text = Text::default();
-        text.header(&Scenario::new(&title, Header::of_rings(&[drives])));
+        text.header(&Scenario::new(&title, syntax::Header::of_rings(&[drives])));
         text.empty_line();
         let mut left = bytes.iter().map(|(byte, _)| Expected::Byte(*byte));
         // Bytes stand together up to a gap or a fault.
@@ -369,5 +409,29 @@ mod tests {
         assert!(text.trim_end().ends_with("\nwait 20000us"), "{text}");
         assert_eq!(orders(0x60, WRITE_BYTE), None);
         assert_eq!(orders(0x5C, 0x84), None);
+    }
+
+    /// ND21 9.2: a short address means the drive of the telegram before, whose address stands in its place then.
+    #[test]
+    fn a_short_address_is_written_out() {
+        let written_out = |bytes: &[u8]| {
+            let bytes: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
+            let sent = Sent {
+                pieces: vec![Piece::Byte; bytes.len()],
+                roles: roles(RingSize::new(3).expect("a ring"), &bytes),
+                bytes,
+            };
+            let (long, count) = sent.with_addresses(sent.bytes.len(), 3)?;
+            assert_eq!(count, long.pieces.len());
+            Some(long.bytes.iter().map(|(byte, _)| *byte).collect::<Vec<_>>())
+        };
+        let (read, short) = ([0xC0, 0x12, 0xFE, 0xD0], [0xC0, 0x13, 0xFE, 0xD1]);
+        let first = [&[0x88, 0xFE][..], &read, &[0x80]].concat();
+        let same = [&first[..], &[0xA8], &short].concat();
+        let long = [&first[..], &[0x88, 0xFE], &short].concat();
+        assert_eq!(written_out(&same), Some(long.clone()));
+        assert_eq!(written_out(&long), Some(long));
+        // Without a byte behind it there is no such telegram (9.3).
+        assert_eq!(written_out(&[&first[..], &[0xA0]].concat()), None);
     }
 }
