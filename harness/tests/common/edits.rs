@@ -40,14 +40,24 @@ impl Kept {
 
     /// Whether verify refuses the folder with another record.
     pub(crate) fn refused(&self, lines: &[Value]) -> bool {
+        self.with(lines, Self::is_refused)
+    }
+
+    /// What verify says of the folder with another record.
+    pub(crate) fn verified(&self, lines: &[Value]) -> String {
+        self.with(lines, |own| said(&own.desk.run(&["verify", "kept"])))
+    }
+
+    /// Asks about the folder with another record.
+    fn with<T>(&self, lines: &[Value], ask: impl FnOnce(&Self) -> T) -> T {
         let before = fs::read(self.folder().join("run.jsonl")).expect("a record");
         let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
         fs::write(self.folder().join("run.jsonl"), text).expect("room");
         fit(&self.folder());
-        let refused = self.is_refused();
+        let answer = ask(self);
         fs::write(self.folder().join("run.jsonl"), before).expect("room");
         fit(&self.folder());
-        refused
+        answer
     }
 
     fn is_refused(&self) -> bool {

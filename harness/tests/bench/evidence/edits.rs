@@ -109,6 +109,40 @@ fn a_scenario_left_out_with_all_its_files() {
     }
 }
 
+/// A record of schema 1 has neither the purpose of the run nor the scenarios that were selected, and no sums of the texts of cases. Its
+/// attempts are judged again, and verify says that the record does not hold the rest.
+#[test]
+fn of_a_record_of_schema_1() {
+    let kept = kept(Desk::new(OWN), "run", false);
+    let mut old = kept.lines();
+    old[0]["schema"] = 1.into();
+    for line in &mut old {
+        let new: &[&str] = match line["kind"].as_str() {
+            Some("run") => &["purpose", "selected"],
+            Some("case") => &["sha256"],
+            _ => &[],
+        };
+        let line = line.as_object_mut().expect("fields");
+        for field in new {
+            assert!(line.remove(*field).is_some(), "{field}");
+        }
+    }
+    let said = kept.verified(&old);
+    for words in [
+        "unconfirmed  this record of schema 1 has no looks at the ports and no texts of skipped scenarios",
+        "passed       passes\n",
+        "failed       fails\n",
+        "3 attempts judged again, 0 things wrong; incomplete",
+    ] {
+        assert!(said.contains(words), "{words} is not in {said}");
+    }
+    let failed = old.iter_mut().find(|line| line["verdict"] == "failed");
+    failed.expect("a scenario that fails")["verdict"] = "passed".into();
+    let said = kept.verified(&old);
+    let words = "fails: the record says passed, its bytes say failed";
+    assert!(said.contains(words), "{words} is not in {said}");
+}
+
 /// A signature by the standard tool, checked and broken.
 #[test]
 fn signatures() {
