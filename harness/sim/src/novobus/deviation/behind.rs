@@ -236,15 +236,11 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
     Deviation {
         name: "eeprom-never-ready",
         section: "14.10.5",
-        about: "its EEPROM controller never comes to an end",
+        about: "its EEPROM controller reports neither by bit 4 nor by bit 5 that it has come to an end",
         behind_the_bus: true,
-        how: How::Reads(|peek, a| {
-            peek(a)
-                | if a == ram::EEPROM_CONTROL {
-                    EEPROM_READ
-                } else {
-                    0
-                }
+        how: How::Reads(|peek, a| match a {
+            ram::EEPROM_CONTROL => peek(a) & !(EEPROM_READY | EEPROM_HAS_READ),
+            _ => peek(a),
         }),
     },
     Deviation {
