@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 /// Fields that can hold another value without a contradiction, of rings with ports: kind of line and field.
 const UNCONFIRMED: [(&str, &str); 4] = [
@@ -38,34 +38,36 @@ impl Kept {
         lines.map(|line| line.expect("JSON")).collect()
     }
 
-    /// Whether verify refuses the folder with another record.
-    pub(crate) fn refused(&self, lines: &[Value]) -> bool {
-        self.with(lines, Self::is_refused)
-    }
-
     /// What verify says of the folder with another record.
-    pub(crate) fn verified(&self, lines: &[Value]) -> String {
-        self.with(lines, |own| said(&own.desk.run(&["verify", "kept"])))
-    }
-
-    /// Asks about the folder with another record.
-    fn with<T>(&self, lines: &[Value], ask: impl FnOnce(&Self) -> T) -> T {
+    pub(crate) fn verified(&self, lines: &[Value]) -> Output {
         let before = fs::read(self.folder().join("run.jsonl")).expect("a record");
         let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
         fs::write(self.folder().join("run.jsonl"), text).expect("room");
         fit(&self.folder());
-        let answer = ask(self);
+        let verified = self.verify();
         fs::write(self.folder().join("run.jsonl"), before).expect("room");
         fit(&self.folder());
-        answer
+        verified
+    }
+
+    /// Whether verify refuses the folder with another record.
+    pub(crate) fn refused(&self, lines: &[Value]) -> bool {
+        is_refusal(&self.verified(lines))
+    }
+
+    fn verify(&self) -> Output {
+        self.desk.run(&["verify", "kept"])
     }
 
     fn is_refused(&self) -> bool {
-        let verified = self.desk.run(&["verify", "kept"]);
-        let code = verified.status.code();
-        assert!(matches!(code, Some(0 | 1 | 2 | 5)), "{}", said(&verified));
-        code != Some(0)
+        is_refusal(&self.verify())
     }
+}
+
+fn is_refusal(verified: &Output) -> bool {
+    let code = verified.status.code();
+    assert!(matches!(code, Some(0 | 1 | 2 | 5)), "{}", said(verified));
+    code != Some(0)
 }
 
 /// Makes the sums fit again.
