@@ -252,7 +252,7 @@ mod tests {
                 [Unlock::Simulated, Unlock::Limit(LimitSetting::Motion)],
             ),
             no_interposer("2->1"),
-            Outcome::skipped(Skip::other_size(vec![100], vec![3])),
+            Outcome::skipped(Skip::other_size(vec![(100, 100)], vec![3])),
             Outcome::skipped(denied),
         ]);
         assert_eq!(
@@ -272,7 +272,8 @@ mod tests {
         let at = |place: u8| format!("{}->{place}", place + 1);
         let taps = (0..99).map(|place| Unlock::Tap(at(place)));
         let long = Skip::from(Why::NoTap(at(0))).and(taps.chain([Unlock::Interposer(at(97))]));
-        let sizes = (1..=9).map(|size| Outcome::skipped(Skip::other_size(vec![size], vec![20])));
+        let sizes =
+            (1..=9).map(|size| Outcome::skipped(Skip::other_size(vec![(size, size)], vec![20])));
         let outcomes: Vec<_> = [Outcome::skipped(long)].into_iter().chain(sizes).collect();
         let summary = of(&outcomes).summary();
         let line = summary.lines().last();

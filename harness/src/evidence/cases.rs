@@ -271,5 +271,5 @@ pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
     let plan = entry.plan.as_ref()?;
     let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    (own != sizes).then(|| Skip::other_size(own, sizes))
+    (own != sizes).then(|| Skip::other_size(plan.sizes.clone(), sizes))
 }

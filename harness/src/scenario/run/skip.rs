@@ -1,7 +1,6 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
 use crate::buses::LimitSetting;
-use crate::counted::counted;
 use crate::link::{Capability, Link};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
@@ -27,8 +26,8 @@ pub enum Why {
     NoInterposer(String),
     /// What goes over this link must be seen, where the rig has no tap.
     NoTap(String),
-    /// It is for rings with these numbers of drives, and the rig has those.
-    OtherSize(Vec<u8>, Vec<u8>),
+    /// It is for rings with these numbers of drives, each from the first to the second, and the rig has those.
+    OtherSize(Vec<(u8, u8)>, Vec<u8>),
     /// The rig's limits deny a byte or a fault of it, in the guard's words.
     Denied(String),
     /// The rig's drives are not those that it is for: what differs, in a sentence.
@@ -56,8 +55,8 @@ pub enum Unlock {
     Interposer(String),
     /// Ports that send and show line errors.
     LineErrors,
-    /// Rings with these numbers of drives.
-    Rings(Vec<u8>),
+    /// Rings with these numbers of drives, each from the first to the second.
+    Rings(Vec<(u8, u8)>),
     /// A second ring.
     SecondRing,
     /// Drives that are simulated in the program.
@@ -86,7 +85,7 @@ impl Skip {
 
     /// A scenario for rings of these sizes, on a rig of those.
     #[must_use]
-    pub fn other_size(own: Vec<u8>, rig: Vec<u8>) -> Self {
+    pub fn other_size(own: Vec<(u8, u8)>, rig: Vec<u8>) -> Self {
         Self {
             unlocks: [Unlock::Rings(own.clone())].into(),
             why: Why::OtherSize(own, rig),
@@ -156,7 +155,7 @@ impl fmt::Display for Why {
             Self::OtherSize(own, rig) => write!(
                 f,
                 "it is for rings of another size ({} drives, the rig has {})",
-                sizes(own),
+                ranges(own),
                 sizes(rig)
             ),
             Self::Denied(words) => write!(f, "{DENIED}{words}"),
@@ -172,6 +171,16 @@ impl fmt::Display for Why {
 pub(crate) fn sizes(sizes: &[u8]) -> String {
     let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
     sizes.join(" and ")
+}
+
+/// The sizes that rings can have, in words.
+fn ranges(sizes: &[(u8, u8)]) -> String {
+    let words = |(smallest, largest): &(u8, u8)| match smallest == largest {
+        true => smallest.to_string(),
+        false => format!("{smallest} to {largest}"),
+    };
+    let words: Vec<_> = sizes.iter().map(words).collect();
+    words.join(" and ")
 }
 
 /// What is needed together, in words.
@@ -279,8 +288,9 @@ impl fmt::Display for Unlock {
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
             Self::Rings(drives) => match drives.as_slice() {
-                [drives] => write!(f, "a ring of {}", counted(*drives, "drive")),
-                all => write!(f, "rings of {} drives", sizes(all)),
+                [(1, 1)] => f.write_str("a ring of 1 drive"),
+                [_] => write!(f, "a ring of {} drives", ranges(drives)),
+                all => write!(f, "rings of {} drives", ranges(all)),
             },
             Self::SecondRing => f.write_str("a second ring"),
             Self::Simulated => f.write_str("a simulated rig"),

@@ -418,7 +418,6 @@ pub(crate) fn opening(
 
 /// Why a scenario is not played on rings of these sizes; `None` where it is, unless the rig's limits deny it.
 pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<Skip> {
-    let sizes = |rings: &[RingSize]| rings.iter().map(|r| r.drives()).collect();
     // The size first: a link of another ring may have the number of one that there is.
     match plan.rings == rings {
         true => lacks(plan, link),
@@ -427,7 +426,8 @@ pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Op
                 let drives = plan.rings.get(ring).map_or(0, |size| size.drives());
                 (1..usize::from(drives)).contains(&place)
             };
-            let skip = Skip::other_size(sizes(&plan.rings), sizes(rings));
+            let rig = rings.iter().map(|ring| ring.drives()).collect();
+            let skip = Skip::other_size(plan.sizes.clone(), rig);
             Some(skip.and(lacks_as_well(plan, link, is_inner)))
         }
     }

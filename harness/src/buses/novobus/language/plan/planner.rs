@@ -82,6 +82,10 @@ pub(crate) fn settle(
     let mut planner = Planner {
         bench: PlannedBench {
             rings: sizes(scenario, size)?,
+            sizes: {
+                let ranges = header.rings.iter();
+                ranges.map(|own| (own.smallest, own.largest)).collect()
+            },
             rate: header.rate.unwrap_or_default(),
             master: header.master.as_ref().map(|master| master.value),
             setups: Vec::new(),

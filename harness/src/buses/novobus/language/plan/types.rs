@@ -30,6 +30,8 @@ pub const LOOK: time::Span = time::Span::from_micros(108);
 pub struct PlannedBench {
     /// The rings; one or two.
     pub rings: Vec<RingSize>,
+    /// The smallest and the largest number of drives that each ring can have.
+    pub(crate) sizes: Vec<(u8, u8)>,
     /// The rate of the line.
     pub rate: Rate,
     /// How the bench's own master breaks the manual, on purpose.
