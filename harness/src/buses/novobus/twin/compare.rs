@@ -209,6 +209,7 @@ impl Comparer<'_> {
             (Some(_), None) => return Some(Symptom::Missing),
             (None, _) => return Some(Symptom::Surplus),
         };
+        self.knowledge.proceed_to(due);
         let found_good = found.error.is_none() || !self.exactness.line_errors;
         let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
         let right = match index < rows.known {

@@ -3,7 +3,7 @@
 //! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
-use super::program::Program;
+use super::program::{Program, READ, READ_BYTE, READY};
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
@@ -11,6 +11,7 @@ use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, PAGE};
 use harness_proto::novobus::output::Output;
+use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How many different values must come out of as many resets before a cell counts as one that a reset does not clear: one value may
@@ -125,6 +126,9 @@ fn is_lost(address: u16) -> bool {
     kept && (ram::POLE_JUMP..=ram::VCO_LIN_L).contains(&address)
 }
 
+/// How long an order to the controller of the EEPROM may take. The manual gives no time; the copy of the 32 parameters takes the model 320 ms.
+const LONGEST_ORDER: Span = Span::from_millis(4_000);
+
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
@@ -143,6 +147,10 @@ pub(crate) struct Knowledge {
     survived: BTreeMap<CellByte, BTreeSet<u8>>,
     /// Drives whose EEPROM may have been written in the present attempt.
     saved: BTreeSet<(usize, u8)>,
+    /// When the byte in hand is due.
+    now: Instant,
+    /// When drives were given an order to the controller of the EEPROM whose end they have not reported in the present conversation.
+    ordered: BTreeMap<(usize, u8), Instant>,
     /// Drives that are known not to monitor time-outs (14.10.2): their `Flags2` says so, and nothing was written to it since.
     trusting: BTreeSet<(usize, u8)>,
 }
@@ -160,11 +168,17 @@ impl Knowledge {
 
     /// A conversation begins, with or without faults.
     pub(crate) fn converse(&mut self, faults: bool) {
+        self.ordered.clear();
         if faults || self.disturbed {
             self.working.clear();
             self.trusting.clear();
         }
         self.disturbed = faults;
+    }
+
+    /// The next byte is due.
+    pub(crate) const fn proceed_to(&mut self, due: Instant) {
+        self.now = due;
     }
 
     /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
@@ -186,6 +200,7 @@ impl Knowledge {
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
         self.programs.entry((ring, drive)).or_default().begin();
         self.working.remove(&(ring, drive));
+        self.ordered.remove(&(ring, drive));
         self.trusting.remove(&(ring, drive));
     }
 
@@ -218,6 +233,16 @@ impl Knowledge {
         }
         if started || ordered || address == ram::EEPROM_CONTROL {
             self.saved.insert((ring, drive));
+        }
+        if address == ram::EEPROM_CONTROL {
+            match write {
+                Write::Set(order) if order >= READ_BYTE => {
+                    self.ordered.insert((ring, drive), self.now);
+                }
+                _ => {
+                    self.ordered.remove(&(ring, drive));
+                }
+            }
         }
         if ordered || address == ram::FLAGS2 && write.sets(flags2::MONITORING) {
             self.trusting.remove(&(ring, drive));
@@ -254,6 +279,7 @@ impl Knowledge {
         self.write(place, write);
         self.cells.remove(&place);
         self.programs.remove(&(place.0, place.1));
+        self.ordered.remove(&(place.0, place.1));
     }
 
     /// The cell that `DataIn` or `DataOut` of a drive points at (ND21 14.10.3), where that is known.
@@ -307,6 +333,17 @@ impl Knowledge {
         written & self.kept(place, value)
     }
 
+    /// Whether `EEPROMcontrol` of a drive should long have shown the end of an order (ND21 14.10.5.2, 14.10.5.3).
+    fn is_overdue(&mut self, drive: (usize, u8), wanted: u8, value: u8) -> bool {
+        let ended = |shown: u8| shown & (READ | READY) != 0;
+        if ended(value) {
+            self.ordered.remove(&drive);
+        }
+        let since = self.ordered.get(&drive);
+        let late = since.is_some_and(|since| self.now.since(*since) > LONGEST_ORDER);
+        late && ended(wanted) && !self.disturbed
+    }
+
     /// Judges a byte that was read, where the model holds `wanted`.
     pub(crate) fn read(&mut self, place: CellByte, wanted: u8, value: u8) -> ByteRead {
         if place.2 == ram::FLAGS2 {
@@ -320,6 +357,9 @@ impl Knowledge {
             Some(true) => return ByteRead::Right,
             Some(false) => return ByteRead::Wrong,
             None => {}
+        }
+        if place.2 == ram::EEPROM_CONTROL && self.is_overdue((place.0, place.1), wanted, value) {
+            return ByteRead::Wrong;
         }
         if place.2 == ram::STATUS && self.is_in_reset_by_itself((place.0, place.1), wanted, value) {
             return ByteRead::Wrong;
@@ -536,5 +576,37 @@ mod tests {
         assert_eq!(known.read(status, 0x01, 0x80), ByteRead::Wrong);
         assert_eq!(known.read(status, 0x01, 0xA0), ByteRead::Own);
         assert_eq!(known.read(status, 0x01, 0x05), ByteRead::Own);
+    }
+
+    /// ND21 14.10.5.2, 14.10.5.3: bit 4 or bit 5 of `EEPROMcontrol` reports the end of an order, and not only after seconds.
+    #[test]
+    fn an_order_to_the_eeprom_comes_to_an_end() {
+        let control = (0, 1, ram::EEPROM_CONTROL);
+        let ordered = || {
+            let mut known = Knowledge::default();
+            known.converse(false);
+            known.write(control, Write::Set(READ_BYTE));
+            known
+        };
+        let after = |known: &mut Knowledge, ms: u64, wanted, value| {
+            known.proceed_to(Instant::START + Span::from_millis(ms));
+            known.read(control, wanted, value)
+        };
+        let mut known = ordered();
+        assert_eq!(after(&mut known, 3_999, READ, 0x81), ByteRead::Own);
+        assert_eq!(after(&mut known, 4_001, READ, 0x81), ByteRead::Wrong);
+        // A model that takes as long itself, as a profile may say.
+        assert_eq!(after(&mut known, 4_002, 0x81, 0x81), ByteRead::Own);
+        // It has come to an end before.
+        assert_eq!(after(&mut known, 4_003, READ, READ), ByteRead::Own);
+        assert_eq!(after(&mut known, 4_004, READ, 0x00), ByteRead::Own);
+        // The master has confirmed the end, and the supply of a drive may have failed.
+        let mut known = ordered();
+        known.write(control, Write::Set(0x10));
+        assert_eq!(after(&mut known, 5_000, READ, 0x00), ByteRead::Own);
+        let mut known = ordered();
+        known.converse(true);
+        known.write(control, Write::Set(READ_BYTE));
+        assert_eq!(after(&mut known, 5_000, READ, 0x00), ByteRead::Own);
     }
 }

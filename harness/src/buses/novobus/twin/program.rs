@@ -13,12 +13,12 @@ const CONFIRM: u8 = 0xAF;
 const OF_THE_BUS: u8 = 0x05;
 
 /// Commands of `EEPROMcontrol` (14.10.5.1), and its bit that says that a byte has been read.
-const READ_BYTE: u8 = 0x81;
+pub(super) const READ_BYTE: u8 = 0x81;
 const WRITE_BYTE: u8 = 0x82;
-const READ: u8 = 1 << 5;
+pub(super) const READ: u8 = 1 << 5;
 
 /// Its bit that says that a byte has been written, or that nothing is going on.
-const READY: u8 = 1 << 4;
+pub(super) const READY: u8 = 1 << 4;
 
 /// The cells of the EEPROM that only a master changes (14.2.2): the parameters and settings, the customer's cells, and the positions of
 /// the cycle control. The drive itself counts its hours, notes errors and dates, and may note its reference point.
