@@ -243,7 +243,7 @@ impl Settled {
             let same = judged.and_then(|outcome| outcome.finding.clone());
             same.filter(|own| own.message == *message)
                 .unwrap_or_else(|| Mismatch {
-                    span: problem::Span { start: 0, end: 0 },
+                    span: problem::TextSpan { start: 0, end: 0 },
                     message: message.clone(),
                     difference: None,
                     in_error: String::new(),

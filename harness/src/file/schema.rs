@@ -1,7 +1,7 @@
 //! The check of a TOML text against a JSON schema: unknown keys, missing keys, wrong types, numbers out of their range. All mistakes at once, each with its place.
 
 use super::values::check_format;
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -10,9 +10,9 @@ use toml::de::{DeTable, DeValue};
 const MAX_DEPTH: usize = 32;
 
 /// A place of a TOML value.
-pub(crate) fn span_of<T>(value: &Spanned<T>) -> Span {
+pub(crate) fn span_of<T>(value: &Spanned<T>) -> TextSpan {
     let range = value.span();
-    Span {
+    TextSpan {
         start: range.start,
         end: range.end,
     }
@@ -49,7 +49,7 @@ impl From<usize> for Step<'_> {
 }
 
 /// The place of a value, or of the nearest table around it that is there.
-pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[Step<'_>]) -> Span {
+pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[Step<'_>]) -> TextSpan {
     let mut span = span_of(table);
     let mut value: Option<&Spanned<DeValue<'_>>> = None;
     for step in path {
@@ -69,7 +69,7 @@ pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[Step<'_>]) -> Span {
 /// What is no TOML at all.
 pub(crate) fn syntax(error: &toml::de::Error) -> Problem {
     let span = error.span().unwrap_or_default();
-    let span = Span {
+    let span = TextSpan {
         start: span.start,
         end: span.end,
     };
@@ -110,7 +110,7 @@ impl<'a> Walk<'a> {
         &mut self,
         schema: &'a Value,
         table: &DeTable<'_>,
-        place: Span,
+        place: TextSpan,
         path: &str,
         depth: usize,
     ) {
@@ -262,7 +262,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn range(&mut self, number: f64, least: &Value, most: &Value, place: Span, what: &str) {
+    fn range(&mut self, number: f64, least: &Value, most: &Value, place: TextSpan, what: &str) {
         let (least, most) = (least.as_f64(), most.as_f64());
         if least.is_some_and(|least| number < least) || most.is_some_and(|most| number > most) {
             let bounds = match (least, most) {

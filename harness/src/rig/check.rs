@@ -8,7 +8,7 @@ use super::session_error::SessionError;
 use crate::buses::syntax::Header;
 use crate::file::schema::{Step, compare, place, syntax};
 use crate::file::values::Wire;
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -165,7 +165,7 @@ pub(crate) struct RigCheck<'a> {
 
 impl RigCheck<'_> {
     /// The place of a value, or of the nearest table around it that is there.
-    pub(crate) fn place(&self, path: &[Step<'_>]) -> Span {
+    pub(crate) fn place(&self, path: &[Step<'_>]) -> TextSpan {
         place(self.table, path)
     }
 

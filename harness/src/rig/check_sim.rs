@@ -8,7 +8,7 @@ use crate::buses::header::{for_other_rings, parse_lines};
 use crate::buses::syntax::Header;
 use crate::file::schema::Step;
 use crate::rig::sim::{mistakes, sizes};
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::source::{Source, line_number};
 use serde::de::DeserializeOwned;
 
@@ -80,7 +80,7 @@ impl RigCheck<'_> {
             return Header::default();
         }
         let text = lines.join("\n");
-        let place = |span: Span| line(line_number(&text, span.start) - 1);
+        let place = |span: TextSpan| line(line_number(&text, span.start) - 1);
         let read = parse_lines(&Source {
             name: source.name.clone(),
             text: text.as_str().into(),

@@ -10,7 +10,7 @@ use crate::link::{InnerLink, Ports};
 use crate::port::{self, OpenError, PortSettings, Wire};
 use crate::scenario::problem::Problems;
 use harness_proto::line::Rate;
-use harness_proto::time;
+use harness_proto::time::Span;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -106,7 +106,7 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     }
     let tolerance = rig.rings().map(|(_, ring)| ring.time_tolerance.0).max();
     let tolerance = tolerance.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX));
-    let tolerance = time::Span::from_nanos(tolerance);
+    let tolerance = Span::from_nanos(tolerance);
     let link = buses::over_ports(wires, inner, (rate, tolerance), interrupt);
     Ok(Opened {
         ends: Ends::Ports(link),

@@ -1,6 +1,6 @@
 //! Arithmetic over the ring's size and the counters of loops, so that one file serves rings of any size: `N-1`, `last`, `N/2+1`, `k-N`.
 
-use super::problem::{Problem, Span};
+use super::problem::{Problem, TextSpan};
 use super::scanner::Scanner;
 use std::fmt::{self, Display};
 
@@ -114,7 +114,7 @@ pub struct Located {
     /// The number.
     pub expression: Expression,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl Located {
@@ -145,7 +145,7 @@ impl Located {
     pub const fn number(value: i64) -> Self {
         Self {
             expression: Expression::Number(value),
-            span: Span { start: 0, end: 0 },
+            span: TextSpan { start: 0, end: 0 },
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::expression::Scope;
 use super::plan::{Plan, PlannedStep, Unroll};
-use super::problem::{Problem, Span, Spanned};
+use super::problem::{Problem, Spanned, TextSpan};
 use super::run::CellRecord;
 use super::run::outcome::{ByteDifference, Mismatch, Stop};
 use super::run::player::{MAX_ROUND, Runner};
@@ -15,7 +15,7 @@ use super::syntax::Scenario;
 use crate::buses::Bus;
 use crate::link::{Capability, Link};
 use crate::traffic::SegmentReport;
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 use std::fmt::Debug;
 
 /// How a step that belongs to a bus begins.
@@ -38,7 +38,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// Whether a message that no line asks for is a failure also without a `strict` line.
     const STRICT: bool;
     /// The longest time for which what was sent may be under way. On a bus that other stations fill it may never leave.
-    const ROUND: time::Span = MAX_ROUND;
+    const ROUND: Span = MAX_ROUND;
     /// A document and a section as a `source` line has them, for messages.
     const SOURCE: &'static str;
     /// A step and what it does, for messages.
@@ -277,7 +277,7 @@ pub trait Settle<L: Language>: Sized {
     fn enter(&mut self, scope: Scope);
 
     /// How long a byte takes, for times in bytes.
-    fn byte_time(&self) -> time::Span;
+    fn byte_time(&self) -> Span;
 
     /// The most pieces that the steps together may send: what all links carry is kept in memory.
     fn room(&self) -> usize;
@@ -301,7 +301,7 @@ pub trait Settle<L: Language>: Sized {
     fn act(
         &mut self,
         step: &L::Step,
-        span: Span,
+        span: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<L::Act, Problem>;
 

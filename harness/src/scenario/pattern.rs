@@ -1,7 +1,7 @@
 //! Bytes in a scenario: `88 FB`, `1234`, `80*12`, `xx`, `(2-N)`, `[EC 63]*3`.
 
 use super::expression::{self, Expression, Located, Scope};
-use super::problem::{Problem, Span};
+use super::problem::{Problem, TextSpan};
 use super::scanner::Scanner;
 use std::fmt::{self, Display};
 
@@ -41,7 +41,7 @@ impl fmt::Display for Expected {
 pub struct Item {
     what: ItemKind,
     times: Option<Located>,
-    span: Span,
+    span: TextSpan,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ enum ItemKind {
 pub struct Pattern {
     items: Vec<Item>,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl fmt::Display for Pattern {
@@ -98,7 +98,7 @@ impl Pattern {
         let item = |byte: &Expected, times| Item {
             what: ItemKind::Bytes(vec![*byte]),
             times,
-            span: Span::default(),
+            span: TextSpan::default(),
         };
         let mut items = Vec::new();
         for equal in bytes.chunk_by(|one, other| one == other) {
@@ -111,7 +111,7 @@ impl Pattern {
         }
         Self {
             items,
-            span: Span::default(),
+            span: TextSpan::default(),
         }
     }
 

@@ -11,14 +11,14 @@ const MAX_SHOWN: usize = 20;
 
 /// A place in a scenario's text, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Span {
+pub struct TextSpan {
     /// The first byte.
     pub start: usize,
     /// The byte behind the last.
     pub end: usize,
 }
 
-impl Span {
+impl TextSpan {
     /// From the start of this place to the end of another.
     #[must_use]
     pub fn to(self, other: Self) -> Self {
@@ -29,8 +29,8 @@ impl Span {
     }
 }
 
-impl From<Span> for SourceSpan {
-    fn from(span: Span) -> Self {
+impl From<TextSpan> for SourceSpan {
+    fn from(span: TextSpan) -> Self {
         (span.start, span.end.saturating_sub(span.start)).into()
     }
 }
@@ -41,7 +41,7 @@ pub struct Spanned<T> {
     /// The value.
     pub value: T,
     /// Its place.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// One mistake: what is wrong, where, what was expected, and how to fix it.
@@ -50,7 +50,7 @@ pub struct Problem {
     /// What is wrong.
     pub message: String,
     /// Where.
-    pub span: Span,
+    pub span: TextSpan,
     /// What was expected there.
     pub expected: String,
     /// A suggestion.
@@ -60,7 +60,7 @@ pub struct Problem {
 impl Problem {
     /// A mistake at a place.
     #[must_use]
-    pub fn new(span: Span, message: impl Into<String>, expected: impl Into<String>) -> Self {
+    pub fn new(span: TextSpan, message: impl Into<String>, expected: impl Into<String>) -> Self {
         Self {
             message: message.into(),
             span,

@@ -1,6 +1,6 @@
 //! Numbers with a unit: `1500rpm`, `-2.5 A`, `95°C`, and tolerances: `+-1%`, `+-10rpm`.
 
-use super::problem::{Problem, Span};
+use super::problem::{Problem, TextSpan};
 use super::scanner::Scanner;
 use harness_proto::ratio::Ratio;
 use std::fmt;
@@ -146,7 +146,7 @@ pub struct Quantity {
     /// The unit as written.
     pub unit: &'static Unit,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl fmt::Display for Quantity {
@@ -413,7 +413,7 @@ fn number(scanner: &mut Scanner<'_>) -> Result<(i64, u32), Problem> {
     }
 }
 
-fn too_many_digits(span: Span) -> Problem {
+fn too_many_digits(span: TextSpan) -> Problem {
     Problem::new(
         span,
         "the number has too many digits",

@@ -1,6 +1,6 @@
 //! Reads one line from left to right and remembers the place of everything.
 
-use super::problem::{Problem, Span, Spanned};
+use super::problem::{Problem, Spanned, TextSpan};
 
 /// A line without its comment.
 #[derive(Clone, Debug)]
@@ -54,18 +54,18 @@ impl<'a> Scanner<'a> {
     }
 
     /// Where the scanner stands; one character wide, or none at the end.
-    pub(crate) fn here(&mut self) -> Span {
+    pub(crate) fn here(&mut self) -> TextSpan {
         let width = self.peek().map_or(0, char::len_utf8);
         let start = self.offset + self.at;
-        Span {
+        TextSpan {
             start,
             end: start + width,
         }
     }
 
     /// From the place `from` to where the scanner stands.
-    pub(crate) fn since(&self, from: Span) -> Span {
-        Span {
+    pub(crate) fn since(&self, from: TextSpan) -> TextSpan {
+        TextSpan {
             start: from.start,
             end: self.offset + self.text[..self.at].trim_end().len(),
         }
@@ -121,7 +121,7 @@ impl<'a> Scanner<'a> {
         self.at += length;
         Some(Spanned {
             value: &rest[..length],
-            span: Span {
+            span: TextSpan {
                 start,
                 end: start + length,
             },
@@ -164,7 +164,7 @@ impl<'a> Scanner<'a> {
         }
         let here = self.here();
         let rest = self.rest();
-        let span = Span {
+        let span = TextSpan {
             start: here.start,
             end: here.start + rest.len(),
         };

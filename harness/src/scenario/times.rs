@@ -1,12 +1,12 @@
 //! Times in a scenario: `5ms`, `286.458us`, `12 bytes`, and windows of them.
 
-use super::problem::{Problem, Span, Spanned};
+use super::problem::{Problem, Spanned, TextSpan};
 use super::scanner::Scanner;
-use harness_proto::time;
+use harness_proto::time::Span;
 use std::fmt;
 
 /// The longest time that a scenario can speak of: ten minutes.
-const MAX: time::Span = time::Span::from_millis(600_000);
+const MAX: Span = Span::from_millis(600_000);
 
 /// Digits after the point that are taken.
 const MAX_DECIMALS: usize = 9;
@@ -19,41 +19,41 @@ pub struct Duration {
     /// How many of them stand behind the point.
     decimals: u32,
     unit: Unit,
-    span: Span,
+    span: TextSpan,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unit {
-    Time(time::Span),
+    Time(Span),
     Bytes,
 }
 
 const UNITS: [(&str, Unit); 6] = [
-    ("us", Unit::Time(time::Span::from_micros(1))),
-    ("ms", Unit::Time(time::Span::from_millis(1))),
-    ("s", Unit::Time(time::Span::from_millis(1000))),
+    ("us", Unit::Time(Span::from_micros(1))),
+    ("ms", Unit::Time(Span::from_millis(1))),
+    ("s", Unit::Time(Span::from_millis(1000))),
     ("bytes", Unit::Bytes),
     ("byte", Unit::Bytes),
-    ("ns", Unit::Time(time::Span::from_nanos(1))),
+    ("ns", Unit::Time(Span::from_nanos(1))),
 ];
 
 impl Duration {
     /// A number of nanoseconds.
     #[must_use]
     pub const fn nanos(number: u64) -> Self {
-        Self::of(number, time::Span::from_nanos(1))
+        Self::of(number, Span::from_nanos(1))
     }
 
     /// A number of microseconds.
     #[must_use]
     pub const fn micros(number: u64) -> Self {
-        Self::of(number, time::Span::from_micros(1))
+        Self::of(number, Span::from_micros(1))
     }
 
     /// A number of milliseconds.
     #[must_use]
     pub const fn millis(number: u64) -> Self {
-        Self::of(number, time::Span::from_millis(1))
+        Self::of(number, Span::from_millis(1))
     }
 
     /// The same digits with one more of them behind the point: a tenth of the time.
@@ -65,41 +65,41 @@ impl Duration {
         }
     }
 
-    const fn of(digits: u64, unit: time::Span) -> Self {
+    const fn of(digits: u64, unit: Span) -> Self {
         Self {
             digits,
             decimals: 0,
             unit: Unit::Time(unit),
-            span: Span { start: 0, end: 0 },
+            span: TextSpan { start: 0, end: 0 },
         }
     }
 
     /// The time on a line with the given byte time.
     #[must_use]
-    pub fn on(self, byte_time: time::Span) -> time::Span {
+    pub fn on(self, byte_time: Span) -> Span {
         self.scaled(self.digits, byte_time)
     }
 
     /// Half a unit of the last digit written: how exact an exact time is meant.
     #[must_use]
-    pub fn tolerance(self, byte_time: time::Span) -> time::Span {
+    pub fn tolerance(self, byte_time: Span) -> Span {
         let digit = self.scaled(1, byte_time);
-        time::Span::from_units(digit.units() / 2)
+        Span::from_units(digit.units() / 2)
     }
 
     /// Where it stands.
     #[must_use]
-    pub const fn span(self) -> Span {
+    pub const fn span(self) -> TextSpan {
         self.span
     }
 
-    fn scaled(self, digits: u64, byte_time: time::Span) -> time::Span {
+    fn scaled(self, digits: u64, byte_time: Span) -> Span {
         let unit = match self.unit {
             Unit::Time(unit) => unit,
             Unit::Bytes => byte_time,
         };
         let units = u128::from(digits) * u128::from(unit.units()) / 10u128.pow(self.decimals);
-        time::Span::from_units(u64::try_from(units).unwrap_or(u64::MAX))
+        Span::from_units(u64::try_from(units).unwrap_or(u64::MAX))
     }
 }
 
@@ -183,8 +183,8 @@ pub(crate) fn window(scanner: &mut Scanner<'_>) -> Result<Window, Problem> {
     ordered(Window { from, to }, scanner.since(start))
 }
 
-fn ordered(window: Window, span: Span) -> Result<Window, Problem> {
-    let nominal = time::Span::from_micros(286);
+fn ordered(window: Window, span: TextSpan) -> Result<Window, Problem> {
+    let nominal = Span::from_micros(286);
     if window.from.on(nominal) > window.to.on(nominal) {
         return Err(Problem::new(
             span,
@@ -224,7 +224,7 @@ fn finish(
     scanner: &mut Scanner<'_>,
     digits: u64,
     decimals: u32,
-    start: Span,
+    start: TextSpan,
 ) -> Result<Duration, Problem> {
     let Spanned { value, span } = scanner
         .take_while(|c| c.is_ascii_alphabetic())
@@ -245,7 +245,7 @@ fn finish(
         unit: *unit,
         span,
     };
-    if duration.on(time::Span::from_micros(1146)) > MAX {
+    if duration.on(Span::from_micros(1146)) > MAX {
         return Err(Problem::new(
             span,
             "the time is longer than ten minutes",

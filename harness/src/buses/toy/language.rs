@@ -11,14 +11,14 @@ use crate::scenario::language::{Language, Opening, Settle};
 use crate::scenario::parse::words::{equals, required};
 use crate::scenario::pattern::{self, Expected, Pattern};
 use crate::scenario::plan::{Plan, PlannedStep, Unroll};
-use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::problem::{Problem, Spanned, TextSpan};
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use crate::traffic::SegmentReport;
 use harness_proto::can::{BitRate, Frame, Heard};
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 
 /// The bus.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ fn percent(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
     number(scanner, 100, "0 to 100 percent")
 }
 
-fn frame(id: u16, data: &[u8], span: Span) -> Result<Frame, Problem> {
+fn frame(id: u16, data: &[u8], span: TextSpan) -> Result<Frame, Problem> {
     let wrong = |error| Problem::new(span, format!("{error}"), "at most 8 bytes expected here");
     Frame::base(id, data).map_err(wrong)
 }
@@ -78,7 +78,7 @@ impl Settle<Valves> for Planner {
 
     fn enter(&mut self, _: Scope) {}
 
-    fn byte_time(&self) -> time::Span {
+    fn byte_time(&self) -> Span {
         BitRate::K500.time_of(8)
     }
 
@@ -96,7 +96,12 @@ impl Settle<Valves> for Planner {
         Ok(vec![Wanted(message.id, data)])
     }
 
-    fn act(&mut self, own: &Own, span: Span, needs: &mut Vec<Capability>) -> Result<Own, Problem> {
+    fn act(
+        &mut self,
+        own: &Own,
+        span: TextSpan,
+        needs: &mut Vec<Capability>,
+    ) -> Result<Own, Problem> {
         let (Own::Open(valve, _) | Own::At(valve, _)) = *own;
         if !self.0.iter().any(|(known, _)| *known == valve) {
             let message = format!("the bench has no valve {valve}");
@@ -166,7 +171,13 @@ impl Language for Valves {
     }
 
     fn incomplete(header: &Vec<(u8, bool)>) -> Option<Problem> {
-        let none = || Problem::new(Span::default(), "the scenario has no valve", "`valve 1`");
+        let none = || {
+            Problem::new(
+                TextSpan::default(),
+                "the scenario has no valve",
+                "`valve 1`",
+            )
+        };
         header.is_empty().then(none)
     }
 

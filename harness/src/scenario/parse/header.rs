@@ -4,7 +4,7 @@ use super::step;
 use super::words::named;
 use crate::link::Capability;
 use crate::scenario::language::Language;
-use crate::scenario::problem::{Problem, Problems, Span, Spanned};
+use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{Action, Bus, Citation, Scenario, Step};
@@ -64,7 +64,7 @@ pub(crate) fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<
     for (number, line) in source.text.split('\n').enumerate() {
         if number == MAX_LINES {
             reader.problems.push(Problem::new(
-                Span {
+                TextSpan {
                     start: offset,
                     end: offset,
                 },
@@ -202,7 +202,7 @@ impl<L: Language> Reader<L> {
 
 fn no_step(example: &str) -> Problem {
     let what = "the scenario has no step";
-    let problem = Problem::new(Span::default(), what, "a step expected");
+    let problem = Problem::new(TextSpan::default(), what, "a step expected");
     problem.help(format!("add a line such as {example}"))
 }
 
@@ -257,7 +257,7 @@ pub(crate) fn given_twice(word: &Spanned<&str>) -> Problem {
 fn citation(scanner: &mut Scanner<'_>, example: &str) -> Result<Citation, Problem> {
     let here = scanner.here();
     let text: Vec<_> = scanner.rest().split_whitespace().collect();
-    let span = Span {
+    let span = TextSpan {
         start: here.start,
         end: here.start + scanner.rest().len(),
     };

@@ -3,7 +3,7 @@
 use super::words::required;
 use crate::scenario::expression::{self, Counter};
 use crate::scenario::language::{Language, Opening};
-use crate::scenario::problem::{Problem, Span, nearest};
+use crate::scenario::problem::{Problem, TextSpan, nearest};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::{Action, Step, When};
 use crate::scenario::times;
@@ -137,7 +137,7 @@ fn begin_loop<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Probl
 }
 
 /// A header line among the steps.
-pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
+pub(crate) fn behind_the_first(span: TextSpan, word: &str) -> Problem {
     Problem::new(
         span,
         format!("`{word}` comes after the first step"),
@@ -146,7 +146,7 @@ pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
 }
 
 /// A header line of one word and its value among the steps.
-pub(crate) fn header_too_late(span: Span, word: &str) -> Problem {
+pub(crate) fn header_too_late(span: TextSpan, word: &str) -> Problem {
     let help = format!("move the line up, above the first step (line `{word}`)");
     behind_the_first(span, word).help(help)
 }

@@ -7,20 +7,20 @@ pub use unroll::Unroll;
 
 use super::language::{Language, Settle};
 use super::pattern::MAX_BYTES;
-use super::problem::{Problem, Problems, Span};
+use super::problem::{Problem, Problems, TextSpan};
 use super::source::Source;
 use super::syntax::{Action, Scenario, Step, When};
 use super::times::Window;
 use crate::buses::DefaultBus;
 use crate::link::Capability;
-use harness_proto::time;
+use harness_proto::time::Span;
 use std::ops::{Deref, DerefMut};
 
 /// Maximum number of bytes that a run may carry on all links together: its record is kept in memory.
 pub(crate) const MAX_CARRIED: u64 = 20_000_000;
 
 /// Default wait of a line without a time.
-const DEADLINE: time::Span = time::Span::from_millis(1000);
+const DEADLINE: Span = Span::from_millis(1000);
 
 /// A scenario for a bench of a given size. What its header says is read through the plan itself.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Plan<L: Language = DefaultBus> {
     /// Whether messages that no line expects are a failure.
     pub strict: bool,
     /// How long a line without a time waits.
-    pub deadline: time::Span,
+    pub deadline: Span,
     /// What a rig must have.
     pub needs: Vec<Capability>,
     /// The steps, in order.
@@ -68,7 +68,7 @@ pub struct PlannedStep<L: Language = DefaultBus> {
     /// What happens.
     pub action: PlannedAction<L>,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// A time in front of a step.
@@ -86,11 +86,11 @@ pub enum PlannedWhen {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedWindow {
     /// From.
-    pub from: time::Span,
+    pub from: Span,
     /// To.
-    pub to: time::Span,
+    pub to: Span,
     /// Half a unit of the last digit written, for an exact time; zero for a window.
-    pub tolerance: time::Span,
+    pub tolerance: Span,
 }
 
 /// What a step does.
@@ -101,7 +101,7 @@ pub enum PlannedAction<L: Language = DefaultBus> {
     /// The master receives on a port.
     Receive(usize, Vec<L::Wanted>),
     /// Time passes.
-    Wait(time::Span),
+    Wait(Span),
     /// A step of the bus.
     Own(L::Act),
 }
@@ -200,7 +200,7 @@ fn steps<L: Language>(
     steps
 }
 
-fn too_long((sent, room): (usize, usize), expected: usize, span: Span) -> Option<Problem> {
+fn too_long((sent, room): (usize, usize), expected: usize, span: TextSpan) -> Option<Problem> {
     let (what, remedy) = if expected > MAX_BYTES {
         let what = format!("more than {MAX_BYTES} bytes expected in one scenario");
         (what, "fewer bytes, in several scenarios")
@@ -251,12 +251,12 @@ fn action<L: Language>(
     })
 }
 
-fn when(when: When, byte_time: time::Span) -> PlannedWhen {
+fn when(when: When, byte_time: Span) -> PlannedWhen {
     let window = |window: Window| {
         let tolerance = if window.is_exact() {
             window.from.tolerance(byte_time)
         } else {
-            time::Span::ZERO
+            Span::ZERO
         };
         PlannedWindow {
             from: window.from.on(byte_time),

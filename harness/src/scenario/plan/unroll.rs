@@ -2,7 +2,7 @@
 
 use crate::scenario::expression::{Counter, Scope};
 use crate::scenario::language::Language;
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::syntax::{Action, Step};
 
 /// Maximum number of steps of a scenario, including the repetitions of its loops.
@@ -106,7 +106,7 @@ impl<'s, L: Language> Iterator for Unroll<'s, L> {
     }
 }
 
-fn too_many(span: Span) -> Problem {
+fn too_many(span: TextSpan) -> Problem {
     Problem::new(
         span,
         format!("the loops of the scenario unroll to more than {MAX_STEPS} steps"),

@@ -3,11 +3,11 @@
 use super::CellRecord;
 use crate::link::Trouble;
 use crate::scenario::pattern::Expected;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::skip::Skip;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
-use harness_proto::time;
+use harness_proto::time::{self, Span};
 
 /// The outcome of a scenario.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub struct Outcome {
     /// Notes, also when nothing failed.
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
-    pub took: time::Span,
+    pub took: Span,
     /// The cells that it recorded.
     pub records: Vec<CellRecord>,
     /// Why no step was played although the rig has all that the scenario needs: a drive could not be made ready.
@@ -88,7 +88,7 @@ impl Outcome {
             verdict,
             finding: None,
             remarks: vec![remark],
-            took: time::Span::ZERO,
+            took: Span::ZERO,
             records: Vec::new(),
             unready: None,
             skip: None,
@@ -111,7 +111,7 @@ impl Trouble {
 #[derive(Clone, Debug)]
 pub struct Mismatch {
     /// The step.
-    pub span: Span,
+    pub span: TextSpan,
     /// What is wrong, in a sentence.
     pub message: String,
     /// Where the bytes differ, if bytes are what differs.
@@ -152,7 +152,7 @@ pub struct Stop {
 }
 
 impl Stop {
-    pub(crate) fn failed(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn failed(span: TextSpan, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Failed,
             finding: Box::new(Mismatch {
@@ -169,7 +169,7 @@ impl Stop {
         self.finding.message
     }
 
-    pub(crate) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn inconclusive(span: TextSpan, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Inconclusive,
             ..Self::failed(span, message)
@@ -177,7 +177,7 @@ impl Stop {
     }
 
     /// All bytes are right, and some were late.
-    pub(crate) fn marginal(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn marginal(span: TextSpan, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Marginal,
             ..Self::failed(span, message)
@@ -185,14 +185,14 @@ impl Stop {
     }
 
     /// Trouble of the link.
-    pub(crate) fn trouble(span: Span, trouble: &Trouble) -> Self {
+    pub(crate) fn trouble(span: TextSpan, trouble: &Trouble) -> Self {
         Self {
             verdict: trouble.verdict(),
             ..Self::failed(span, trouble.to_string())
         }
     }
 
-    pub(crate) fn aborted(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn aborted(span: TextSpan, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Aborted,
             ..Self::failed(span, message)

@@ -7,17 +7,17 @@ use crate::buses::DefaultBus;
 use crate::link::{Capability, Link};
 use crate::scenario::language::Language;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::verdict::Verdict;
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 use std::sync::atomic::AtomicBool;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
-pub(crate) const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
+pub(crate) const MAX_ROUND: Span = Span::from_millis(3_600_000);
 
 /// How long a link may need for a pause.
-const PAUSE: time::Span = time::Span::from_millis(50);
+const PAUSE: Span = Span::from_millis(50);
 
 /// What to do at a line that is not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,9 +96,9 @@ pub struct Runner<'a, L: Language = DefaultBus> {
     pub(crate) ports: Vec<PortState<L>>,
     /// When the line before was done.
     pub(crate) line_before: Instant,
-    deadline: time::Span,
+    deadline: Span,
     /// The step that is under way, or the last one.
-    pub(crate) place: Span,
+    pub(crate) place: TextSpan,
     pub(crate) own: L::State,
 }
 
@@ -120,7 +120,7 @@ impl<'a, L: Language> Runner<'a, L> {
             strict: plan.strict,
             full: None,
             unseen: None,
-            place: Span::default(),
+            place: TextSpan::default(),
         }
     }
 }
@@ -128,7 +128,10 @@ impl<'a, L: Language> Runner<'a, L> {
 impl<L: Language> Runner<'_, L> {
     fn play(&mut self) -> Result<(), Stop> {
         let plan = self.plan;
-        self.place = plan.steps.first().map_or(Span::default(), |step| step.span);
+        self.place = plan
+            .steps
+            .first()
+            .map_or(TextSpan::default(), |step| step.span);
         self.halted()?;
         L::begin(self)?;
         let mut first = Ok(());
@@ -297,7 +300,7 @@ impl<L: Language> Runner<'_, L> {
     /// The next pieces must be these; with a window, the first of them must come in it.
     pub(crate) fn expect(
         &mut self,
-        span: Span,
+        span: TextSpan,
         port: usize,
         wanted: &[L::Wanted],
         window: Option<(Instant, PlannedWindow)>,
@@ -378,7 +381,7 @@ impl<L: Language> Runner<'_, L> {
     }
 
     /// A strict scenario asks for everything.
-    pub(crate) fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
+    pub(crate) fn nothing_unasked(&self, span: TextSpan) -> Result<(), Stop> {
         let ports = self.ports.iter().enumerate().filter(|_| self.strict);
         for (index, port) in ports {
             let unasked = &port.received[port.next..];

@@ -4,7 +4,7 @@ use crate::buses::{Bus, DefaultBus};
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::language::Language;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::times::{Duration, Window};
 
 /// A scenario: what it is, the bench that it needs, and its steps.
@@ -67,7 +67,7 @@ pub struct Citation {
     /// The whole reference, single spaces between its words.
     pub text: String,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// A step.
@@ -78,7 +78,7 @@ pub struct Step<L: Language = DefaultBus> {
     /// What happens.
     pub action: Action<L>,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl<L: Language> From<Action<L>> for Step<L> {
@@ -87,7 +87,7 @@ impl<L: Language> From<Action<L>> for Step<L> {
         Self {
             when: When::Now,
             action,
-            span: Span::default(),
+            span: TextSpan::default(),
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, single};
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::{Parameter, PkwError};
@@ -235,7 +235,7 @@ fn read_file(path: &Path) -> Result<Vec<Assignment>, Failure> {
 /// The parameters of a file.
 fn parse(source: &Source) -> Result<Vec<Assignment>, Problems> {
     let problem = |range: std::ops::Range<usize>, message: String, expected: &str| {
-        let span = Span {
+        let span = TextSpan {
             start: range.start,
             end: range.end,
         };

@@ -4,7 +4,7 @@ use super::Nordac;
 use super::parse::word_name;
 use super::plan::{MASTER, PlannedJob, PlannedParameter, PlannedWanted, PlannedWord, SentTelegram};
 use super::syntax::WordName;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use harness_proto::decode::Decoded;
@@ -13,15 +13,15 @@ use harness_proto::nordac::{Answer, IDENT, Image, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
 use harness_proto::profibus::fdl::{FrameControl, Function, Sequence, Status};
 use harness_proto::profibus::{Buffer, Pdu, Telegram};
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
 
 /// How long a drive may need for a state that it reaches at once.
-const PATIENCE: time::Span = time::Span::from_millis(1000);
+const PATIENCE: Span = Span::from_millis(1000);
 /// How long it may need for one behind a ramp.
-const RAMP: time::Span = time::Span::from_millis(600_000);
+const RAMP: Span = Span::from_millis(600_000);
 /// The time between two exchanges while a job waits for a state.
-const POLL: time::Span = time::Span::from_millis(10);
+const POLL: Span = Span::from_millis(10);
 /// The exchange whose reply shows a task's answer: two behind the one that carries the task (3.4.1). A slower drive may need more.
 const MOST_EXCHANGES: usize = 32;
 
@@ -55,7 +55,7 @@ struct Known {
 /// Plays a job.
 pub(super) fn play(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     job: &PlannedJob,
 ) -> Result<(), Stop> {
@@ -152,7 +152,7 @@ fn bytes(image: &Image, name: WordName) -> Vec<u8> {
 
 /// Compares the words of a reply.
 fn judge(
-    span: Span,
+    span: TextSpan,
     slave: u8,
     reply: &Image,
     expect: &[(WordName, PlannedWord)],
@@ -184,7 +184,7 @@ fn judge(
 /// Sends a request, and waits for its reply. The frame count bit changes with each request.
 fn ask(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     (function, service, data): (Function, Service, &[u8]),
 ) -> Result<Telegram, Stop> {
@@ -210,7 +210,7 @@ fn ask(
 /// The next telegram that is received.
 fn reply(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     until: Instant,
     what: &str,
 ) -> Result<Telegram, Stop> {
@@ -252,7 +252,7 @@ fn unread(runner: &Runner<'_, Nordac>) -> bool {
 }
 
 /// The data of a reply.
-fn data(span: Span, slave: u8, telegram: Telegram, what: &str) -> Result<Buffer, Stop> {
+fn data(span: TextSpan, slave: u8, telegram: Telegram, what: &str) -> Result<Buffer, Stop> {
     let wrong = |found: String| {
         let message = format!("slave {slave} answers {what} with {found}");
         Err(Stop::failed(span, message))
@@ -273,7 +273,7 @@ fn data(span: Span, slave: u8, telegram: Telegram, what: &str) -> Result<Buffer,
 /// Parameters, configuration and diagnosis, up to data exchange.
 fn start(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     (ppo, watchdog): (PpoType, Option<[u8; 2]>),
 ) -> Result<(), Stop> {
@@ -311,7 +311,7 @@ fn start(
     Ok(())
 }
 
-fn diagnose(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8) -> Result<Diagnosis, Stop> {
+fn diagnose(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<Diagnosis, Stop> {
     let request = (Function::SrdLow, Service::SlaveDiag, &[][..]);
     let reply = ask(runner, span, slave, request)?;
     let octets = data(span, slave, reply, Service::SlaveDiag.name())?;
@@ -322,7 +322,7 @@ fn diagnose(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8) -> Result<Di
 }
 
 /// One Data_Exchange with the words in force.
-fn exchange(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8) -> Result<Image, Stop> {
+fn exchange(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<Image, Stop> {
     let known = known(runner, slave);
     let ppo = known.ppo.unwrap_or_default();
     let octets = known.sent.encode(ppo);
@@ -339,10 +339,10 @@ fn exchange(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8) -> Result<Im
 /// Exchanges with a control word until the status word is as wanted. The reply to an exchange shows the drive as it was before.
 fn reach(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     control: u16,
-    patience: time::Span,
+    patience: Span,
     (wanted, done): (&str, impl Fn(u16) -> bool),
 ) -> Result<(), Stop> {
     let known = known(runner, slave);
@@ -368,7 +368,7 @@ fn reach(
 }
 
 /// Enables operation from any state without a fault.
-fn on(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8) -> Result<(), Stop> {
+fn on(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Result<(), Stop> {
     known(runner, slave).sent.pkw = Pkw::default();
     let zsw = exchange(runner, span, slave)?.first();
     if zsw & FAULT != 0 {
@@ -402,7 +402,7 @@ impl PlannedParameter {
 /// Reads a parameter, and compares it with what it must be.
 pub(super) fn read(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     parameter: PlannedParameter,
     wanted: Option<u32>,
@@ -413,7 +413,12 @@ pub(super) fn read(
 }
 
 /// Sends a task until its answer has come. The words in force stay.
-fn task(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8, task: Pkw) -> Result<Answer, Stop> {
+fn task(
+    runner: &mut Runner<'_, Nordac>,
+    span: TextSpan,
+    slave: u8,
+    task: Pkw,
+) -> Result<Answer, Stop> {
     let ppo = known(runner, slave).ppo.unwrap_or_default();
     if !ppo.has_pkw() {
         let message = format!("{ppo} has no parameter channel (NORDAC 3.1)");
@@ -436,7 +441,7 @@ fn task(runner: &mut Runner<'_, Nordac>, span: Span, slave: u8, task: Pkw) -> Re
 /// Exchanges with a task until the answer is as wanted, or until it would have come. Gives the last answer.
 fn settled(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     task: Pkw,
     done: impl Fn(Pkw) -> bool,
@@ -453,7 +458,7 @@ fn settled(
 }
 
 /// The value of an answer.
-fn value(span: Span, parameter: &PlannedParameter, answer: Answer) -> Result<u32, Stop> {
+fn value(span: TextSpan, parameter: &PlannedParameter, answer: Answer) -> Result<u32, Stop> {
     match answer {
         Answer::Error(error) => {
             let (name, code, about) = (parameter.name(), error.code(), error.about());
@@ -466,7 +471,7 @@ fn value(span: Span, parameter: &PlannedParameter, answer: Answer) -> Result<u32
 
 /// A task must be refused with this error.
 fn refused(
-    span: Span,
+    span: TextSpan,
     parameter: &PlannedParameter,
     answer: Answer,
     wanted: u16,

@@ -25,7 +25,7 @@ use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use crate::traffic::SegmentReport;
 use harness_proto::line::Received;
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 
 /// The language of scenarios with the words of this bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl Language for Nordac {
     const BUS: Bus = Bus::Nordac;
     const STRICT: bool = true;
     /// A reply that a fault holds back may be 10 s late.
-    const ROUND: time::Span = time::Span::from_millis(11_000);
+    const ROUND: Span = Span::from_millis(11_000);
     const SOURCE: &'static str = "nordac 3.2.1";
     const EXAMPLE: &'static str = "`> 10 08 02 49 53 16`: the master asks slave 8 for its status";
 

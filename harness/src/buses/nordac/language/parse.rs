@@ -14,7 +14,7 @@ use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
 use crate::scenario::parse::step::{behind_the_first, header_too_late};
 use crate::scenario::parse::words::{deviation, named, required};
-use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::problem::{Problem, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_proto::profibus::BusRate;
@@ -47,7 +47,7 @@ pub(super) fn header(
 /// The first thing that a header lacks.
 pub(super) fn incomplete(header: &Header) -> Option<Problem> {
     let what = "the scenario has no slave";
-    let problem = Problem::new(Span::default(), what, "a `slave` line expected");
+    let problem = Problem::new(TextSpan::default(), what, "a `slave` line expected");
     let help = "add a line such as `slave 8`, or `slave 8 ppo 2`";
     header.slaves.is_empty().then(|| problem.help(help))
 }

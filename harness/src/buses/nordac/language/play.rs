@@ -9,7 +9,7 @@ use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::medium::Out;
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::{Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use harness_proto::line::{LineError, Received};
@@ -86,7 +86,7 @@ fn happen(runner: &mut Runner<'_, Nordac>, settles: bool, faults: &[PlacedFault]
 /// A parameter beside the bus; over the bus where the inverter cannot be seen.
 fn look(
     runner: &mut Runner<'_, Nordac>,
-    span: Span,
+    span: TextSpan,
     slave: u8,
     parameter: PlannedParameter,
     raw: u32,

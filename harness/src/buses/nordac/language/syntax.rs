@@ -2,7 +2,7 @@
 
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::problem::{Spanned, TextSpan};
 use crate::scenario::times::Duration;
 use harness_proto::nordac::properties::Description;
 use harness_proto::nordac::{Parameter, PpoType};
@@ -30,7 +30,7 @@ pub struct SlaveLine {
     /// What the line says.
     pub what: Setup,
     /// The whole line.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// What a header line says about a slave.
@@ -59,7 +59,7 @@ pub struct ParameterName {
     /// What stands behind it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
     pub index: Vec<Located>,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// How a parameter is given.
@@ -79,7 +79,7 @@ pub struct Value {
     /// What is written.
     pub kind: ValueKind,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// A raw number, or a number with a unit.
@@ -258,7 +258,7 @@ pub struct WordValue {
     /// What is written.
     pub kind: WordKind,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// How a word is written.

@@ -27,7 +27,7 @@ use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::{Part, read};
 use crate::scenario::plan::plan as settle;
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use harness_proto::nordac::PpoType;
@@ -162,7 +162,11 @@ pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
     let there = |address: u8| slaves.iter().any(|own| own.address == address);
     if let Some(other) = setup.slaves.iter().find(|own| !there(own.address)) {
         let message = format!("the port has no slave {}", other.address);
-        let problem = Problem::new(Span::default(), message, "an address of `drives` expected");
+        let problem = Problem::new(
+            TextSpan::default(),
+            message,
+            "an address of `drives` expected",
+        );
         return Err(Problems::new(
             &source.name,
             source.text.clone(),

@@ -3,7 +3,7 @@
 use crate::buses::novobus::language::plan::{PlannedCall, RingAct};
 use crate::campaign::plan::Shape;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedWhen};
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{LAYOUTS, Layout, Reply};
@@ -29,7 +29,7 @@ pub enum MasterTalk {
 /// # Errors
 /// A step that a campaign does not play, or drives whose cells change by themselves.
 pub fn talk(plan: &Plan) -> Result<MasterTalk, Problem> {
-    let start = Span::default();
+    let start = TextSpan::default();
     let refused = |span, message: &str| {
         let expected =
             "`>` lines and jobs alone, or `master` lines alone, expected in a campaign's scenario";

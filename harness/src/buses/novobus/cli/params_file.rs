@@ -9,7 +9,7 @@
 use crate::buses::novobus::driver::cell::{CellFound, hex};
 use crate::buses::novobus::language::syntax::Written;
 use crate::scenario::argument::{MemoryKind, MemoryRange, value_at};
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::LINKS;
@@ -120,7 +120,7 @@ pub(crate) fn read(
 }
 
 /// With the range of speeds that the file itself sets (14.3.2).
-fn units(written: &[(MemoryRange, Written, Span)], drive: DriveUnits) -> DriveUnits {
+fn units(written: &[(MemoryRange, Written, TextSpan)], drive: DriveUnits) -> DriveUnits {
     let own = written
         .iter()
         .find(|(location, ..)| location.address() == ram::SW_VERSION2)
@@ -135,10 +135,10 @@ fn units(written: &[(MemoryRange, Written, Span)], drive: DriveUnits) -> DriveUn
 }
 
 /// The values of the file, as far as they can be read.
-fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Written, Span)> {
+fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Written, TextSpan)> {
     let (document, errors) = DeTable::parse_recoverable(&source.text);
     for error in errors {
-        let span = error.span().map_or(Span::default(), place);
+        let span = error.span().map_or(TextSpan::default(), place);
         problems.push(Problem::new(span, error.message(), "TOML expected here"));
     }
     let known = parameters();
@@ -178,7 +178,11 @@ fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Wri
     }
     if !there && problems.is_empty() {
         let message = "the file has no parameters";
-        problems.push(Problem::new(Span::default(), message, "`[nd21]` expected"));
+        problems.push(Problem::new(
+            TextSpan::default(),
+            message,
+            "`[nd21]` expected",
+        ));
     }
     written.sort_by_key(|(at, ..)| *at);
     written
@@ -210,8 +214,8 @@ fn entry(
     })
 }
 
-fn place(range: Range<usize>) -> Span {
-    Span {
+fn place(range: Range<usize>) -> TextSpan {
+    TextSpan {
         start: range.start,
         end: range.end,
     }

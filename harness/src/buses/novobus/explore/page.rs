@@ -9,7 +9,7 @@ use crate::explore::{KeptRun, LogLine, read};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::report::html::{ScenarioView, ShownScenario, section};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::{self, AtMismatch, Outcome, Skip};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
@@ -122,7 +122,7 @@ fn shown(
         Some(found) => found.message = format!("{about}; the scenario says: {}", found.message),
         None => {
             outcome.finding = Some(run::Mismatch {
-                span: Span { start: 0, end: 0 },
+                span: TextSpan { start: 0, end: 0 },
                 message: about.clone(),
                 difference: None,
                 in_error: String::new(),

@@ -9,7 +9,7 @@ use crate::buses::novobus::language::syntax::{
 use crate::buses::novobus::twin::answering;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::{Expected as Byte, Pattern};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::syntax::{Action, Citation, Scenario, Step, When};
 use crate::scenario::times::Duration;
 use crate::scenario::write::Text;
@@ -60,7 +60,7 @@ pub fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let header = Header::of_rings(&case.sizes()).and(header);
     let source = |text: &String| Citation {
         text: text.clone(),
-        span: Span::default(),
+        span: TextSpan::default(),
     };
     let mut text: Text = Text::default();
     text.header(&Scenario {

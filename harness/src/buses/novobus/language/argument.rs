@@ -6,13 +6,13 @@ use crate::buses::novobus::language::parse::value::{bytes, eeprom_place, place, 
 use crate::buses::novobus::language::syntax::{CellPlace, Written};
 use crate::scenario::expression::{self, Scope};
 use crate::scenario::parse::words::equals;
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::quantity::{self, Dimension, Quantity};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
-use harness_proto::time;
+use harness_proto::time::Span;
 
 /// Maximum number of bytes read from an address on.
 const MAX_LENGTH: i64 = 256;
@@ -52,7 +52,7 @@ impl MemoryRange {
                 offset: None,
                 cell: Some(cell),
                 named: true,
-                span: Span::default(),
+                span: TextSpan::default(),
             },
         }
     }
@@ -244,7 +244,7 @@ pub fn number(text: &str, dimension: Dimension) -> Result<Quantity, String> {
 ///
 /// # Errors
 /// It is none, in a sentence.
-pub fn duration(text: &str) -> Result<time::Span, String> {
+pub fn duration(text: &str) -> Result<Span, String> {
     let found = one(text, times::duration)?;
     Ok(found.on(harness_proto::line::Rate::default().byte_time()))
 }

@@ -8,7 +8,7 @@ use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
 use crate::rig::limits;
 use crate::rig::profile::KnownProfile;
 use crate::scenario::plan::Plan;
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::line_number;
 use harness_sim::nd21::Stimulus;
 
@@ -58,7 +58,7 @@ impl Rig {
     pub fn plan_with(&self, more: &Header) -> Result<Plan, Problems> {
         if self.port().is_some() {
             let message = "the rig has no rings";
-            let problem = Problem::new(Span::default(), message, "a table [ring.1] expected");
+            let problem = Problem::new(TextSpan::default(), message, "a table [ring.1] expected");
             return Err(Problems::new(
                 &self.origin,
                 self.text.clone(),

@@ -16,7 +16,7 @@ use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, single};
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::unitek::guard::{Class, class};
 use harness_proto::unitek::{Data, REGISTERS, Register};
@@ -206,7 +206,7 @@ fn parse(source: &Source) -> Result<Vec<(&'static Register, Data)>, Problems> {
     let mut problems = Vec::new();
     let mut found = Vec::new();
     let problem = |range: std::ops::Range<usize>, message: String, expected: &str| {
-        let span = Span {
+        let span = TextSpan {
             start: range.start,
             end: range.end,
         };

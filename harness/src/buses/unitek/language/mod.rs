@@ -27,7 +27,7 @@ use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use crate::traffic::SegmentReport;
 use harness_proto::can::Frame;
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 
 /// The language of scenarios with the words of this bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl Language for Unitek {
     const BUS: Bus = Bus::Unitek;
     const STRICT: bool = true;
     /// Replies may be 10 s late (`reply-delay`).
-    const ROUND: time::Span = time::Span::from_millis(11_000);
+    const ROUND: Span = Span::from_millis(11_000);
     const SOURCE: &'static str = "unitek 5.4 ex 8";
     const EXAMPLE: &'static str = "`> 201 3D 40 00`: the master asks drive 1 for STATUS";
 

@@ -16,7 +16,7 @@ use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
 use crate::scenario::parse::step::{behind_the_first, header_too_late};
 use crate::scenario::parse::words::{deviation, named, required};
-use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::problem::{Problem, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_proto::can::BitRate;
@@ -47,7 +47,7 @@ pub(super) fn header(
 /// The first thing that a header lacks.
 pub(super) fn incomplete(header: &Header) -> Option<Problem> {
     let what = "the scenario has no drive";
-    let problem = Problem::new(Span::default(), what, "a `drive` line expected");
+    let problem = Problem::new(TextSpan::default(), what, "a `drive` line expected");
     let help = "add a line such as `drive 1`, or `drive 3 rx 210 tx 190`";
     header.drives.is_empty().then(|| problem.help(help))
 }

@@ -11,11 +11,11 @@ use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::plan::Unroll;
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::syntax::Scenario;
 use crate::scenario::times::Duration;
 use harness_proto::can::{BitRate, Frame, Id, MAX_DATA};
-use harness_proto::time;
+use harness_proto::time::Span;
 use harness_proto::unitek::master;
 use harness_proto::unitek::properties::{Properties, Setting};
 use harness_proto::unitek::units::{Scaling, to_raw};
@@ -26,7 +26,7 @@ use harness_sim::unitek::deviation::MasterDeviation;
 /// The most frames that a scenario sends.
 const ROOM: usize = 100_000;
 /// How long a start-up waits for ready and for the hardware enable.
-const PATIENCE: time::Span = time::Span::from_millis(1000);
+const PATIENCE: Span = Span::from_millis(1000);
 /// The highest number of a drive (UNITEK 3.1).
 const MOST_NODES: i64 = 127;
 
@@ -130,7 +130,7 @@ pub(super) fn settle(
         let span = header
             .drives
             .first()
-            .map_or(Span::default(), |line| line.span);
+            .map_or(TextSpan::default(), |line| line.span);
         let what = format!("the bench has {size} drives, and the scenario {count}");
         return Err(Problem::new(span, what, "as many `drive` lines expected"));
     }
@@ -189,7 +189,7 @@ fn apply(line: &DriveLine, drives: &mut Vec<DriveSetup>, rate: BitRate) -> Resul
 }
 
 /// Eight bits: what `bytes` means as a unit of time.
-pub(crate) fn octet_time(rate: BitRate) -> time::Span {
+pub(crate) fn octet_time(rate: BitRate) -> Span {
     rate.time_of(8)
 }
 
@@ -385,7 +385,7 @@ impl Planner {
     }
 
     /// A job that is compiled to one frame.
-    fn job(&self, job: &Job, span: Span) -> Result<Act, Problem> {
+    fn job(&self, job: &Job, span: TextSpan) -> Result<Act, Problem> {
         let drive = self.drive(&job.drive)?;
         let (rx, tx) = drive.identifiers;
         let encoded = |request: Request| {
@@ -490,9 +490,9 @@ impl Planner {
 
 /// The interval of a cycle.
 fn interval(time: Duration) -> Result<u8, Problem> {
-    let span = time.on(time::Span::ZERO);
-    let millis = span.units() / time::Span::from_millis(1).units();
-    let whole = time::Span::from_millis(millis) == span;
+    let span = time.on(Span::ZERO);
+    let millis = span.units() / Span::from_millis(1).units();
+    let whole = Span::from_millis(millis) == span;
     let every = u8::try_from(millis)
         .ok()
         .filter(|own| whole && (1..=254).contains(own));
@@ -513,7 +513,7 @@ impl Settle<Unitek> for Planner {
         self.scope = scope;
     }
 
-    fn byte_time(&self) -> time::Span {
+    fn byte_time(&self) -> Span {
         octet_time(self.bench.setup.rate)
     }
 
@@ -556,7 +556,7 @@ impl Settle<Unitek> for Planner {
     fn act(
         &mut self,
         step: &Step,
-        span: Span,
+        span: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<Act, Problem> {
         Ok(match step {

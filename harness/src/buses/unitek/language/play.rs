@@ -9,11 +9,11 @@ use crate::buses::unitek::simulate::Bench;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::{Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use harness_proto::can::{BusError, Frame, Heard};
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Event, Job, JobId, Options, Outcome};
 use harness_proto::unitek::units::{Scaling, shown, usual};
 use harness_proto::unitek::{Data, Register, Reply, Request};
@@ -22,7 +22,7 @@ use harness_sim::unitek::deviation::{DeviantMaster, MasterDeviation};
 use std::collections::BTreeMap;
 
 /// The longest job of the driver.
-const LONGEST: time::Span = time::Span::from_millis(10_000);
+const LONGEST: Span = Span::from_millis(10_000);
 
 /// What is kept while a scenario is played.
 #[derive(Debug, Default)]
@@ -161,16 +161,16 @@ impl WantedValue {
     }
 
     /// Compares what a reply says.
-    fn judge(&self, span: Span, reply: &Reply) -> Result<(), Stop> {
+    fn judge(&self, span: TextSpan, reply: &Reply) -> Result<(), Stop> {
         self.compared(span, reply.number(), reply.data.bits())
     }
 
     /// Compares the contents of the register itself.
-    pub(super) fn compare(&self, span: Span, raw: u32) -> Result<(), Stop> {
+    pub(super) fn compare(&self, span: TextSpan, raw: u32) -> Result<(), Stop> {
         self.compared(span, Register::of(self.register).number_of(raw), raw)
     }
 
-    fn compared(&self, span: Span, number: i64, raw: u32) -> Result<(), Stop> {
+    fn compared(&self, span: TextSpan, number: i64, raw: u32) -> Result<(), Stop> {
         if self.is_met(number) {
             return Ok(());
         }
@@ -294,7 +294,7 @@ fn happen(runner: &mut Runner<'_, Unitek>, settles: bool, faults: &[PlacedFault]
 /// A register beside the bus; over the bus where the drive cannot be seen.
 fn look(
     runner: &mut Runner<'_, Unitek>,
-    span: Span,
+    span: TextSpan,
     node: u8,
     wanted: &WantedValue,
 ) -> Result<(), Stop> {
@@ -322,7 +322,7 @@ fn look(
 /// Sends a request and waits for its reply: the next frame with that identifier and register. Other frames are left for other lines.
 fn read(
     runner: &mut Runner<'_, Unitek>,
-    span: Span,
+    span: TextSpan,
     request: Frame,
     from: (u16, u8),
 ) -> Result<Reply, Stop> {
@@ -352,7 +352,12 @@ fn read(
 }
 
 /// Runs a job of the driver to its end.
-fn drive(runner: &mut Runner<'_, Unitek>, span: Span, node: u8, job: Job) -> Result<Outcome, Stop> {
+fn drive(
+    runner: &mut Runner<'_, Unitek>,
+    span: TextSpan,
+    node: u8,
+    job: Job,
+) -> Result<Outcome, Stop> {
     runner.fetch();
     let plan = runner.plan;
     let setup = plan.setup.setup.drives.iter().find(|own| own.node == node);
@@ -397,7 +402,7 @@ fn drive(runner: &mut Runner<'_, Unitek>, span: Span, node: u8, job: Job) -> Res
 }
 
 /// Whether a job of the driver has ended as it should.
-fn judge(span: Span, outcome: Outcome, wanted: WantedOutcome) -> Result<(), Stop> {
+fn judge(span: TextSpan, outcome: Outcome, wanted: WantedOutcome) -> Result<(), Stop> {
     let message = match (outcome, wanted) {
         (Outcome::NotReady(_), WantedOutcome::NotReady) => return Ok(()),
         (_, WantedOutcome::NotReady) => "the start-up has not ended as not ready".to_owned(),

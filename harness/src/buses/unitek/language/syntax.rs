@@ -2,7 +2,7 @@
 
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::problem::{Spanned, TextSpan};
 use crate::scenario::times::Duration;
 use harness_proto::can::{BitRate, Id};
 use harness_proto::unitek::Register;
@@ -30,7 +30,7 @@ pub struct DriveLine {
     /// What the line says.
     pub what: Setup,
     /// The whole line.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// What a header line says about a drive.
@@ -97,7 +97,7 @@ pub struct Value {
     /// What is written.
     pub kind: ValueKind,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// A raw number, or a number with a unit.
@@ -128,7 +128,7 @@ pub struct Message {
     /// The data, or the length of a remote frame.
     pub content: Content,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// What a frame carries.

@@ -390,8 +390,9 @@ fn damaged_scenarios() {
                 played += 1;
             }
             Err(problems) => {
-                let inside =
-                    |span: crate::scenario::problem::Span| text.get(span.start..span.end).is_some();
+                let inside = |span: crate::scenario::problem::TextSpan| {
+                    text.get(span.start..span.end).is_some()
+                };
                 assert!(problems.all().iter().all(|own| inside(own.span)), "{text}");
                 refused += 1;
             }

@@ -26,7 +26,7 @@ use crate::cli::port_bench::PortBench;
 use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
@@ -141,7 +141,7 @@ pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
     let missing = |drive: &&DriveSetup| axes.iter().all(|axis| axis.node != drive.node);
     if let Some(drive) = named.iter().find(missing) {
         let message = format!("the port has no drive {}", drive.node);
-        let problem = Problem::new(Span::default(), message, "a drive of `drives` expected");
+        let problem = Problem::new(TextSpan::default(), message, "a drive of `drives` expected");
         return Err(Problems::new(
             &source.name,
             source.text.clone(),

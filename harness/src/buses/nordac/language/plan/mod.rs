@@ -16,12 +16,12 @@ use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_CELLS};
 use crate::scenario::plan::Unroll;
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::syntax::{Action, Scenario};
 use crate::scenario::times::Duration;
 use harness_proto::line::LineError;
 use harness_proto::nordac::PpoType;
-use harness_proto::time;
+use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
 use harness_sim::octet_segment::{LineFault, LineFaultAt, TelegramFault};
 
@@ -134,7 +134,7 @@ pub(super) fn settle(
         let span = header
             .slaves
             .first()
-            .map_or(Span::default(), |line| line.span);
+            .map_or(TextSpan::default(), |line| line.span);
         let what = format!("the bench has {size} slaves, and the scenario {count}");
         return Err(Problem::new(span, what, "as many `slave` lines expected"));
     }
@@ -241,7 +241,7 @@ impl Planner {
         }))
     }
 
-    fn span(&self, time: Duration) -> time::Span {
+    fn span(&self, time: Duration) -> Span {
         time.on(self.byte_time())
     }
 
@@ -351,8 +351,8 @@ impl Damage {
 
 /// The watchdog factors of a time: 10 ms x WD1 x WD2, with the smallest WD1.
 fn factors(time: Duration) -> Result<[u8; 2], Problem> {
-    let span = time.on(time::Span::ZERO);
-    let ten = time::Span::from_millis(10).units();
+    let span = time.on(Span::ZERO);
+    let ten = Span::from_millis(10).units();
     let tens = span.units() / ten;
     let whole = tens * ten == span.units() && tens > 0;
     let pair = (1..=255_u8).filter(|one| tens.is_multiple_of(u64::from(*one)));
@@ -373,7 +373,7 @@ impl Settle<Nordac> for Planner {
         self.scope = scope;
     }
 
-    fn byte_time(&self) -> time::Span {
+    fn byte_time(&self) -> Span {
         self.bench.rate.octet_time()
     }
 
@@ -411,7 +411,7 @@ impl Settle<Nordac> for Planner {
     fn act(
         &mut self,
         step: &Step,
-        _: Span,
+        _: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<PlannedAct, Problem> {
         Ok(match step {

@@ -4,7 +4,7 @@ use crate::buses::nordac::language::syntax::{
     ParameterName, Value, ValueKind, Which, WordKind, WordValue,
 };
 use crate::scenario::expression::{Located, Scope};
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::run::outcome::Stop;
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::parameter::Flag;
@@ -137,7 +137,7 @@ impl PlannedParameter {
     }
 
     /// Its row of the table, which there must be beside the bus.
-    pub(super) fn listed(&self, span: Span) -> Result<&'static Parameter, Problem> {
+    pub(super) fn listed(&self, span: TextSpan) -> Result<&'static Parameter, Problem> {
         self.known.ok_or_else(|| {
             let what = format!("there is no parameter {}", self.number);
             Problem::new(
@@ -171,7 +171,7 @@ impl PlannedParameter {
     /// Compares what the inverter holds with what it must hold.
     pub(in super::super) fn compare(
         &self,
-        span: Span,
+        span: TextSpan,
         found: u32,
         wanted: u32,
     ) -> Result<(), Stop> {

@@ -6,7 +6,7 @@ use super::words::master_deviates;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
 use crate::scenario::parse::header::{Part, given_twice, once, read};
 use crate::scenario::parse::step as core;
-use crate::scenario::problem::{Problem, Problems, Span, Spanned};
+use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{Scenario, Step};
@@ -48,7 +48,7 @@ pub(crate) fn line(
 /// What a header that is read lacks.
 pub(crate) fn incomplete(header: &Header) -> Option<Problem> {
     let what = "the scenario does not say how many drives its ring has";
-    let problem = Problem::new(Span::default(), what, "a `ring` line expected");
+    let problem = Problem::new(TextSpan::default(), what, "a `ring` line expected");
     let help = "add a line such as `ring 4` or `ring 3..250 default 100`";
     header.rings.is_empty().then(|| problem.help(help))
 }

@@ -10,7 +10,7 @@ use crate::buses::novobus::language::syntax::{
 use crate::scenario::expression::{self, Located};
 use crate::scenario::language::Opening;
 use crate::scenario::parse::step::behind_the_first;
-use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::problem::{Problem, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_sim::fault::{DriveFault, Flips};
@@ -42,7 +42,7 @@ fn drive_step(word: &Spanned<&str>, scanner: &mut Scanner<'_>) -> Result<RingSte
 }
 
 /// A line that begins with `drive`, as a step.
-fn drive_action(drives: DriveRange, line: DriveLine, span: Span) -> Result<RingStep, Problem> {
+fn drive_action(drives: DriveRange, line: DriveLine, span: TextSpan) -> Result<RingStep, Problem> {
     match line {
         DriveLine::Setup(what) => Err(not_a_step(span, &what)),
         DriveLine::Influence(influence) => Ok(RingStep::Influence(drives, influence)),
@@ -55,7 +55,7 @@ fn drive_action(drives: DriveRange, line: DriveLine, span: Span) -> Result<RingS
 }
 
 /// What a drive is set to hold or to be, among the steps.
-pub(crate) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
+pub(crate) fn not_a_step(span: TextSpan, what: &SetupKind) -> Problem {
     let help = match what {
         SetupKind::Memory(..) => {
             "move the line up, above the first step; `? drive ...` checks cells, `write-byte` writes one"

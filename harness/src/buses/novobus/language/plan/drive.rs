@@ -12,8 +12,8 @@ use crate::buses::novobus::language::syntax::{
 use crate::link::Capability;
 use crate::scenario::language::Settle as _;
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
-use crate::scenario::problem::{Problem, Span};
-use harness_proto::time;
+use crate::scenario::problem::{Problem, TextSpan};
+use harness_proto::time::Span;
 use std::collections::BTreeSet;
 
 /// Maximum number of records of a scenario, each of one cell of one drive.
@@ -163,7 +163,7 @@ impl Planner {
         &self,
         drives: &DriveRange,
         influence: &Influence,
-        span: Span,
+        span: TextSpan,
     ) -> Result<(), Problem> {
         match influence {
             Influence::Stimuli(_) => self.only_nd21(drives, OUTSIDE, span),
@@ -268,4 +268,4 @@ fn wrong_length(place: &CellPlace, pattern: &Pattern, found: usize, size: usize)
 }
 
 /// Ten minutes of looks: a run that looks longer at cells is too long.
-pub(crate) const MAX_LOOKS: u64 = time::Span::from_millis(600_000).units() / LOOK.units() + 1;
+pub(crate) const MAX_LOOKS: u64 = Span::from_millis(600_000).units() / LOOK.units() + 1;

@@ -5,7 +5,7 @@ use super::setup::number_bytes;
 use super::types::{CellTest, NumberCheck, PlannedCell, RingAct, setups_of};
 use crate::buses::novobus::language::syntax::{CellPlace, Job, JobKind, Relation, Written};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::units::Scale;
@@ -20,7 +20,7 @@ impl Planner {
     pub(crate) fn job(&self, job: &Job) -> Result<RingAct, Problem> {
         match job {
             Job::Recover(ring) => {
-                self.ring(*ring, Span::default())?;
+                self.ring(*ring, TextSpan::default())?;
                 Ok(RingAct::Recover(*ring))
             }
             Job::Master { calls, once } => self.master(calls, *once),
@@ -161,7 +161,7 @@ impl Planner {
                 let code = byte()?;
                 let change = OutputChange::from_code(code).ok_or_else(|| {
                     Problem::new(
-                        data.map_or(Span::default(), Written::span),
+                        data.map_or(TextSpan::default(), Written::span),
                         format!("{code:02X} is not an output code"),
                         "00 to 03 expected here (ND21 10.4)",
                     )
@@ -282,7 +282,7 @@ impl Planner {
         &self,
         ring: usize,
         drive: u8,
-        span: Span,
+        span: TextSpan,
         process_data: Option<u16>,
         parameters: &[u8],
         answer: Vec<Expected>,

@@ -15,19 +15,19 @@ use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_BYTES, Pattern};
 use crate::scenario::plan::MAX_CARRIED;
 use crate::scenario::plan::{Plan, Unroll, plan};
-use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
 use harness_sim::nd21;
 use harness_sim::novobus::drive::Model;
 use std::ops::{Deref, DerefMut, RangeInclusive};
 
 /// The longest delay or break.
-const MAX_FAULT: time::Span = time::Span::from_millis(10_000);
+const MAX_FAULT: Span = Span::from_millis(10_000);
 
 /// Settles a header for rings of these sizes: what a bench is before anything is sent.
 ///
@@ -145,7 +145,7 @@ impl Settle<Novobus> for Planner {
         self.scope = scope;
     }
 
-    fn byte_time(&self) -> time::Span {
+    fn byte_time(&self) -> Span {
         self.rate.byte_time()
     }
 
@@ -168,7 +168,7 @@ impl Settle<Novobus> for Planner {
     fn act(
         &mut self,
         step: &RingStep,
-        span: Span,
+        span: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<RingAct, Problem> {
         let act = self.step(step, span, needs)?;
@@ -200,7 +200,7 @@ impl Settle<Novobus> for Planner {
 }
 
 impl Planner {
-    pub(crate) fn ring(&self, index: usize, span: Span) -> Result<RingSize, Problem> {
+    pub(crate) fn ring(&self, index: usize, span: TextSpan) -> Result<RingSize, Problem> {
         self.rings.get(index).copied().ok_or_else(|| {
             Problem::new(
                 span,
@@ -246,7 +246,7 @@ impl Planner {
     fn step(
         &self,
         step: &RingStep,
-        span: Span,
+        span: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<RingAct, Problem> {
         match step {
@@ -333,7 +333,7 @@ impl Planner {
         Ok(RingAct::Fault(fault.ring, placed, moment))
     }
 
-    fn link(&self, ring: usize, span: Span, ends: &LinkEnds) -> Result<usize, Problem> {
+    fn link(&self, ring: usize, span: TextSpan, ends: &LinkEnds) -> Result<usize, Problem> {
         let size = self.ring(ring, span)?;
         let from = ends
             .from

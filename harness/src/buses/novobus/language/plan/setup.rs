@@ -9,7 +9,7 @@ use crate::buses::novobus::language::syntax::{
 };
 use crate::scenario::language::Settle as _;
 use crate::scenario::pattern::MAX_CELLS;
-use crate::scenario::problem::{Problem, Span};
+use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::syntax::{Action, Scenario};
 use harness_proto::nd21;
 use harness_proto::nd21::units::{self, DriveType, Scale, SpeedRange, Value};
@@ -206,7 +206,7 @@ impl Planner {
         &self,
         drives: &DriveRange,
         what: &str,
-        span: Span,
+        span: TextSpan,
     ) -> Result<(), Problem> {
         let model = |drive: &u8| {
             let of_ring = self.models.get(drives.ring);
@@ -319,7 +319,7 @@ pub(crate) fn in_memory(place: &CellPlace, length: usize) -> Result<(), Problem>
     ))
 }
 
-fn set_property(name: &str, setting: Setting<'_>, span: Span) -> Result<(), Problem> {
+fn set_property(name: &str, setting: Setting<'_>, span: TextSpan) -> Result<(), Problem> {
     if let Some(own) = PROPERTIES.iter().find(|own| own.name == name) {
         if own.set(&mut Nd21Properties::default(), setting) {
             return Ok(());

@@ -5,7 +5,7 @@ use crate::buses::novobus::language::syntax::{CellPlace, Ending, Influence, Rela
 use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::Position;
@@ -15,7 +15,7 @@ use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
-use harness_proto::time;
+use harness_proto::time::Span;
 use harness_sim::nd21::Nd21Properties;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::drive::Model;
@@ -23,7 +23,7 @@ use std::ops::RangeInclusive;
 
 /// How often the bench looks at cells while it waits for one: a quarter of the cycle of the drive's
 /// regulators (ND21 4.1).
-pub const LOOK: time::Span = time::Span::from_micros(108);
+pub const LOOK: Span = Span::from_micros(108);
 
 /// What a bench is before anything is sent: the header of a scenario, settled for rings of given sizes.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub(crate) enum PlannedSetupKind {
     Type(DriveType),
     Influence(Influence),
     Word(String, String),
-    Time(String, time::Span),
+    Time(String, Span),
     Deviates(&'static Deviation),
 }
 
@@ -130,7 +130,7 @@ pub enum RingAct {
     /// The driver counts this number of drives.
     Count(usize, u8),
     /// Time passes until a check holds, at most this long.
-    Until(PlannedDriveCheck, time::Span),
+    Until(PlannedDriveCheck, Span),
     /// Something happens to drives from outside the bus.
     Influence(usize, RangeInclusive<u8>, Influence),
     /// Cells are recorded from here on, or no longer.
@@ -263,14 +263,14 @@ pub struct PlannedRecord {
     /// When it is looked at.
     pub looks: PlannedLooks,
     /// Where the cell stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// When a recorded cell is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlannedLooks {
     /// Every so often.
-    Every(time::Span),
+    Every(Span),
     /// Every [`LOOK`]; what changes is noted.
     Changes,
     /// No longer.
@@ -297,7 +297,7 @@ pub enum PlannedCheck {
     /// The bytes that the driver sent into this ring follow the manual.
     RulesKept(usize),
     /// This number of bytes was sent since the last check, in this time (and its tolerance).
-    Sent(u64, Option<(time::Span, time::Span)>),
+    Sent(u64, Option<(Span, Span)>),
     /// This number of bytes was received since the start.
     Received(u64),
 }

@@ -4,7 +4,7 @@ use super::look::Miss;
 use crate::buses::novobus::language::plan::PlannedCheck;
 use crate::buses::novobus::language::syntax::Ending;
 use crate::buses::novobus::locate::{self, Location};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use harness_proto::novobus::master::{Fault, LinkEnd, RingLink};
@@ -19,7 +19,7 @@ impl Runner<'_> {
         &mut self,
         check: &PlannedCheck,
         timed: bool,
-        span: Span,
+        span: TextSpan,
     ) -> Result<(), Stop> {
         let failed = |message: String| Err(Stop::failed(span, message));
         match check {
@@ -104,7 +104,7 @@ impl Runner<'_> {
     }
 
     /// Whether all commands of the driver's last job have ended so.
-    fn all_ended(&self, ending: Ending, span: Span) -> Result<(), Stop> {
+    fn all_ended(&self, ending: Ending, span: TextSpan) -> Result<(), Stop> {
         let other = self.own.ended.iter().find(|own| **own != ending);
         let message = match (self.own.ended.is_empty(), other) {
             (false, None) => return Ok(()),
@@ -119,7 +119,12 @@ impl Runner<'_> {
     }
 
     /// Whether the driver said first that this link is broken, or damages bytes.
-    fn named(&self, (ring, link): (usize, usize), broken: bool, span: Span) -> Result<(), Stop> {
+    fn named(
+        &self,
+        (ring, link): (usize, usize),
+        broken: bool,
+        span: TextSpan,
+    ) -> Result<(), Stop> {
         let what = if broken { "broken" } else { "damaged" };
         let expected = format!("{what} {}", self.plan.link_name(ring, link));
         let Some(fault) = self.own.disturbed.first() else {
@@ -161,7 +166,7 @@ impl Runner<'_> {
 }
 
 /// Whether the zeros in front of an address were few enough.
-fn enough(location: Location, most: Option<u64>, span: Span) -> Result<(), Stop> {
+fn enough(location: Location, most: Option<u64>, span: TextSpan) -> Result<(), Stop> {
     match (location.zeros, most) {
         (Some(zeros), Some(most)) if zeros > most => Err(Stop::failed(
             span,

@@ -5,10 +5,10 @@ use crate::buses::Stimulus;
 use crate::buses::novobus::language::plan::{LOOK, NumberCheck, PlannedDriveCheck};
 use crate::buses::novobus::language::syntax::Influence;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
-use harness_proto::time;
+use harness_proto::time::Span;
 use std::ops::RangeInclusive;
 
 impl Influence {
@@ -37,8 +37,8 @@ impl Runner<'_> {
     pub(crate) fn until(
         &mut self,
         check: &PlannedDriveCheck,
-        within: time::Span,
-        span: Span,
+        within: Span,
+        span: TextSpan,
     ) -> Result<(), Stop> {
         let end = self.link.now() + within + self.asking_time(check);
         loop {
@@ -69,7 +69,7 @@ impl Runner<'_> {
     }
 
     /// What a look at drives is for the verdict. What the link does not show does not end the scenario.
-    pub(crate) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
+    pub(crate) fn judged(&mut self, seen: Result<(), Miss>, span: TextSpan) -> Result<(), Stop> {
         match seen {
             Ok(()) => Ok(()),
             Err(Miss::Otherwise(message)) => Err(Stop::failed(span, message)),
@@ -87,7 +87,7 @@ impl Runner<'_> {
         ring: usize,
         answer: usize,
         reading: Option<&NumberCheck>,
-        span: Span,
+        span: TextSpan,
     ) -> Result<(), Stop> {
         let Some(reading) = reading else {
             return Ok(());

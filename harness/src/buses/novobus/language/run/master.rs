@@ -7,14 +7,14 @@ use crate::buses::novobus::language::syntax::Ending;
 use crate::link::{Lead, Line, Octets, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use crate::scenario::pattern::Expected;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::halt::Halt;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Event, Job, Outcome};
-use harness_proto::time::{self, Instant};
+use harness_proto::time::{Instant, Span};
 
 /// The line as a master sees it that works in the middle of a scenario.
 struct Through<'r, 'a> {
@@ -91,7 +91,7 @@ impl Runner<'_> {
         ring: usize,
         calls: &[(u8, PlannedCall)],
         once: bool,
-        span: Span,
+        span: TextSpan,
     ) -> Result<(), Stop> {
         self.settle();
         self.forget(ring);
@@ -155,7 +155,7 @@ impl Runner<'_> {
 
     /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong. Where time is real, a gap is that
     /// of a busy computer, and no drive's fault.
-    pub(crate) fn rules_kept(&self, ring: usize, span: Span) -> Result<(), Stop> {
+    pub(crate) fn rules_kept(&self, ring: usize, span: TextSpan) -> Result<(), Stop> {
         let drives = self.link.drives(ring);
         let record = self.own.rings.get(ring);
         let sent = record.into_iter().flat_map(|record| &record.sent);
@@ -169,13 +169,13 @@ impl Runner<'_> {
         };
         let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
         Err(match self.link.time_tolerance() {
-            time::Span::ZERO => Stop::failed(span, message),
+            Span::ZERO => Stop::failed(span, message),
             _ => Stop::marginal(span, message + ": the computer was busy"),
         })
     }
 
     /// Lets the driver count the drives.
-    pub(crate) fn count(&mut self, ring: usize, expected: u8, span: Span) -> Result<(), Stop> {
+    pub(crate) fn count(&mut self, ring: usize, expected: u8, span: TextSpan) -> Result<(), Stop> {
         self.settle();
         self.forget(ring);
         let mut line = Through {

@@ -9,7 +9,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::link::{Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use harness_proto::line::Received;
@@ -220,7 +220,7 @@ impl Runner<'_> {
     }
 
     /// ND21 9.8: 17 zeros and the five bytes; they must come back.
-    fn recover(&mut self, ring: usize, span: Span) -> Result<(), Stop> {
+    fn recover(&mut self, ring: usize, span: TextSpan) -> Result<(), Stop> {
         self.settle();
         let before = self.own.corrected;
         self.transmit(ring, &CHECK_SEQUENCE);

@@ -2,7 +2,7 @@
 
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use harness_proto::nd21::cells::{self, Cell};
 use harness_proto::nd21::units::Scale;
@@ -21,7 +21,7 @@ pub struct CellPlace {
     /// Whether it was written by its name.
     pub named: bool,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl CellPlace {
@@ -34,7 +34,7 @@ impl CellPlace {
             offset: None,
             cell: cells::cell_at(address).filter(|cell| cell.address == address),
             named: false,
-            span: Span::default(),
+            span: TextSpan::default(),
         }
     }
 
@@ -47,7 +47,7 @@ impl CellPlace {
             offset: None,
             cell: None,
             named: false,
-            span: Span::default(),
+            span: TextSpan::default(),
         }
     }
 
@@ -66,13 +66,13 @@ pub enum Written {
     /// A number with a unit.
     Number(Quantity),
     /// `off`: a limit that is switched off.
-    Off(Span),
+    Off(TextSpan),
 }
 
 impl Written {
     /// Where it stands.
     #[must_use]
-    pub fn span(&self) -> Span {
+    pub fn span(&self) -> TextSpan {
         match self {
             Self::Bytes(pattern) => pattern.span,
             Self::Number(number) => number.span,

@@ -4,7 +4,7 @@ use super::cell::{CellCheck, CellPlace};
 use crate::buses::novobus::language::syntax::{DriveRange, LinkEnds};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::TextSpan;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::error::BusError;
@@ -97,7 +97,7 @@ pub struct DriveCheck {
     /// What.
     pub condition: Condition,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 /// What can hold of a drive.

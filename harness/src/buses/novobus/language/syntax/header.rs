@@ -4,7 +4,7 @@ use super::cell::{CellPlace, Written};
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::write;
 use crate::scenario::expression::{Expression, Located};
-use crate::scenario::problem::{Problems, Span, Spanned};
+use crate::scenario::problem::{Problems, Spanned, TextSpan};
 use crate::scenario::source::Source;
 use crate::scenario::times::Duration;
 use harness_proto::line::Rate;
@@ -172,7 +172,7 @@ pub struct RingRange {
     /// The one to take where nothing else is asked for.
     pub default: u8,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl RingRange {
@@ -183,7 +183,7 @@ impl RingRange {
             smallest: drives,
             largest: drives,
             default: drives,
-            span: Span::default(),
+            span: TextSpan::default(),
         }
     }
 
@@ -247,7 +247,7 @@ pub struct Setup {
     /// What.
     pub what: SetupKind,
     /// Where it stands.
-    pub span: Span,
+    pub span: TextSpan,
 }
 
 impl fmt::Display for Setup {
@@ -261,7 +261,7 @@ impl Setup {
     /// A setup that stands in no text.
     #[must_use]
     pub fn new(drives: DriveRange, what: SetupKind) -> Self {
-        let span = Span::default();
+        let span = TextSpan::default();
         Self { drives, what, span }
     }
 
@@ -329,7 +329,7 @@ impl SetupKind {
 fn unplaced(text: &str) -> Spanned<String> {
     Spanned {
         value: text.to_owned(),
-        span: Span::default(),
+        span: TextSpan::default(),
     }
 }
 
