@@ -20,7 +20,7 @@ mod ring;
 
 use harness::library::Entry;
 use harness::link::{Line, Link, Octets};
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use harness::rig::{Rig, Run, Session, UseOptions, parse};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, play};
@@ -258,7 +258,7 @@ fn main() {
 
 fn address(served: &Served) -> &str {
     match &served.endpoints[0] {
-        Endpoint::Tcp(address) => address,
+        PortAddress::Tcp(address) => address,
         _ => unreachable!("a socket"),
     }
 }

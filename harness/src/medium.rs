@@ -6,6 +6,8 @@
 use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::line::{Format, Rate, Received};
 use harness_proto::time::Span;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What a port carries, and how fast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,6 +139,22 @@ impl Pieces {
             Self::Frames(frames) => Out::Frames(frames),
         }
     }
+}
+
+/// How a stream tells of line errors.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Marks")]
+pub enum ErrorMarks {
+    /// Not at all, or by the serial driver.
+    #[default]
+    #[value(help = "Line errors are not carried")]
+    None,
+    /// In PARMRK's own coding: FF FF is a good FF, FF 00 x an x with bad parity.
+    #[value(help = "As PARMRK does: FF 00 x is the byte x with an error, FF FF is a good FF")]
+    InBand,
 }
 
 /// What was received at a port.

@@ -60,6 +60,7 @@ use crate::evidence::Signer;
 use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
+use crate::medium::ErrorMarks;
 use crate::port::Wire;
 use crate::report::pcapng_telegrams::PacketOctet;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
@@ -71,7 +72,7 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
-use crate::serve::{Job, Marks, ServeEnd, ServeError, ServeHost, serve};
+use crate::serve::{Job, ServeEnd, ServeError, ServeHost, serve};
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
@@ -581,7 +582,7 @@ pub(crate) const fn shares_octets(bus: Bus) -> bool {
 pub(crate) fn serve_octets(
     bus: Bus,
     (slaves, header): (Option<&[u8]>, Option<&Source>),
-    marks: Marks,
+    marks: ErrorMarks,
     job: &Job,
     host: &mut dyn ServeHost,
 ) -> Result<Result<ServeEnd, ServeError>, Problems> {

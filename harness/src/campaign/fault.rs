@@ -1,7 +1,7 @@
 //! One fault of a case: where it is and what it does, with the name by which people call it.
 
 use crate::buses::syntax::LinkFaultKind;
-use crate::file::values::{Time, Wire};
+use crate::file::values::{LinkName, Time};
 use crate::link::{LinkFault, link_name};
 use crate::scenario::times;
 use harness_proto::time::Span;
@@ -75,11 +75,11 @@ pub fn link_index(drives: u8, drive: u8) -> Option<usize> {
 
 /// The place of a link in a ring, if the ring has it.
 #[must_use]
-pub fn wire_index(drives: u8, wire: Wire) -> Option<usize> {
-    if !wire.is_in(drives) {
+pub fn link_place(drives: u8, link: LinkName) -> Option<usize> {
+    if !link.is_in(drives) {
         return None;
     }
-    match wire.to {
+    match link.to {
         Some(drive) => link_index(drives, drive),
         None => Some(usize::from(drives)),
     }
@@ -262,7 +262,7 @@ impl CaseFaults {
     pub fn from_name(name: &str, drives: u8) -> Result<Self, String> {
         let one = |text: &str| -> Option<Injected> {
             let mut parts = text.splitn(3, ':');
-            let link = wire_index(drives, parts.next()?.parse::<Wire>().ok()?)?;
+            let link = link_place(drives, parts.next()?.parse::<LinkName>().ok()?)?;
             let byte = parts.next()?.parse().ok().filter(|byte| *byte > 0)?;
             let what = parts.next()?.parse().ok()?;
             Some(Injected { link, byte, what })

@@ -1,9 +1,9 @@
 //! What may stand in a campaign file (`corpora/campaigns/*.toml`), and the check of a text.
 
-use super::fault::{LONGEST, LineBit, MAX_GAP, wire_index};
+use super::fault::{LONGEST, LineBit, MAX_GAP, link_place};
 use crate::campaign::class::CaseClass;
 use crate::file::schema::{Step, compare, place, syntax};
-use crate::file::values::{Time, Wire};
+use crate::file::values::{LinkName, Time};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
 use schemars::JsonSchema;
@@ -35,7 +35,7 @@ pub struct CampaignFile {
     /// The links, such as "98->97"; all where none is named.
     #[serde(default)]
     #[schemars(length(min = 1, max = 251))]
-    pub links: Option<Vec<Wire>>,
+    pub links: Option<Vec<LinkName>>,
     /// The bytes of the conversation, such as "1..18"; all where nothing is said.
     #[serde(default)]
     pub bytes: Option<String>,
@@ -387,9 +387,9 @@ impl Read<'_> {
     /// # Errors
     /// The first key that does not fit.
     pub fn fits(&self, drives: u8, length: u64) -> Result<(), Problem> {
-        for (index, wire) in self.file.links.iter().flatten().enumerate() {
-            if wire_index(drives, *wire).is_none() {
-                let message = format!("a ring of {drives} has no link {wire}");
+        for (index, link) in self.file.links.iter().flatten().enumerate() {
+            if link_place(drives, *link).is_none() {
+                let message = format!("a ring of {drives} has no link {link}");
                 return Err(self.at("links", index, message, "a link of the ring expected here"));
             }
         }

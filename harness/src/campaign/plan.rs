@@ -1,6 +1,6 @@
 //! The list of cases: a pure function of a campaign file and the ring and conversation that it is for.
 
-use super::fault::{CaseFaults, FaultEffect, Injected, LineBit, wire_index};
+use super::fault::{CaseFaults, FaultEffect, Injected, LineBit, link_place};
 use super::file::{CampaignFile, FaultFamily, MAX_CASES, Pairs, hex};
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -69,9 +69,9 @@ pub fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults>, TooM
 /// Every fault at every byte of every link that the file names.
 fn singles(file: &CampaignFile, shape: &Shape) -> Vec<Injected> {
     let mut links: Vec<usize> = match &file.links {
-        Some(wires) => wires
+        Some(links) => links
             .iter()
-            .filter_map(|wire| wire_index(shape.drives, *wire))
+            .filter_map(|link| link_place(shape.drives, *link))
             .collect(),
         None => (0..=usize::from(shape.drives)).collect(),
     };

@@ -2,9 +2,8 @@
 
 use super::Error;
 use crate::buses::drives::released;
-use crate::serve::{
-    EndRequest, Job, Marks, Pace, ServeError, ServeHost, ServedAt, Server, serve_until,
-};
+use crate::medium::ErrorMarks;
+use crate::serve::{EndRequest, Job, Pace, ServeError, ServeHost, ServedAt, Server, serve_until};
 use std::io;
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
@@ -29,7 +28,7 @@ impl Served {
     /// `setup` has mistakes, the address is in use, or other machines would reach it.
     pub fn ring(drives: u8, setup: &str, address: &str) -> Result<Self, Error> {
         let (plan, link) = released(drives, setup)?;
-        let server = Server::new(plan, link, Pace::Line, Marks::None);
+        let server = Server::new(plan, link, Pace::Line, ErrorMarks::None);
         let job = Job {
             places: vec![ServedAt::Tcp(address.to_owned())],
             ..Job::default()

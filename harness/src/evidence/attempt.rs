@@ -4,7 +4,7 @@ use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
 use crate::buses::twin::{Conversation, Twin};
-use crate::file::values::Wire;
+use crate::file::values::LinkName;
 use crate::library::Entry;
 use crate::link::{
     Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
@@ -296,7 +296,7 @@ pub(super) fn heard(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
 }
 
 /// The master's own links and those between drives that are given by the number of their ring; all links of simulated rings.
-fn links(header: &Header, inner: impl Iterator<Item = (u8, Wire)>) -> Vec<(usize, usize)> {
+fn links(header: &Header, inner: impl Iterator<Item = (u8, LinkName)>) -> Vec<(usize, usize)> {
     let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
     let inner: Vec<_> = inner
         .map(|(ring, link)| {

@@ -238,19 +238,19 @@ impl Serialize for KilobitRate {
     }
 }
 
-/// One wire of a ring by its ends, as a scenario writes it: `98->97`, `master->99`, `0->master`. An end that
+/// A link of a ring by its ends, as a scenario writes it: `98->97`, `master->99`, `0->master`. An end that
 /// is `None` is the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "String")]
-pub struct Wire {
+pub struct LinkName {
     /// Who sends.
     pub from: Option<u8>,
     /// Who receives.
     pub to: Option<u8>,
 }
 
-impl Wire {
-    /// Whether a ring of `drives` drives has this wire: bytes go from the master to the drive with the highest address and down
+impl LinkName {
+    /// Whether a ring of `drives` drives has this link: bytes go from the master to the drive with the highest address and down
     /// to drive 0 (ND21 8.1).
     #[must_use]
     pub fn is_in(self, drives: u8) -> bool {
@@ -263,7 +263,7 @@ impl Wire {
     }
 }
 
-impl FromStr for Wire {
+impl FromStr for LinkName {
     type Err = ValueError;
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
@@ -287,16 +287,16 @@ impl FromStr for Wire {
     }
 }
 
-impl fmt::Display for Wire {
+impl fmt::Display for LinkName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
         write!(f, "{}->{}", end(self.from), end(self.to))
     }
 }
 
-/// What each of these values has in common: from and to a text, and a `format` by which a file is checked.
+/// What each of these values has in common: from and to a text, and a name and a `format` in the schema by which a file is checked.
 macro_rules! text_values {
-    ($($value:ident $format:literal $about:literal;)*) => {
+    ($($value:ident $schema:literal $format:literal $about:literal;)*) => {
         $(
             impl TryFrom<String> for $value {
                 type Error = ValueError;
@@ -314,7 +314,7 @@ macro_rules! text_values {
 
             impl JsonSchema for $value {
                 fn schema_name() -> Cow<'static, str> {
-                    stringify!($value).into()
+                    $schema.into()
                 }
 
                 fn json_schema(_: &mut SchemaGenerator) -> Schema {
@@ -334,10 +334,10 @@ macro_rules! text_values {
 }
 
 text_values! {
-    Time "drivebench-time" "a time above 0 with its unit: 100ms, 5s, 1h";
-    Speed "drivebench-speed" "a speed above 0 with its unit: 300rpm";
-    MaxSpeed "drivebench-max-speed" "a speed above 0 with its unit: 300rpm, 10%";
-    Percent "drivebench-percent" "a share above 0% and below 200%: 50%";
-    Hertz "drivebench-frequency" "a frequency with its unit: 35Hz";
-    Wire "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
+    Time "Time" "drivebench-time" "a time above 0 with its unit: 100ms, 5s, 1h";
+    Speed "Speed" "drivebench-speed" "a speed above 0 with its unit: 300rpm";
+    MaxSpeed "MaxSpeed" "drivebench-max-speed" "a speed above 0 with its unit: 300rpm, 10%";
+    Percent "Percent" "drivebench-percent" "a share above 0% and below 200%: 50%";
+    Hertz "Hertz" "drivebench-frequency" "a frequency with its unit: 35Hz";
+    LinkName "Wire" "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
 }

@@ -17,7 +17,7 @@ use std::time;
 
 /// Where an inner link is listened to or cut open.
 #[derive(Debug)]
-pub enum Ports {
+pub enum InnerPorts {
     /// A receiver beside the link.
     Tap(Wire),
     /// One port: its receiver hears the drive in front, its transmitter feeds the drive behind.
@@ -61,7 +61,7 @@ pub struct InnerLink {
     pub(crate) ring: usize,
     /// Counted from the master's outgoing link.
     pub(crate) place: usize,
-    ports: Ports,
+    ports: InnerPorts,
     pub(crate) tamper: Tamper,
     queue: VecDeque<Waiting>,
     free: Instant,
@@ -78,7 +78,7 @@ pub struct InnerLink {
 impl InnerLink {
     /// The `place`-th link of a ring, counted from the master's outgoing one.
     #[must_use]
-    pub fn new(ring: usize, place: usize, ports: Ports) -> Self {
+    pub fn new(ring: usize, place: usize, ports: InnerPorts) -> Self {
         Self {
             ring,
             place,
@@ -98,7 +98,7 @@ impl InnerLink {
     /// Whether bytes pass through, so that they can be changed.
     #[must_use]
     pub fn passes(&self) -> bool {
-        !matches!(self.ports, Ports::Tap(_))
+        !matches!(self.ports, InnerPorts::Tap(_))
     }
 
     /// What passing bytes on has cost.
@@ -109,8 +109,8 @@ impl InnerLink {
 
     pub(crate) fn shows_errors(&self) -> bool {
         match &self.ports {
-            Ports::Tap(wire) | Ports::Interposer(wire) => wire.abilities().shows_errors,
-            Ports::TwoPortInterposer(up, down) => {
+            InnerPorts::Tap(wire) | InnerPorts::Interposer(wire) => wire.abilities().shows_errors,
+            InnerPorts::TwoPortInterposer(up, down) => {
                 up.abilities().shows_errors && down.abilities().sends_wrong_parity
             }
         }
@@ -118,8 +118,8 @@ impl InnerLink {
 
     pub(crate) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
         let (first, second) = match &self.ports {
-            Ports::Tap(wire) | Ports::Interposer(wire) => (wire, None),
-            Ports::TwoPortInterposer(up, down) => (up, Some(down)),
+            InnerPorts::Tap(wire) | InnerPorts::Interposer(wire) => (wire, None),
+            InnerPorts::TwoPortInterposer(up, down) => (up, Some(down)),
         };
         std::iter::once(first).chain(second).map(Wire::poll_fd)
     }
@@ -157,8 +157,8 @@ impl InnerLink {
     ) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
         let (up, passes) = match &mut self.ports {
-            Ports::Tap(wire) => (wire, false),
-            Ports::Interposer(wire) | Ports::TwoPortInterposer(wire, _) => (wire, true),
+            InnerPorts::Tap(wire) => (wire, false),
+            InnerPorts::Interposer(wire) | InnerPorts::TwoPortInterposer(wire, _) => (wire, true),
         };
         let result = up.receive(&mut bytes);
         let read = time::Instant::now();
@@ -212,8 +212,8 @@ impl InnerLink {
 
     fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
         let down = match &mut self.ports {
-            Ports::Tap(_) => return Ok(()),
-            Ports::Interposer(wire) | Ports::TwoPortInterposer(_, wire) => wire,
+            InnerPorts::Tap(_) => return Ok(()),
+            InnerPorts::Interposer(wire) | InnerPorts::TwoPortInterposer(_, wire) => wire,
         };
         let mut gone = Vec::new();
         while let Some(&(start, outgoing, read)) = self.queue.front() {

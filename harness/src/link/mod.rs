@@ -19,7 +19,7 @@ pub(crate) mod tamper;
 pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::segment::FrameFault;
-pub use inner::{Delay, InnerLink, Ports};
+pub use inner::{Delay, InnerLink, InnerPorts};
 pub use octets::Octets;
 pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;

@@ -490,7 +490,7 @@ impl<A: Accounting> Pump<A> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::port::{Endpoint, PortSettings, open};
+    use crate::port::{PortAddress, PortSettings, open};
     use harness_proto::line::Rate;
     use std::net::TcpListener;
 
@@ -526,7 +526,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("an address").to_string();
         let settings = PortSettings {
-            endpoint: Endpoint::Tcp(address),
+            address: PortAddress::Tcp(address),
             format: Rate::default().into(),
             marks: false,
             low_latency: false,

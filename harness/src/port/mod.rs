@@ -21,7 +21,7 @@ mod tap;
 mod wire;
 
 pub use last_words::{LastWords, Unsaid};
-pub use open::{Endpoint, OpenError, PortSettings, open, open_adapter};
+pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
 pub use tap::{PortCounts, SilentTap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
 

@@ -17,7 +17,7 @@ const CONNECT: Duration = Duration::from_secs(5);
 
 /// Where a stream is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Endpoint {
+pub enum PortAddress {
     /// A serial port: `/dev/ttyUSB0`.
     Serial(PathBuf),
     /// A pseudo terminal: its slave end.
@@ -28,7 +28,7 @@ pub enum Endpoint {
     Rfc2217(String),
 }
 
-impl std::fmt::Display for Endpoint {
+impl std::fmt::Display for PortAddress {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Serial(path) | Self::Pty(path) => write!(f, "{}", path.display()),
@@ -41,7 +41,7 @@ impl std::fmt::Display for Endpoint {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortSettings {
     /// Where.
-    pub endpoint: Endpoint,
+    pub address: PortAddress,
     /// The rate and the format of a serial line, with 8 data bits.
     pub format: Format,
     /// Whether a pty or a socket carries line errors as in-band marks.
@@ -156,20 +156,20 @@ pub(super) fn printed(format: Format) -> String {
 /// # Errors
 /// [`OpenError`]; the port is left as it was.
 pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
-    let name = settings.endpoint.to_string();
+    let name = settings.address.to_string();
     let plain = || match settings.marks {
         true => Coding::Marked(Unmark::default()),
         false => Coding::Plain,
     };
-    match &settings.endpoint {
-        Endpoint::Serial(path) => {
+    match &settings.address {
+        PortAddress::Serial(path) => {
             let (fd, serial) = serial::open(path, settings.format, settings.low_latency)?;
             let coding = Coding::Serial(Unmark::default(), Box::new(serial));
             Ok(Wire::new(fd, name, coding))
         }
-        Endpoint::Pty(path) => Ok(Wire::new(pty(path)?, name, plain())),
-        Endpoint::Tcp(address) => Ok(Wire::new(connect(address)?.into(), name, plain())),
-        Endpoint::Rfc2217(address) => {
+        PortAddress::Pty(path) => Ok(Wire::new(pty(path)?, name, plain())),
+        PortAddress::Tcp(address) => Ok(Wire::new(connect(address)?.into(), name, plain())),
+        PortAddress::Rfc2217(address) => {
             let stream = connect(address)?;
             let telnet = rfc2217::negotiate(&stream, settings.format).map_err(|error| {
                 OpenError::Negotiation {
@@ -191,17 +191,17 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
 ///
 /// # Errors
 /// [`OpenError`]; the port is left as it was.
-pub fn open_adapter(endpoint: &Endpoint, bits_per_second: u32) -> Result<Wire, OpenError> {
-    let name = endpoint.to_string();
-    match endpoint {
-        Endpoint::Serial(path) | Endpoint::Pty(path) => {
+pub fn open_adapter(address: &PortAddress, bits_per_second: u32) -> Result<Wire, OpenError> {
+    let name = address.to_string();
+    match address {
+        PortAddress::Serial(path) | PortAddress::Pty(path) => {
             match serial::open_plain(path, bits_per_second) {
                 Ok((fd, serial)) => Ok(Wire::new(fd, name, Coding::Plain).keeping(serial)),
                 Err(OpenError::PseudoTerminal(_)) => Ok(Wire::new(pty(path)?, name, Coding::Plain)),
                 Err(error) => Err(error),
             }
         }
-        Endpoint::Tcp(address) | Endpoint::Rfc2217(address) => {
+        PortAddress::Tcp(address) | PortAddress::Rfc2217(address) => {
             Ok(Wire::new(connect(address)?.into(), name, Coding::Plain))
         }
     }

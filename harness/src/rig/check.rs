@@ -1,13 +1,14 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
 use super::file::schema;
-use super::file::{Endpoint, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
+use super::file::{Endpoint, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::port_file::Port;
 use super::profile::KnownProfile;
 use super::session_error::SessionError;
 use crate::buses::syntax::Header;
 use crate::file::schema::{Step, compare, place, syntax};
-use crate::file::values::Wire;
+use crate::file::values::LinkName;
+use crate::medium::ErrorMarks;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use std::collections::BTreeSet;
@@ -202,13 +203,13 @@ impl RigCheck<'_> {
         self.one_world();
         for (index, tap) in file.tap.iter().enumerate() {
             let path = ["tap".into(), index.into()];
-            self.wire(&path, tap.ring, tap.link);
+            self.link(&path, tap.ring, tap.link);
             self.endpoint(&path, &tap.endpoint);
             self.is_physical(&path, &tap.endpoint);
         }
         for (index, interposer) in file.interposer.iter().enumerate() {
             let path = ["interposer".into(), index.into()];
-            self.wire(&path, interposer.ring, interposer.link);
+            self.link(&path, interposer.ring, interposer.link);
             let ends = [
                 ("upstream", &interposer.upstream),
                 ("downstream", &interposer.downstream),
@@ -331,7 +332,7 @@ impl RigCheck<'_> {
             );
         }
         let carries = matches!(endpoint.transport, Transport::Pty | Transport::Tcp);
-        if endpoint.marks == Marks::InBand && !carries {
+        if endpoint.marks == ErrorMarks::InBand && !carries {
             let why = match endpoint.transport {
                 Transport::Rfc2217 => "RFC 2217 cannot carry the value of a bad byte",
                 Transport::Serial => "a serial port reports line errors itself",
@@ -390,13 +391,13 @@ impl RigCheck<'_> {
         found.map(|ring| ring.drives)
     }
 
-    fn wire(&mut self, path: &[Step<'_>], ring: u8, wire: Wire) {
+    fn link(&mut self, path: &[Step<'_>], ring: u8, link: LinkName) {
         let Some(drives) = self.ring(path, ring) else {
             return;
         };
-        if !wire.is_in(drives) {
+        if !link.is_in(drives) {
             let last = drives.saturating_sub(1);
-            let message = format!("ring {ring} has no link {wire}");
+            let message = format!("ring {ring} has no link {link}");
             let expected = match last {
                 0 => "master->0 or 0->master expected here: the ring has one drive".to_owned(),
                 _ => format!(

@@ -2,7 +2,8 @@
 //! schema` prints these doc comments.
 
 use super::port_file::{PortBus, PortLimits, Ports};
-use crate::file::values::{MaxSpeed, Speed, Time, Wire};
+use crate::file::values::{LinkName, MaxSpeed, Speed, Time};
+use crate::medium::ErrorMarks;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -153,7 +154,7 @@ pub struct Endpoint {
     pub line: LineFormat,
     /// Whether line errors stand in the stream itself (pty and tcp only); default `none`.
     #[serde(default)]
-    pub marks: Marks,
+    pub marks: ErrorMarks,
     /// Whether a serial adapter is asked for a short latency (ASYNC_LOW_LATENCY); default true.
     #[serde(default = "yes")]
     pub low_latency: bool,
@@ -219,17 +220,6 @@ impl LineFormat {
     }
 }
 
-/// How a stream tells of line errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Marks {
-    /// Not at all, or by the serial driver.
-    #[default]
-    None,
-    /// In PARMRK's own coding: FF FF is a good FF, FF 00 x an x with bad parity.
-    InBand,
-}
-
 /// A port that listens on a link.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
@@ -239,7 +229,7 @@ pub struct Tap {
     #[schemars(range(min = 1, max = 2))]
     pub ring: u8,
     /// On which link.
-    pub link: Wire,
+    pub link: LinkName,
     /// Its port.
     #[serde(flatten)]
     pub endpoint: Endpoint,
@@ -254,7 +244,7 @@ pub struct Interposer {
     #[schemars(range(min = 1, max = 2))]
     pub ring: u8,
     /// In which link.
-    pub link: Wire,
+    pub link: LinkName,
     /// The port toward the sender of the link.
     pub upstream: Endpoint,
     /// The port toward its receiver.

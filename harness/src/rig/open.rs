@@ -2,11 +2,12 @@
 
 use super::Rig;
 use super::ends::Ends;
-use super::file::{Endpoint, Marks, Transport};
+use super::file::{Endpoint, Transport};
 use super::lock::{PortLock, PortLockError};
 use super::scan::{self, FoundPort, MatchError};
 use crate::buses;
-use crate::link::{InnerLink, Ports};
+use crate::link::{InnerLink, InnerPorts};
+use crate::medium::ErrorMarks;
 use crate::port::{self, OpenError, PortSettings, Wire};
 use crate::scenario::problem::Problems;
 use harness_proto::line::Rate;
@@ -91,15 +92,20 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     let mut inner = Vec::new();
     for tap in &rig.file.tap {
         let wire = wire(&tap.endpoint, &ports, &mut locks)?;
-        inner.push(inner_link(rig, tap.ring, tap.link.from, Ports::Tap(wire)));
+        inner.push(inner_link(
+            rig,
+            tap.ring,
+            tap.link.from,
+            InnerPorts::Tap(wire),
+        ));
     }
     for interposer in &rig.file.interposer {
         let up = wire(&interposer.upstream, &ports, &mut locks)?;
         let interposer_ports = if interposer.upstream == interposer.downstream {
-            Ports::Interposer(up)
+            InnerPorts::Interposer(up)
         } else {
             let down = wire(&interposer.downstream, &ports, &mut locks)?;
-            Ports::TwoPortInterposer(up, down)
+            InnerPorts::TwoPortInterposer(up, down)
         };
         let from = interposer.link.from;
         inner.push(inner_link(rig, interposer.ring, from, interposer_ports));
@@ -114,7 +120,7 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     })
 }
 
-fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: Ports) -> InnerLink {
+fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: InnerPorts) -> InnerLink {
     let index = usize::from(ring.saturating_sub(1));
     let drives = rig.rings().nth(index).map_or(0, |(_, ring)| ring.drives);
     let place = from.map_or(0, |from| usize::from(drives.saturating_sub(from)));
@@ -129,19 +135,19 @@ fn wire(
     let named = endpoint.port.clone().unwrap_or_default();
     let place = match endpoint.transport {
         Transport::Serial if endpoint.port.is_none() => {
-            port::Endpoint::Serial(scan::resolve(ports, &endpoint.udev)?)
+            port::PortAddress::Serial(scan::resolve(ports, &endpoint.udev)?)
         }
-        Transport::Serial => port::Endpoint::Serial(named.into()),
-        Transport::Pty => port::Endpoint::Pty(named.into()),
-        Transport::Rfc2217 => port::Endpoint::Rfc2217(named),
+        Transport::Serial => port::PortAddress::Serial(named.into()),
+        Transport::Pty => port::PortAddress::Pty(named.into()),
+        Transport::Rfc2217 => port::PortAddress::Rfc2217(named),
         // Checked before: a rig is simulated as a whole or not at all.
-        Transport::Tcp | Transport::Sim => port::Endpoint::Tcp(named),
+        Transport::Tcp | Transport::Sim => port::PortAddress::Tcp(named),
     };
     let name = place.to_string();
     let wire = port::open(&PortSettings {
-        endpoint: place,
+        address: place,
         format: Rate::from(endpoint.line).into(),
-        marks: endpoint.marks == Marks::InBand,
+        marks: endpoint.marks == ErrorMarks::InBand,
         low_latency: endpoint.low_latency,
     })?;
     if matches!(endpoint.transport, Transport::Serial | Transport::Pty) {

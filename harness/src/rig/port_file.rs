@@ -1,8 +1,8 @@
 //! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
-use super::file::Marks;
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use crate::link::frames::AdapterPlace;
+use crate::medium::ErrorMarks;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +44,7 @@ pub struct Port {
     pub tcp: Option<String>,
     /// Whether line errors stand in the stream itself (a pseudo terminal or `tcp` only); default `none`.
     #[serde(default, skip_serializing_if = "is_unmarked")]
-    pub marks: Marks,
+    pub marks: ErrorMarks,
     /// Whether a half-duplex adapter gives back what the bench sends; it is compared, and is no part of the record; default false.
     #[serde(default, skip_serializing_if = "is_false")]
     pub echo: bool,
@@ -108,7 +108,7 @@ impl Port {
     pub fn more(&self) -> Vec<&'static str> {
         let all = [
             ("channel", self.channel.is_some()),
-            ("marks", self.marks != Marks::None),
+            ("marks", self.marks != ErrorMarks::None),
             ("echo", self.echo),
         ];
         let given = all.into_iter().filter(|(_, given)| *given);
@@ -221,8 +221,8 @@ fn twenty_milliseconds() -> Time {
     clippy::trivially_copy_pass_by_ref,
     reason = "serde calls it with a reference"
 )]
-fn is_unmarked(marks: &Marks) -> bool {
-    *marks == Marks::None
+fn is_unmarked(marks: &ErrorMarks) -> bool {
+    *marks == ErrorMarks::None
 }
 
 #[expect(

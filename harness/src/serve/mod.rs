@@ -19,7 +19,7 @@ mod tcp;
 pub use crate::buses::rings::serve::Server;
 pub use control::ControlAnswer;
 pub(crate) use control::first;
-pub use place::{ClientRole, ControlPlace, Inner, Marks, Pace, ServedAt};
+pub use place::{ClientRole, ControlPlace, Inner, Pace, ServedAt};
 pub use served::ServedBus;
 pub(crate) use shell::{EndRequest, serve_until};
 pub use shell::{Job, ServeEnd, ServeError, ServeHost, serve};

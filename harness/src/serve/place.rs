@@ -66,15 +66,3 @@ pub enum Pace {
     /// 9.9) happen and motors turn.
     Free,
 }
-
-/// How the stream of a client carries line errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Marks {
-    /// Not at all. Every byte of the client's is a good one; a byte that comes back damaged is given as it was read (a break as
-    /// 00), and that it was damaged is lost.
-    #[default]
-    None,
-    /// In-band, as of [`harness_proto::marks`]. A byte with an error of the client's reaches the first drive with a parity error, a
-    /// 00 with an error as a break; a byte that comes back damaged is marked.
-    InBand,
-}

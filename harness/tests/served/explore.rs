@@ -3,7 +3,7 @@
 use crate::program::{ended, findings, name, said};
 use crate::ring::Served;
 use harness::explore::{Finding, RECORD};
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use harness_proto::nd21::ram;
 use harness_sim::novobus::reference;
 use std::io::{Read, Write};
@@ -36,8 +36,8 @@ impl Desk {
         let mut text = "schema = 1\n[rig]\nid = \"desk\"\n".to_owned();
         for ((number, drives), endpoint) in (1..).zip(&served.sizes).zip(&served.endpoints) {
             let (transport, port) = match endpoint {
-                Endpoint::Tcp(place) => ("tcp", place.clone()),
-                Endpoint::Pty(path) => ("pty", path.display().to_string()),
+                PortAddress::Tcp(place) => ("tcp", place.clone()),
+                PortAddress::Pty(path) => ("pty", path.display().to_string()),
                 other => panic!("{other}"),
             };
             text.push_str(&format!(
@@ -69,7 +69,7 @@ impl Desk {
 
 fn place(served: &Served) -> String {
     match &served.endpoints[0] {
-        Endpoint::Tcp(place) => place.clone(),
+        PortAddress::Tcp(place) => place.clone(),
         other => panic!("{other}"),
     }
 }

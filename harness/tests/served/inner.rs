@@ -4,9 +4,10 @@
 use harness::buses::{SimulatedLink, StreamLink};
 use harness::library::Entry;
 use harness::link::{
-    InnerLink, Line, Link, LinkFault, Moment, Octets, PlacedFault, PortLink as _, Ports, Trouble,
+    InnerLink, InnerPorts, Line, Link, LinkFault, Moment, Octets, PlacedFault, PortLink as _,
+    Trouble,
 };
-use harness::port::{Endpoint, PortSettings, Wire, open};
+use harness::port::{PortAddress, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, lacks, play_over_bus, start_anew};
 use harness::scenario::simulate;
 use harness::scenario::source::Source;
@@ -38,7 +39,7 @@ type Seen = (Option<u8>, Option<u8>, Option<LineError>);
 struct Served {
     child: Child,
     /// In the order of its lines: the ring, then the inner links.
-    endpoints: Vec<Endpoint>,
+    endpoints: Vec<PortAddress>,
     marks: bool,
     _folder: tempfile::TempDir,
 }
@@ -74,8 +75,8 @@ impl Served {
             let line = out.next().expect("it starts").expect("a line");
             let place = line.rsplit(" at ").next().expect("a place").to_owned();
             match transport {
-                "pty" => Endpoint::Pty(place.into()),
-                _ => Endpoint::Tcp(place),
+                "pty" => PortAddress::Pty(place.into()),
+                _ => PortAddress::Tcp(place),
             }
         });
         Self {
@@ -87,9 +88,9 @@ impl Served {
     }
 
     fn wire(&self, index: usize) -> Wire {
-        let endpoint = self.endpoints[index].clone();
+        let address = self.endpoints[index].clone();
         open(&PortSettings {
-            endpoint,
+            address,
             format: Rate::default().into(),
             marks: self.marks,
             low_latency: false,
@@ -104,7 +105,7 @@ impl Served {
 
     /// A link with an interposer in the middle.
     fn interposed(&self) -> StreamLink {
-        let ports = Ports::Interposer(self.wire(1));
+        let ports = InnerPorts::Interposer(self.wire(1));
         self.link(vec![InnerLink::new(0, MIDDLE, ports)])
     }
 }
@@ -243,7 +244,7 @@ fn every_fault_at_an_interposer_on_a_pty() {
 #[test]
 fn an_interposer_with_two_ports() {
     let served = Served::start("tcp", true, &[("--cut", "2->1", 2)]);
-    let ports = Ports::TwoPortInterposer(served.wire(1), served.wire(2));
+    let ports = InnerPorts::TwoPortInterposer(served.wire(1), served.wire(2));
     let mut link = served.link(vec![InnerLink::new(0, MIDDLE, ports)]);
     let faults = [(10, flip(1))];
     let mut model = simulated();
@@ -255,7 +256,7 @@ fn an_interposer_with_two_ports() {
 #[test]
 fn an_interposer_goes_on_behind_an_interruption() {
     let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
-    let inner = InnerLink::new(0, MIDDLE, Ports::Interposer(served.wire(1)));
+    let inner = InnerLink::new(0, MIDDLE, InnerPorts::Interposer(served.wire(1)));
     let ring = vec![(served.wire(0), 4)];
     let interrupt: Arc<AtomicBool> = Arc::default();
     let mut link = StreamLink::new(ring, vec![inner], Rate::default(), Arc::clone(&interrupt));
@@ -280,7 +281,8 @@ fn tapped(transport: &str, marks: bool) {
         &[("--tap", "3->2", 1), ("--tap", "1->0", 1)],
     );
     let taps = [(1, 1), (2, 3)];
-    let inner = taps.map(|(wire, place)| InnerLink::new(0, place, Ports::Tap(served.wire(wire))));
+    let inner =
+        taps.map(|(wire, place)| InnerLink::new(0, place, InnerPorts::Tap(served.wire(wire))));
     let mut link = served.link(inner.into());
     let mut model = simulated();
     assert_eq!(play(&mut link, &[]), play(&mut model, &[]));

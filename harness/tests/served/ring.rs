@@ -1,6 +1,6 @@
 //! A ring that another process serves.
 
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 /// The process and where its rings are; it ends with this value.
 pub(crate) struct Served {
     pub(crate) child: Child,
-    pub(crate) endpoints: Vec<Endpoint>,
+    pub(crate) endpoints: Vec<PortAddress>,
     pub(crate) sizes: Vec<u8>,
     _folder: tempfile::TempDir,
 }
@@ -77,8 +77,8 @@ impl Served {
             };
             let place = line.rsplit(" at ").next().expect("a place").to_owned();
             endpoints.push(match transport {
-                "pty" => Endpoint::Pty(path),
-                _ => Endpoint::Tcp(place),
+                "pty" => PortAddress::Pty(path),
+                _ => PortAddress::Tcp(place),
             });
         }
         Self {
@@ -92,8 +92,8 @@ impl Served {
     /// What a rig's file says of one of them under `[ring.1]`.
     pub(crate) fn lines(&self, ring: usize) -> String {
         let (transport, port) = match &self.endpoints[ring] {
-            Endpoint::Pty(path) => ("pty", path.display().to_string()),
-            Endpoint::Tcp(address) => ("tcp", address.clone()),
+            PortAddress::Pty(path) => ("pty", path.display().to_string()),
+            PortAddress::Tcp(address) => ("tcp", address.clone()),
             other => panic!("{other}"),
         };
         let drives = self.sizes[ring];

@@ -5,7 +5,7 @@ use crate::ring::Served;
 use harness::buses::StreamLink;
 use harness::library::{Entry, sources};
 use harness::link::{Line, Octets, PortLink as _};
-use harness::port::{Endpoint, PortSettings, Wire, open};
+use harness::port::{PortAddress, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, run, start_anew};
 use harness::scenario::simulate::simulated;
 use harness::scenario::verdict::Verdict;
@@ -27,14 +27,14 @@ fn link(served: &Served, marks: bool) -> StreamLink {
     StreamLink::new(wires.collect(), Vec::new(), Rate::default(), Arc::default())
 }
 
-fn wire(endpoint: &Endpoint, marks: bool) -> Wire {
+fn wire(address: &PortAddress, marks: bool) -> Wire {
     let settings = PortSettings {
-        endpoint: endpoint.clone(),
+        address: address.clone(),
         format: Rate::default().into(),
         marks,
         low_latency: false,
     };
-    open(&settings).unwrap_or_else(|error| panic!("{endpoint}: {error}"))
+    open(&settings).unwrap_or_else(|error| panic!("{address}: {error}"))
 }
 
 fn play_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
@@ -178,7 +178,7 @@ fn long_ones_over_a_socket_with_marks_and_a_pty_without() {
 fn bytes_that_lie_there_are_no_news() {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
-    let wires = vec![(wire(&Endpoint::Tcp(address), false), 1)];
+    let wires = vec![(wire(&PortAddress::Tcp(address), false), 1)];
     let (mut far, _) = listener.accept().expect("a client");
     let mut link = StreamLink::new(wires, Vec::new(), Rate::default(), Arc::default());
     far.write_all(&[0x80; 8]).expect("room");

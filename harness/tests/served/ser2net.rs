@@ -1,7 +1,7 @@
 //! RFC 2217 as ser2net (Debian) speaks it: a served ring on a pseudo terminal, ser2net in front of it, and the bench behind that.
 
 use crate::ring::Served;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -22,7 +22,7 @@ fn a_ring_behind_ser2net() {
         return;
     }
     let served = Served::start("nd21", &[2], "pty", false, &[]);
-    let Endpoint::Pty(path) = &served.endpoints[0] else {
+    let PortAddress::Pty(path) = &served.endpoints[0] else {
         panic!("a pseudo terminal");
     };
     let folder = tempfile::tempdir().expect("a folder");

@@ -3,7 +3,7 @@
 use crate::program::{Desk, ended};
 use crate::ring::Served;
 use crate::serve::Sim;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Lines, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
@@ -100,7 +100,7 @@ pub(crate) fn code_of(answer: &Value) -> u64 {
 
 /// A desk at a served ring.
 pub(crate) fn at(served: &Served) -> Desk {
-    let Endpoint::Tcp(address) = &served.endpoints[0] else {
+    let PortAddress::Tcp(address) = &served.endpoints[0] else {
         panic!("a socket");
     };
     Desk::new(&format!(

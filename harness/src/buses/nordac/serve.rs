@@ -8,12 +8,13 @@ use super::language::now::{NotNow, now};
 use super::live::Recorder;
 use super::simulate::Bench;
 use crate::counted::counted;
+use crate::medium::ErrorMarks;
 use crate::scenario::parse::header::{Part, parse_step, read};
 use crate::scenario::plan::{Plan, plan as settle, plan_step};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
-use crate::serve::{ControlAnswer, Marks, ServedBus, first};
+use crate::serve::{ControlAnswer, ServedBus, first};
 use crate::web::LiveView;
 use harness_proto::decode::Decoded;
 use harness_proto::line::{LineError, Received};
@@ -61,7 +62,7 @@ struct Seat {
 pub(crate) struct SegmentServer {
     pub(super) bench: Bench,
     pub(super) plan: Plan<Nordac>,
-    marks: Marks,
+    marks: ErrorMarks,
     /// What a live page shows, while one is open.
     pub(super) recorder: Option<Recorder>,
     seats: Vec<Seat>,
@@ -103,7 +104,7 @@ pub(crate) fn bench(
 
 impl SegmentServer {
     /// Serves the slaves of a plan to this number of clients.
-    pub(crate) fn new(plan: Plan<Nordac>, clients: usize, marks: Marks) -> Self {
+    pub(crate) fn new(plan: Plan<Nordac>, clients: usize, marks: ErrorMarks) -> Self {
         let mut bench = Bench::with_guests(&plan.setup, clients.saturating_sub(1));
         bench.line().keep_no_record();
         Self {
@@ -170,8 +171,8 @@ impl SegmentServer {
             while let Some((_, read)) = host.receive() {
                 let marked = mark(read);
                 let octets = match self.marks {
-                    Marks::None => std::slice::from_ref(&read.byte),
-                    Marks::InBand => marked.as_bytes(),
+                    ErrorMarks::None => std::slice::from_ref(&read.byte),
+                    ErrorMarks::InBand => marked.as_bytes(),
                 };
                 if !seat.taken {
                 } else if seat.outbox.len() + octets.len() > UNREAD {
@@ -283,8 +284,8 @@ impl ServedBus for SegmentServer {
         let mut wrong = Ok(());
         for &octet in octets {
             match self.marks {
-                Marks::None => own.begun.push(Received::good(octet)),
-                Marks::InBand => match own.unmark.push(octet) {
+                ErrorMarks::None => own.begun.push(Received::good(octet)),
+                ErrorMarks::InBand => match own.unmark.push(octet) {
                     None => {}
                     Some(Err(bad)) => wrong = wrong.and(Err(bad)),
                     Some(Ok(octet)) => own.begun.push(octet),

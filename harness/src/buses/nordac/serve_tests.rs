@@ -1,7 +1,8 @@
 //! The segment behind streams of clients, without I/O: how telegrams are known, line errors, several masters.
 
 use super::serve::{SegmentServer, bench};
-use crate::serve::{Marks, ServedBus};
+use crate::medium::ErrorMarks;
+use crate::serve::ServedBus;
 use crate::web::LiveView;
 use harness_proto::time::{Instant, Span};
 
@@ -15,7 +16,7 @@ struct Clients {
 }
 
 impl Clients {
-    fn new(clients: usize, marks: Marks) -> Self {
+    fn new(clients: usize, marks: ErrorMarks) -> Self {
         let plan = bench(Some(&[8]), None).expect("a bench");
         let mut server = SegmentServer::new(plan, clients, marks);
         (0..clients).for_each(|seat| server.come(seat));
@@ -49,7 +50,7 @@ impl Clients {
 /// A telegram is whole however it is cut, and two in one piece are two.
 #[test]
 fn telegrams_are_known_by_their_octets() {
-    let mut clients = Clients::new(1, Marks::None);
+    let mut clients = Clients::new(1, ErrorMarks::None);
     for cut in 0..STATUS.len() {
         clients.send(0, &STATUS[..cut]);
         assert!(clients.hears_nothing(0), "{cut}");
@@ -74,7 +75,7 @@ fn what_is_no_telegram_is_not_answered() {
         ],
         &[0xDC, 0x03, 0x02],
     ] {
-        let mut clients = Clients::new(2, Marks::None);
+        let mut clients = Clients::new(2, ErrorMarks::None);
         clients.send(0, garbage);
         assert!(clients.hears_nothing(0), "{garbage:X?}");
         clients.send(0, &STATUS);
@@ -92,7 +93,7 @@ fn what_is_no_telegram_is_not_answered() {
 /// The begin of a telegram that does not go on leaves after 20 ms, and nothing waits for ever.
 #[test]
 fn a_telegram_that_does_not_go_on() {
-    let mut clients = Clients::new(2, Marks::None);
+    let mut clients = Clients::new(2, ErrorMarks::None);
     clients.send(0, &STATUS[..4]);
     assert!(clients.hears_nothing(1));
     assert!(clients.server.deadline() <= clients.now + Span::from_millis(10));
@@ -108,7 +109,7 @@ fn a_telegram_that_does_not_go_on() {
 /// With marks an octet goes out with wrong parity, and the slave does not answer (EN 1).
 #[test]
 fn marks_carry_parity_errors() {
-    let mut clients = Clients::new(2, Marks::InBand);
+    let mut clients = Clients::new(2, ErrorMarks::InBand);
     let [a, b, c, d, e, f] = STATUS;
     clients.send(0, &[a, b, 0xFF, 0x00, c, d, e, f]);
     assert!(clients.hears_nothing(0));
@@ -121,7 +122,7 @@ fn marks_carry_parity_errors() {
 /// At 500 kbit/s a reply begins 11 bits behind its request, and 33 idle bits stand in front of the request.
 #[test]
 fn times_are_those_of_the_line() {
-    let mut clients = Clients::new(1, Marks::None);
+    let mut clients = Clients::new(1, ErrorMarks::None);
     clients.send(0, &DIAGNOSIS);
     // 33 + 11 x 11 + 11 bits, and the first octet of the reply, at 2 us a bit.
     let first = Span::from_micros(2 * (33 + 121 + 11 + 11));
@@ -134,7 +135,7 @@ fn times_are_those_of_the_line() {
 /// A client that sends more than the line carries is held back, and one that does not read loses octets that are counted.
 #[test]
 fn memory_is_bounded() {
-    let mut clients = Clients::new(1, Marks::None);
+    let mut clients = Clients::new(1, ErrorMarks::None);
     let mut taken = 0;
     while clients.server.room(0) >= STATUS.len() && taken < 1_000_000 {
         clients.send(0, &STATUS);
@@ -157,7 +158,7 @@ fn memory_is_bounded() {
 /// Tokens that a master gives to itself are counted in a row below the others; one to another station has a row of its own.
 #[test]
 fn a_page_counts_tokens_of_a_lone_master() {
-    let mut clients = Clients::new(1, Marks::None);
+    let mut clients = Clients::new(1, ErrorMarks::None);
     clients.server.watch(true);
     let own = [0xDC, 2, 2];
     let other = [0xDC, 3, 2];
@@ -196,7 +197,7 @@ fn slaves_of_header_and_command_line() {
         addresses(&bench(None, Some(&header)).expect("a bench")),
         [9, 20]
     );
-    let mut server = SegmentServer::new(plan, 1, Marks::None);
+    let mut server = SegmentServer::new(plan, 1, ErrorMarks::None);
     for (line, answer) in [
         ("? slave 8 parameter 1621 = 2", "ok"),
         ("? slave 20 parameter 1621 = 3", "ok"),

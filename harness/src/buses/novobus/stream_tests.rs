@@ -3,7 +3,7 @@
 use super::*;
 use crate::link::Octets;
 use crate::link::pump::{SLACK, STAY};
-use crate::port::{Endpoint, PortSettings, open};
+use crate::port::{PortAddress, PortSettings, open};
 use harness_proto::novobus::sync::SYNCO;
 use std::io::Write as _;
 use std::net::{TcpListener, TcpStream};
@@ -15,7 +15,7 @@ fn link() -> (StreamLink, TcpStream) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
     let settings = PortSettings {
-        endpoint: Endpoint::Tcp(address),
+        address: PortAddress::Tcp(address),
         format: Rate::default().into(),
         marks: false,
         low_latency: false,

@@ -3,8 +3,9 @@
 use crate::buses::line_formats;
 use crate::capture::{Carries, RecordedPlace, ends};
 use crate::link::frames::AdapterPlace;
+use crate::medium::ErrorMarks;
 use crate::rig::Rig;
-use crate::rig::file::{Marks, Transport};
+use crate::rig::file::Transport;
 use harness_proto::can::BitRate;
 use harness_proto::line::{Format, Rate};
 use std::fmt;
@@ -157,7 +158,7 @@ pub(crate) fn taps_of(rig: &Rig) -> Result<(Vec<TapAt>, Rate, bool), String> {
             name: LINE.to_owned(),
             port: port_at,
         };
-        return Ok((vec![tap], Rate::default(), port.marks == Marks::InBand));
+        return Ok((vec![tap], Rate::default(), port.marks == ErrorMarks::InBand));
     }
     let mut taps = Vec::new();
     for tap in &file.tap {
@@ -178,7 +179,7 @@ pub(crate) fn taps_of(rig: &Rig) -> Result<(Vec<TapAt>, Rate, bool), String> {
             "the rig has no [[tap]]; give the taps, as in `--tap '98->97=/dev/ttyUSB1'`".to_owned(),
         );
     };
-    let marks = first.endpoint.marks == Marks::InBand;
+    let marks = first.endpoint.marks == ErrorMarks::InBand;
     let rate = Rate::from_bits_per_second(first.endpoint.line.baud());
     Ok((taps, rate.unwrap_or_default(), marks))
 }

@@ -4,7 +4,7 @@ use super::adapter::{Adapter, Slcan, Socketcand};
 use super::transport::{Stream, Transport};
 use crate::frames::slcan::{self, BitTiming, Command, Report, rate_of};
 use crate::frames::socketcand::{Messages, Request, SocketcandAnswer};
-use crate::port::{Endpoint, OpenError, Outgoing, Wire, open_adapter};
+use crate::port::{OpenError, Outgoing, PortAddress, Wire, open_adapter};
 use crate::trouble::Trouble;
 use harness_proto::can::BitRate;
 use rustix::event::{Timespec, poll};
@@ -32,7 +32,7 @@ pub enum AdapterPlace {
     /// An adapter that speaks SLCAN.
     Slcan {
         /// A serial port, a pseudo terminal or a socket.
-        at: Endpoint,
+        at: PortAddress,
         /// Bits a second on its serial line.
         baud: u32,
     },
@@ -55,8 +55,8 @@ impl AdapterPlace {
     #[must_use]
     pub fn slcan(place: &str) -> Self {
         let at = match place.contains('/') {
-            true => Endpoint::Serial(place.into()),
-            false => Endpoint::Tcp(place.to_owned()),
+            true => PortAddress::Serial(place.into()),
+            false => PortAddress::Tcp(place.to_owned()),
         };
         Self::Slcan {
             at,
@@ -195,7 +195,7 @@ pub(super) fn open(
             Ok(talk.opened(Adapter::Slcan(Slcan::new(settings.listen_only))))
         }
         AdapterPlace::Socketcand { address, channel } => {
-            let wire = open_adapter(&Endpoint::Tcp(address.clone()), DEFAULT_BAUD)?;
+            let wire = open_adapter(&PortAddress::Tcp(address.clone()), DEFAULT_BAUD)?;
             let mut talk = Talk::new(wire, interrupt);
             talk.open_socketcand(channel)?;
             Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))

@@ -3,7 +3,7 @@
 use super::{Desk, finish, playing, signal};
 use crate::program::{ended, said};
 use crate::ring::Served;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -403,7 +403,7 @@ fn a_port_without_rights() {
         return;
     }
     let served = Served::start("plain", &[2], "pty", false, &[]);
-    let Endpoint::Pty(port) = &served.endpoints[0] else {
+    let PortAddress::Pty(port) = &served.endpoints[0] else {
         panic!("a pseudo terminal");
     };
     let desk = Desk::new(2, "pty", &port.display().to_string());

@@ -8,7 +8,7 @@ mod ways_out;
 use crate::edits::fit;
 use crate::program::{ended, said, verify};
 use crate::ring::Served;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::PathBuf;
@@ -37,8 +37,8 @@ impl Desk {
 
     fn of(served: &Served) -> Self {
         let (transport, port) = match &served.endpoints[0] {
-            Endpoint::Pty(path) => ("pty", path.display().to_string()),
-            Endpoint::Tcp(address) => ("tcp", address.clone()),
+            PortAddress::Pty(path) => ("pty", path.display().to_string()),
+            PortAddress::Tcp(address) => ("tcp", address.clone()),
             other => panic!("{other}"),
         };
         Self::new(served.sizes[0], transport, &port)
@@ -161,7 +161,7 @@ fn pass(mut from: TcpStream, mut to: TcpStream, mut hold: &[u8]) {
 #[test]
 fn late_bytes_are_not_taken_for_those_of_the_next_attempt() {
     let served = Served::start("nd21", &[2], "tcp", true, &[]);
-    let Endpoint::Tcp(place) = &served.endpoints[0] else {
+    let PortAddress::Tcp(place) = &served.endpoints[0] else {
         panic!("a socket");
     };
     let desk = Desk::new(2, "tcp", &holding_back(place));
@@ -258,7 +258,7 @@ fn what_is_no_ring_says_so() {
     let desk = Desk::new(2, "serial", "/dev/there-is-none");
     ended(&desk.run(&["run"]), 3, "there is no port");
     let served = Served::start("plain", &[2], "pty", true, &[]);
-    let Endpoint::Pty(path) = &served.endpoints[0] else {
+    let PortAddress::Pty(path) = &served.endpoints[0] else {
         panic!("a pty");
     };
     let desk = Desk::new(2, "serial", path.to_str().expect("a name"));
@@ -270,7 +270,7 @@ fn what_is_no_ring_says_so() {
 fn a_ring_of_another_size_says_so() {
     for stated in [1, 3] {
         let served = Served::start("plain", &[2], "pty", true, &[]);
-        let Endpoint::Pty(path) = &served.endpoints[0] else {
+        let PortAddress::Pty(path) = &served.endpoints[0] else {
             panic!("a pty");
         };
         let desk = Desk::new(stated, "pty", path.to_str().expect("a name"));

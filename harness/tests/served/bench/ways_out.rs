@@ -4,7 +4,7 @@ use super::commands::{SAFE, desk, shows};
 use super::{Desk, finish, playing, signal};
 use crate::program::{ended, said};
 use crate::ring::Served;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use std::io::{BufRead as _, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
@@ -58,7 +58,7 @@ fn handles_signals(child: &Child) {
 /// A socket between a bench and a served ring. It sends a signal to the program of the receiver when the bench connects, or when the bench
 /// has sent its first bytes.
 fn between(served: &Served, on_connect: bool, program: Receiver<String>) -> String {
-    let Endpoint::Tcp(ring) = served.endpoints[0].clone() else {
+    let PortAddress::Tcp(ring) = served.endpoints[0].clone() else {
         panic!("a socket");
     };
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -128,7 +128,7 @@ fn interrupted_while_the_rig_is_opened() {
         turn(&desk);
         let (id, program) = channel();
         let address = between(&served, on_connect, program);
-        let Endpoint::Tcp(ring) = &served.endpoints[0] else {
+        let PortAddress::Tcp(ring) = &served.endpoints[0] else {
             panic!("a socket");
         };
         edit(&desk, ring, &address);

@@ -3,7 +3,7 @@
 use super::tty::{Seen, Tty};
 use crate::ring::Served;
 use harness::buses::novobus::top::FORM;
-use harness::port::Endpoint;
+use harness::port::PortAddress;
 use harness::top::{Heading, Screen, Top};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Write;
@@ -51,8 +51,8 @@ pub(super) fn signal(tty: &Tty, signal: Signal) {
 /// A rig file for a ring that another process serves.
 fn desk(served: &Served, folder: &Path) -> String {
     let (transport, port) = match &served.endpoints[0] {
-        Endpoint::Pty(path) => ("pty", path.display().to_string()),
-        Endpoint::Tcp(address) => ("tcp", address.clone()),
+        PortAddress::Pty(path) => ("pty", path.display().to_string()),
+        PortAddress::Tcp(address) => ("tcp", address.clone()),
         other => panic!("{other}"),
     };
     let text = format!(

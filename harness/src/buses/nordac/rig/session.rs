@@ -9,9 +9,8 @@ use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
 use crate::guard::{Guarded, Safe, Standstill, Watch};
-use crate::medium::Pieces;
-use crate::port::{Endpoint, PortSettings};
-use crate::rig::file::Marks;
+use crate::medium::{ErrorMarks, Pieces};
+use crate::port::{PortAddress, PortSettings};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
@@ -208,18 +207,18 @@ fn ends(
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
         return Ok((Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new()));
     }
-    let (endpoint, locks) = match (&port.serial, &port.tcp) {
-        (Some(path), _) if is_pseudo_terminal(path) => (Endpoint::Pty(path.into()), true),
-        (Some(path), _) => (Endpoint::Serial(path.into()), true),
-        (None, Some(address)) => (Endpoint::Tcp(address.clone()), false),
+    let (address, locks) = match (&port.serial, &port.tcp) {
+        (Some(path), _) if is_pseudo_terminal(path) => (PortAddress::Pty(path.into()), true),
+        (Some(path), _) => (PortAddress::Serial(path.into()), true),
+        (None, Some(address)) => (PortAddress::Tcp(address.clone()), false),
         (None, None) => return Err(failed(rig, "its port has no adapter")),
     };
-    let place = endpoint.to_string();
+    let place = address.to_string();
     let rate = rate(port);
     let wire = crate::port::open(&PortSettings {
-        endpoint,
+        address,
         format: rate.format(),
-        marks: port.marks == Marks::InBand,
+        marks: port.marks == ErrorMarks::InBand,
         low_latency: true,
     });
     options.unless_interrupted(rig)?;

@@ -7,13 +7,14 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::frames::FrameArguments;
 use crate::cli::output::Output;
-use crate::file::values::Wire;
+use crate::file::values::LinkName;
+use crate::medium::ErrorMarks;
 use crate::scenario::argument::duration;
 use crate::scenario::source::Source;
 use crate::serve::frames::FrameJob;
 use crate::serve::{
-    ClientRole, ControlPlace, Inner, Job, Marks, Pace, ServeEnd, ServeError, ServeHost, ServedAt,
-    Server, serve,
+    ClientRole, ControlPlace, Inner, Job, Pace, ServeEnd, ServeError, ServeHost, ServedAt, Server,
+    serve,
 };
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
@@ -85,8 +86,8 @@ pub struct SimArguments {
     #[arg(long, value_enum, default_value_t = SimSpeed::Line)]
     pub pace: SimSpeed,
     /// How the stream carries line errors.
-    #[arg(long, value_enum, default_value_t = MarksForm::None)]
-    pub marks: MarksForm,
+    #[arg(long, value_enum, default_value_t = ErrorMarks::None)]
+    pub marks: ErrorMarks,
     /// Take control lines from standard input (-) or from a listening socket (HOST:PORT).
     #[arg(long, value_name = "-|ADDRESS")]
     pub control: Option<String>,
@@ -120,21 +121,12 @@ pub enum SimSpeed {
     Free,
 }
 
-/// How a stream carries line errors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum MarksForm {
-    /// Line errors are not carried.
-    None,
-    /// As PARMRK does: FF 00 x is the byte x with an error, FF FF is a good FF.
-    InBand,
-}
-
 /// A link and its places, as written.
 #[derive(Clone, Debug)]
 pub struct InnerPlace {
     text: String,
     ring: usize,
-    wire: Wire,
+    link: LinkName,
     places: Vec<ServedAt>,
 }
 
@@ -149,7 +141,7 @@ impl FromStr for InnerPlace {
             Some(("2", link)) => (1, link),
             Some((ring, _)) => return Err(format!("there is no ring {ring}: 1 or 2 expected")),
         };
-        let wire: Wire = link.parse().map_err(|error| format!("{error}"))?;
+        let link: LinkName = link.parse().map_err(|error| format!("{error}"))?;
         let place = |text: &str| match text {
             "" => Err(expected.to_owned()),
             path if path.contains('/') => Ok(ServedAt::Pty(path.into())),
@@ -159,7 +151,7 @@ impl FromStr for InnerPlace {
         Ok(Self {
             text: text.to_owned(),
             ring,
-            wire,
+            link,
             places,
         })
     }
@@ -182,12 +174,12 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
         let drives = *sizes
             .get(given.ring)
             .ok_or_else(|| refused("the bench has one ring"))?;
-        let Some(from) = given.wire.from.filter(|_| given.wire.to.is_some()) else {
+        let Some(from) = given.link.from.filter(|_| given.link.to.is_some()) else {
             return Err(refused(
                 "the master's own links are the ring's port; a link between two drives expected",
             ));
         };
-        if !given.wire.is_in(drives) {
+        if !given.link.is_in(drives) {
             return Err(refused(&format!(
                 "a ring of {drives} has no such link; bytes go from a drive to the next lower one"
             )));
@@ -263,14 +255,6 @@ fn header(arguments: &SimArguments) -> Result<Option<Source>, Failure> {
     header.map_err(|error| Failure::File(error.into()))
 }
 
-/// How streams carry line errors.
-fn marks(arguments: &SimArguments) -> Marks {
-    match arguments.marks {
-        MarksForm::None => Marks::None,
-        MarksForm::InBand => Marks::InBand,
-    }
-}
-
 /// Where `masters` are served: nowhere, if only a live page is asked for.
 fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
     let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
@@ -312,7 +296,7 @@ fn octets(
     };
     let header = header(arguments)?;
     let slaves = (arguments.frames.slaves.as_deref(), header.as_ref());
-    buses::serve_octets(bus, slaves, marks(arguments), &job, output).map_err(Failure::from)
+    buses::serve_octets(bus, slaves, arguments.marks, &job, output).map_err(Failure::from)
 }
 
 /// Serves the drives of a bus of frames.
@@ -327,7 +311,7 @@ fn frames(
         ("--tap", !arguments.tap.is_empty()),
         ("--cut", !arguments.cut.is_empty()),
         ("--pace", arguments.pace != SimSpeed::Line),
-        ("--marks", arguments.marks != MarksForm::None),
+        ("--marks", arguments.marks != ErrorMarks::None),
         ("--slaves", arguments.frames.slaves.is_some()),
         ("--rig", arguments.rig.rig.is_some()),
     ];
@@ -371,7 +355,7 @@ fn rings(
     };
     let sizes: Vec<u8> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let inner = inner(arguments, &sizes)?;
-    let mut server = Server::new(plan, link, pace, marks(arguments));
+    let mut server = Server::new(plan, link, pace, arguments.marks);
     inner.iter().for_each(|(inner, _)| server.add(*inner));
     let places = inner.into_iter().map(|(_, place)| place);
     let job = Job {

@@ -5,8 +5,9 @@
 use super::health::Unhealthy;
 use super::line_test::{Heard, Pass, RingPace, SENT, pace_of};
 use crate::buses::novobus::locate::locate;
+use crate::medium::ErrorMarks;
 use crate::rig::Rig;
-use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
+use crate::rig::file::{Endpoint, Hooks, LineFormat, Transport};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::novobus::sync::SYNCO;
@@ -75,12 +76,12 @@ pub enum LikelyCause {
     /// The rig's file is wrong about in-band marks.
     #[error(
         "the other end of the port {}. Next: set `marks = \"{}\"` for this ring in the rig's file",
-        match right { Marks::InBand => "sends and expects in-band marks", Marks::None => "knows no in-band marks" },
-        match right { Marks::InBand => "in-band", Marks::None => "none" }
+        match right { ErrorMarks::InBand => "sends and expects in-band marks", ErrorMarks::None => "knows no in-band marks" },
+        match right { ErrorMarks::InBand => "in-band", ErrorMarks::None => "none" }
     )]
     Marks {
         /// What the file should say.
-        right: Marks,
+        right: ErrorMarks,
     },
     /// The number of drives in the rig's file is not that of the ring.
     #[error(
@@ -205,8 +206,8 @@ pub(crate) fn neighbours(rig: &Rig) -> Vec<(LikelyCause, Rig)> {
     match first.transport {
         Transport::Pty | Transport::Tcp => {
             let right = match first.marks {
-                Marks::None => Marks::InBand,
-                Marks::InBand => Marks::None,
+                ErrorMarks::None => ErrorMarks::InBand,
+                ErrorMarks::InBand => ErrorMarks::None,
             };
             vec![(LikelyCause::Marks { right }, with(&|end| end.marks = right))]
         }
@@ -370,7 +371,7 @@ mod tests {
         };
         let tcp = "transport = \"tcp\"\nport = \"127.0.0.1:4021\"";
         let found = neighbours(&rig(tcp, "[hooks.before]\ncommand = [\"true\"]\n"));
-        let right = Marks::InBand;
+        let right = ErrorMarks::InBand;
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].0, LikelyCause::Marks { right });
         assert_eq!(

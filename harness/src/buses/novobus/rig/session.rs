@@ -8,7 +8,7 @@ use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
-use crate::medium::Pieces;
+use crate::medium::{ErrorMarks, Pieces};
 use crate::rig::around::Around;
 use crate::rig::lock::{PortLock, RigLock};
 use crate::rig::open::{Opened, open};
@@ -375,7 +375,7 @@ impl Session {
         let marked: Vec<_> = self
             .rig
             .rings()
-            .map(|(_, ring)| ring.endpoint.marks == file::Marks::InBand)
+            .map(|(_, ring)| ring.endpoint.marks == ErrorMarks::InBand)
             .collect();
         let lacks = (0..).zip(marked).any(|(ring, marked)| {
             marked && line_test::lacks_marks(&mut self.link, ring) && self.link.trouble().is_none()

@@ -4,8 +4,9 @@ use super::recorder::Recorder;
 use crate::buses::novobus::link::SimulatedLink;
 use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
+use crate::medium::ErrorMarks;
 use crate::scenario::plan::Plan;
-use crate::serve::{ClientRole, ControlAnswer, Inner, Marks, Pace, ServedBus};
+use crate::serve::{ClientRole, ControlAnswer, Inner, Pace, ServedBus};
 use crate::web::LiveView;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
@@ -50,7 +51,7 @@ pub struct Server {
     pub(super) plan: Plan,
     pub(super) link: SimulatedLink,
     pace: Pace,
-    marks: Marks,
+    marks: ErrorMarks,
     seats: Vec<Seat>,
     /// The rings' time `base.1` is the clock's time `base.0`.
     base: (Instant, Instant),
@@ -97,11 +98,11 @@ impl Seat {
     }
 
     /// Has a byte for the client.
-    fn give(&mut self, read: Received, marks: Marks) {
+    fn give(&mut self, read: Received, marks: ErrorMarks) {
         let marked = mark(read);
         let bytes = match marks {
-            Marks::None => std::slice::from_ref(&read.byte),
-            Marks::InBand => marked.as_bytes(),
+            ErrorMarks::None => std::slice::from_ref(&read.byte),
+            ErrorMarks::InBand => marked.as_bytes(),
         };
         if !self.taken {
             return;
@@ -116,8 +117,12 @@ impl Seat {
 
 impl Server {
     /// Serves the rings of a plan, without clients at first. The clock starts at [`Instant::START`].
+    ///
+    /// Without marks every byte of a client's is a good one, and a byte that comes back damaged is given as it was read (a break as 00).
+    /// With marks, as of [`harness_proto::marks`], a byte with an error of the client's reaches the first drive with a parity error, a 00
+    /// with an error as a break.
     #[must_use]
-    pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: Marks) -> Self {
+    pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: ErrorMarks) -> Self {
         link.stop_recording();
         link.run_until(link.now() + SETTLED);
         Self {
@@ -356,8 +361,8 @@ impl ServedBus for Server {
         let mut wrong = Ok(());
         for &byte in bytes {
             match self.marks {
-                Marks::None => read.push(Received::good(byte)),
-                Marks::InBand => match seat.unmark.push(byte) {
+                ErrorMarks::None => read.push(Received::good(byte)),
+                ErrorMarks::InBand => match seat.unmark.push(byte) {
                     None => {}
                     Some(Err(bad)) => wrong = wrong.and(Err(bad)),
                     Some(Ok(byte)) => read.push(byte),

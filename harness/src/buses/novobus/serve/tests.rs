@@ -1,6 +1,7 @@
 //! Served rings in virtual time: the clock is a number.
 
 use super::*;
+use crate::medium::ErrorMarks;
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::plan;
 use crate::scenario::simulate;
@@ -19,7 +20,7 @@ const RECOVERY: [u8; 22] = [
 
 const HEADER: &str = "drive 0..last model nd21\ndrive 0..last input GPIN3 GPIN5 high\n";
 
-fn server(header: &str, sizes: &[u8], pace: Pace, marks: Marks) -> Server {
+fn server(header: &str, sizes: &[u8], pace: Pace, marks: ErrorMarks) -> Server {
     let source = Source {
         name: "test".to_owned(),
         text: header.into(),
@@ -59,7 +60,7 @@ fn run(server: &mut Server, until: Instant) {
 /// The last byte of the answer has come a byte time a link after the last byte was sent (ND21 8.4), and no sooner.
 #[test]
 fn an_answer_takes_the_time_of_the_line() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     server.advance(at(5));
     server.receive(0, &READ).expect("no marks");
     let byte = server.link.byte_time();
@@ -75,7 +76,7 @@ fn an_answer_takes_the_time_of_the_line() {
 #[test]
 fn deadlines_are_prompt_when_busy_and_rare_when_idle() {
     for drives in [1, 3, 100] {
-        let mut server = server(HEADER, &[drives], Pace::Line, Marks::None);
+        let mut server = server(HEADER, &[drives], Pace::Line, ErrorMarks::None);
         let byte = server.link.byte_time();
         let bytes = 600;
         server.receive(0, &vec![0x80; bytes]).expect("no marks");
@@ -108,7 +109,7 @@ fn deadlines_are_prompt_when_busy_and_rare_when_idle() {
 /// sent far ahead, or if there is no client.
 #[test]
 fn a_byte_that_somebody_may_wait_for_is_awaited() {
-    let mut server = server(HEADER, &[1], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[1], Pace::Line, ErrorMarks::None);
     let byte = server.link.byte_time();
     assert_eq!(server.awaited(), None, "nothing is under way");
     server.receive(0, &[0x80]).expect("no marks");
@@ -129,7 +130,7 @@ fn a_byte_that_somebody_may_wait_for_is_awaited() {
 /// and the check sequence behind 17 zeros brings it back.
 #[test]
 fn a_marked_byte_is_a_parity_error_for_the_first_drive() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::InBand);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::InBand);
     server.receive(0, &[0x80, 0xFF, 0x00, 0x80]).expect("marks");
     server.receive(0, &[0x80; 40]).expect("marks");
     run(&mut server, at(30));
@@ -155,7 +156,7 @@ fn a_marked_byte_is_a_parity_error_for_the_first_drive() {
 /// FF 00 00 is a break of one byte: the first drive sees a framing error, and the byte behind it is whole.
 #[test]
 fn a_marked_zero_is_a_break() {
-    let mut server = server(HEADER, &[1], Pace::Line, Marks::InBand);
+    let mut server = server(HEADER, &[1], Pace::Line, ErrorMarks::InBand);
     server.receive(0, &[0xFF, 0, 0, 0x80]).expect("marks");
     run(&mut server, at(5));
     assert_eq!(taken(&mut server, 0), [0, 0]);
@@ -167,8 +168,8 @@ fn a_marked_zero_is_a_break() {
 #[test]
 fn what_comes_back_damaged() {
     for (marks, expected) in [
-        (Marks::InBand, &[0xFF, 0x00, 0x81, 0x80][..]),
-        (Marks::None, &[0x81, 0x80][..]),
+        (ErrorMarks::InBand, &[0xFF, 0x00, 0x81, 0x80][..]),
+        (ErrorMarks::None, &[0x81, 0x80][..]),
     ] {
         let mut server = server(HEADER, &[2], Pace::Line, marks);
         assert_eq!(
@@ -183,7 +184,7 @@ fn what_comes_back_damaged() {
 
 #[test]
 fn a_foreign_stream_is_noticed_and_the_rest_is_taken() {
-    let mut server = server(HEADER, &[1], Pace::Line, Marks::InBand);
+    let mut server = server(HEADER, &[1], Pace::Line, ErrorMarks::InBand);
     let error = server.receive(0, &[0x80, 0xFF, 0x12, 0x80]);
     assert_eq!(error, Err(BadMark { byte: 0x12 }));
     run(&mut server, at(5));
@@ -193,7 +194,7 @@ fn a_foreign_stream_is_noticed_and_the_rest_is_taken() {
 /// Half a second of bytes waits, no more; what has left makes room again.
 #[test]
 fn a_fast_client_is_held_back() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     let room = server.room(0);
     assert_eq!(room, 1745);
     server.receive(0, &vec![0x80; room]).expect("no marks");
@@ -205,7 +206,7 @@ fn a_fast_client_is_held_back() {
 /// What a client does not read is bounded and counted.
 #[test]
 fn a_client_that_does_not_read_loses_bytes() {
-    let mut server = server(HEADER, &[1], Pace::Free, Marks::None);
+    let mut server = server(HEADER, &[1], Pace::Free, ErrorMarks::None);
     for turn in 0..80 {
         server.receive(0, &[0x80; 1000]).expect("no marks");
         run(&mut server, at(turn + 1));
@@ -220,7 +221,7 @@ fn a_client_that_does_not_read_loses_bytes() {
 #[test]
 fn free_pace_leaps_over_bytes_and_not_over_silence() {
     let header = format!("{HEADER}drive 0..last memory Flags2 = 04\n");
-    let mut server = server(&header, &[3], Pace::Free, Marks::None);
+    let mut server = server(&header, &[3], Pace::Free, ErrorMarks::None);
     server.receive(0, &READ).expect("no marks");
     server.advance(Instant::START);
     assert_eq!(taken(&mut server, 0), ANSWER);
@@ -234,7 +235,7 @@ fn free_pace_leaps_over_bytes_and_not_over_silence() {
 /// A program that was stopped for an hour does not compute an hour of motion before it answers.
 #[test]
 fn a_long_stop_is_not_made_up_for() {
-    let mut server = server(HEADER, &[1], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[1], Pace::Line, ErrorMarks::None);
     server.advance(at(3_600_000));
     assert_eq!(server.time(), at(1_000) + SETTLED);
     server.receive(0, &[0x80]).expect("no marks");
@@ -246,7 +247,7 @@ fn a_long_stop_is_not_made_up_for() {
 fn two_rings_have_two_clients_and_one_clock() {
     let second = HEADER.replace("0..last", "2:0..last");
     let header = format!("{HEADER}{second}");
-    let mut server = server(&header, &[3, 2], Pace::Line, Marks::None);
+    let mut server = server(&header, &[3, 2], Pace::Line, ErrorMarks::None);
     assert_eq!((server.rings(), server.drives(1)), (2, 2));
     server.receive(0, &[0x80]).expect("no marks");
     server.receive(1, &[0x80, 0x80]).expect("no marks");
@@ -264,7 +265,7 @@ fn two_rings_have_two_clients_and_one_clock() {
 /// A client that goes takes nothing with it and leaves nothing behind.
 #[test]
 fn the_next_client_gets_none_of_the_last_ones_bytes() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::InBand);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::InBand);
     server.receive(0, &[0x80, 0xFF]).expect("half a mark");
     run(&mut server, at(5));
     server.go(0);
@@ -278,7 +279,7 @@ fn the_next_client_gets_none_of_the_last_ones_bytes() {
 
 #[test]
 fn lines_of_control() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     for (line, answer) in [
         ("drive 0 input GPIN5 low", Some("ok")),
         ("? drive 0 nist = 0rpm +-5rpm  # it stands", Some("ok")),
@@ -329,7 +330,7 @@ fn lines_of_control() {
 /// The state tells an error of the bus by its code (ND21 14.11.14), and whether a drive turns.
 #[test]
 fn the_state_of_a_drive_follows_what_happens() {
-    let mut server = server(HEADER, &[2], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[2], Pace::Line, ErrorMarks::None);
     // Nominal value 1500 rpm, written to drive 1 (ND21 10.2), then a byte with a parity error.
     let mut telegram = vec![0x8C, 0xFF, 0x63, 0x52, 0x06, 0x08, 0xFF];
     let sum = telegram[2..]
@@ -358,7 +359,7 @@ fn the_state_of_a_drive_follows_what_happens() {
 /// A fault at a time happens then, however far the clock jumps; the drive without power passes nothing on.
 #[test]
 fn a_fault_at_a_time() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     let armed = server.control("! drive 1 @20ms: off");
     assert_eq!(armed, Some(ControlAnswer::Ok));
     server.receive(0, &[0x80]).expect("no marks");
@@ -380,7 +381,7 @@ fn shown(news: &LiveNews) -> (u64, usize) {
 /// the master.
 #[test]
 fn a_page_shows_each_byte_on_each_link() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     server.watch(true);
     server.receive(0, &READ).expect("no marks");
     run(&mut server, at(20));
@@ -400,7 +401,7 @@ fn a_page_shows_each_byte_on_each_link() {
 /// ND21 9.7: the zeros, and the address of the drive behind the damaged link; the check sequence ends it (9.8).
 #[test]
 fn a_page_tells_which_drive_saw_the_fault() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     server.go(0);
     server.watch(true);
     for place in 0..3 {
@@ -431,7 +432,7 @@ fn a_page_tells_which_drive_saw_the_fault() {
 /// ND21 9.7: the marks of the print stand in front of the bytes of the drive that makes them, also on a page that was opened later.
 #[test]
 fn a_page_shows_the_marks_of_the_print() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     server.go(0);
     server.receive(0, &[0x80; 7]).expect("no marks");
     run(&mut server, at(20));
@@ -470,7 +471,7 @@ fn a_page_shows_the_marks_of_the_print() {
 /// A link that is cut open is shown as such, with nothing in it.
 #[test]
 fn a_page_shows_where_a_ring_is_cut() {
-    let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
     server.add(Inner {
         ring: 0,
         link: 1,
@@ -496,7 +497,7 @@ fn a_page_shows_where_a_ring_is_cut() {
 /// A page that is opened beside a line at full speed gets the newest rows, and the number of the others.
 #[test]
 fn a_picture_has_bounds() {
-    let mut server = server(HEADER, &[3], Pace::Free, Marks::None);
+    let mut server = server(HEADER, &[3], Pace::Free, ErrorMarks::None);
     server.watch(true);
     for turn in 0..5 {
         server.receive(0, &[0x81; 1000]).expect("no marks");
@@ -518,10 +519,10 @@ proptest! {
         free in any::<bool>(),
     ) {
         let pace = if free { Pace::Free } else { Pace::Line };
-        let mut whole = server(HEADER, &[4], Pace::Line, Marks::None);
+        let mut whole = server(HEADER, &[4], Pace::Line, ErrorMarks::None);
         whole.receive(0, &bytes).expect("no marks");
         run(&mut whole, at(200));
-        let mut cut = server(HEADER, &[4], pace, Marks::None);
+        let mut cut = server(HEADER, &[4], pace, ErrorMarks::None);
         let (mut rest, mut heard, mut clock) = (&bytes[..], Vec::new(), 0);
         for (length, millis) in cuts {
             let (head, tail) = rest.split_at(length.min(rest.len()));
@@ -545,7 +546,7 @@ proptest! {
     ) {
         let tap = Inner { ring: 0, link: 1, role: ClientRole::Tap };
         let [mut alone, mut beside] = [(); 2].map(|()| {
-            let mut server = server(HEADER, &[3], Pace::Line, Marks::None);
+            let mut server = server(HEADER, &[3], Pace::Line, ErrorMarks::None);
             server.add(tap);
             server.come(1);
             server.receive(0, &bytes).expect("no marks");
@@ -572,7 +573,7 @@ proptest! {
     /// No line of control is too odd for an answer of one line.
     #[test]
     fn every_line_is_answered(line in "(! |\\? |drive )?[ -~äöü\t]{0,40}") {
-        let mut server = server(HEADER, &[2], Pace::Line, Marks::None);
+        let mut server = server(HEADER, &[2], Pace::Line, ErrorMarks::None);
         if let Some(answer) = server.control(&line) {
             prop_assert!(!answer.to_string().contains('\n'));
         }
