@@ -10,13 +10,14 @@
 mod gate;
 mod guarded;
 mod safe;
+mod standstill;
 mod watch;
 
 pub use crate::buses::rings::guard::{
-    Denial, Found, Guard, Limits, Need, NotSafe, SafeState, SafeStep, Standstill, blind_stop,
-    safe_state,
+    Denial, Found, Guard, Limits, Need, NotSafe, SafeConfirmation, blind_stop, safe_state,
 };
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
 pub use safe::Safe;
+pub use standstill::{Standstill, StandstillStep};
 pub use watch::Watch;

@@ -2,14 +2,14 @@
 
 use super::{Rig, file};
 use crate::file::values::MaxSpeed;
-use crate::guard::{Limits, SafeStep, Standstill};
+use crate::guard::{Limits, Standstill, StandstillStep};
 use harness_proto::time::Span;
 
 /// The safe state of a rig's file, as far as drives go.
 pub(crate) fn standing(wanted: &file::SafeState) -> Standstill {
     let step = |step: &file::SafeStep| match step {
-        file::SafeStep::Stop => Some(SafeStep::Stop),
-        file::SafeStep::Block => Some(SafeStep::Block),
+        file::SafeStep::Stop => Some(StandstillStep::Stop),
+        file::SafeStep::Block => Some(StandstillStep::Block),
         file::SafeStep::PowerOff => None,
     };
     Standstill {

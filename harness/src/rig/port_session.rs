@@ -6,7 +6,7 @@ use super::segment::observed::Beats;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};
-use crate::guard::{Guarded, Safe, SafeStep, Standstill, Watch};
+use crate::guard::{Guarded, Safe, Standstill, StandstillStep, Watch};
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Pieces};
 use crate::scenario::source::Source;
@@ -214,7 +214,7 @@ impl<D: PortDrives> PortSession<D> {
     pub fn make_safe(&mut self) -> Safe {
         self.link.reset_after_denial();
         let wanted = Standstill {
-            order: vec![SafeStep::Stop, SafeStep::Block],
+            order: vec![StandstillStep::Stop, StandstillStep::Block],
             ..standing(&self.rig.file.safe_state)
         };
         let drives = &self.drives;

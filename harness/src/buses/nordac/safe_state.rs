@@ -2,7 +2,7 @@
 
 use super::rig::talk::{Talk, TalkError};
 use super::rig::{MASTER, RigSlave};
-use crate::guard::{Guarded, Safe, SafeStep, Standstill};
+use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
 use harness_proto::nordac::master::ExchangeError;
 use harness_proto::nordac::words::{State, stw, zsw};
@@ -146,7 +146,7 @@ fn make_safe(
         ppo,
         standing,
     };
-    let stops = standing.order.contains(&SafeStep::Stop);
+    let stops = standing.order.contains(&StandstillStep::Stop);
     let modes = [
         (Diagnosis::SYNC, GlobalControl::UNSYNC),
         (Diagnosis::FREEZE, GlobalControl::UNFREEZE),
@@ -164,7 +164,7 @@ fn make_safe(
     if stops {
         off.stop()?;
     }
-    match standing.order.contains(&SafeStep::Block) {
+    match standing.order.contains(&StandstillStep::Block) {
         true => off.block(),
         false => Ok("stopped".to_owned()),
     }
@@ -306,7 +306,7 @@ mod tests {
         drive.inverter().state().output_on()
     }
 
-    fn safe(line: &mut Guarded<Bench>, slaves: &[RigSlave], order: &[SafeStep]) -> Safe {
+    fn safe(line: &mut Guarded<Bench>, slaves: &[RigSlave], order: &[StandstillStep]) -> Safe {
         let standing = Standstill {
             order: order.to_vec(),
             within: Span::from_millis(500),
@@ -333,7 +333,11 @@ mod tests {
             let (mut line, slaves) = line(setup, Limits::unlimited());
             run(&mut line, &slaves);
             assert!(is_on(&line, 8), "{name}");
-            let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+            let safe = safe(
+                &mut line,
+                &slaves,
+                &[StandstillStep::Stop, StandstillStep::Block],
+            );
             assert!(safe.confirmed, "{safe} {name}");
             for slave in &slaves {
                 assert!(!is_on(&line, slave.address), "{name}");
@@ -345,7 +349,7 @@ mod tests {
     #[test]
     fn other_ways_in() {
         let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
-        let none = safe(&mut line, &slaves, &[SafeStep::Block]);
+        let none = safe(&mut line, &slaves, &[StandstillStep::Block]);
         assert!(none.confirmed, "{none}");
         for seconds in [0, 5] {
             let (mut line, slaves) = self::line(vec![slave(8, PpoType::One)], Limits::unlimited());
@@ -383,7 +387,11 @@ mod tests {
                 is_on(&line, 8),
                 "zeros and an end of the exchange stop nothing"
             );
-            let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+            let safe = safe(
+                &mut line,
+                &slaves,
+                &[StandstillStep::Stop, StandstillStep::Block],
+            );
             assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
         }
     }
@@ -397,7 +405,11 @@ mod tests {
         let words = image(stw::START).encode(PpoType::One);
         let exchange = Pdu::new(8, MASTER, control, &words).expect("fits");
         line.send_octets(0, &Telegram::Pdu(exchange).encode());
-        let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+        let safe = safe(
+            &mut line,
+            &slaves,
+            &[StandstillStep::Stop, StandstillStep::Block],
+        );
         assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
     }
 
@@ -407,7 +419,7 @@ mod tests {
         let (mut line, slaves) = line(both, Limits::unlimited());
         run(&mut line, &slaves[1..]);
         line.inject(0, PlacedFault::Drive(8, DriveFault::Off), Moment::Now);
-        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
         assert!(!safe.confirmed);
         assert!(
             safe.words
@@ -426,10 +438,10 @@ mod tests {
         assert!(deaf.deviation.is_some());
         let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
         run(&mut line, &slaves);
-        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
         assert!(!safe.confirmed, "{safe}");
         assert!(safe.words.contains("the output is on"), "{safe}");
-        let safe = self::safe(&mut line, &slaves, &[SafeStep::Stop]);
+        let safe = self::safe(&mut line, &slaves, &[StandstillStep::Stop]);
         assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
     }
 
@@ -454,7 +466,7 @@ mod tests {
         line.send_octets(0, &[SD2]);
         assert!(matches!(line.trouble(), Some(Trouble::Denied(_))));
         line.reset_after_denial();
-        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
         assert!(safe.confirmed, "{safe}");
     }
 

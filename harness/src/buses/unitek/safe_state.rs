@@ -2,7 +2,7 @@
 
 use super::driver::{Driver, Error};
 use super::rig::Axis;
-use crate::guard::{Guarded, Safe, SafeStep, Standstill};
+use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
 use crate::medium::Out;
 use harness_proto::can::Frame;
@@ -124,13 +124,14 @@ fn make_safe(
             why = Err(error.to_string());
         }
     };
-    if standing.order.contains(&SafeStep::Stop) && driver.permits_write(axis, COMMANDS[0], 0) {
+    if standing.order.contains(&StandstillStep::Stop) && driver.permits_write(axis, COMMANDS[0], 0)
+    {
         note(driver.write(axis, COMMANDS[0], Data::Short(0)).map(|_| ()));
         // A torque command would end the ramp. A drive that does not stand in time is locked all the same.
         let _seen_again_below = stands(driver, axis, standing);
         note(driver.write(axis, COMMANDS[1], Data::Short(0)).map(|_| ()));
     }
-    if standing.order.contains(&SafeStep::Block) {
+    if standing.order.contains(&StandstillStep::Block) {
         note(driver.lock(axis));
     }
     for (_, register) in cycles.iter().filter(|(rx, _)| *rx == axis.rx) {
@@ -145,7 +146,7 @@ fn make_safe(
     let [mode, speed, torque] = [0x51, 0x31, 0x90].map(|register| read(driver, register));
     let value = |reply: Reply| low(reply.data.bits());
     let (mode, speed, torque) = (value(mode?), value(speed?), value(torque?));
-    let locks = standing.order.contains(&SafeStep::Block);
+    let locks = standing.order.contains(&StandstillStep::Block);
     if locks && (mode & MODE_LOCK == 0 || speed != 0 || torque != 0) {
         return Err(format!(
             "MODE reads {mode:04X}, the speed command {speed:04X}, the torque command {torque:04X}"

@@ -4,7 +4,7 @@ use super::{axis, bus, guarded, ring, size};
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::OpenRings;
 use harness::buses::novobus::link::BesideTheBus as _;
-use harness::guard::{Guarded, Limits, SafeState, Standstill, blind_stop, safe_state};
+use harness::guard::{Guarded, Limits, SafeConfirmation, Standstill, blind_stop, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Position, PositionMode};
@@ -57,7 +57,7 @@ fn word(line: &Guarded<SimulatedLink>, drive: u8, address: u16) -> i16 {
 fn turning_motors_stand_and_are_blocked() {
     let mut line = in_motion();
     let state = safe_state(&mut line, &[size(3)], &Standstill::default());
-    assert_eq!(state, SafeState::Confirmed(vec![size(3)]));
+    assert_eq!(state, SafeConfirmation::Confirmed(vec![size(3)]));
     for drive in 0..3 {
         assert!(word(&line, drive, ram::NIST).abs() <= 20);
         assert_eq!(word(&line, drive, ram::NSOLL), 0);
@@ -93,7 +93,7 @@ fn half_a_telegram_does_not_keep_it_away() {
     assert_eq!(line.peek(0, 1, ram::STATUS), before);
     line.reset_after_denial();
     let state = safe_state(&mut line, &[size(2)], &Standstill::default());
-    assert_eq!(state, SafeState::Confirmed(vec![size(2)]), "{state}");
+    assert_eq!(state, SafeConfirmation::Confirmed(vec![size(2)]), "{state}");
 }
 
 #[test]
@@ -101,7 +101,8 @@ fn a_drive_without_power_is_named() {
     let mut line = in_motion();
     line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)], &Standstill::default())
+    let SafeConfirmation::NotConfirmed(drives) =
+        safe_state(&mut line, &[size(3)], &Standstill::default())
     else {
         panic!("confirmed");
     };
@@ -123,7 +124,7 @@ fn a_cut_ring_is_not_confirmed() {
     line.inject(0, PlacedFault::Link(0, LinkFault::Cut), Moment::Now);
     let begin = line.now();
     let state = safe_state(&mut line, &[size(3)], &Standstill::default());
-    assert!(matches!(&state, SafeState::NotConfirmed(drives) if drives.len() == 3));
+    assert!(matches!(&state, SafeConfirmation::NotConfirmed(drives) if drives.len() == 3));
     assert!(state.to_string().contains("NOT confirmed"));
     assert!(line.now().since(begin) < Span::from_millis(15_000));
 }
@@ -151,7 +152,7 @@ fn a_motion_of_the_positioning_controller_ends() {
     }
     assert!(word(&line, 0, ram::NIST).abs() > 200);
     let state = safe_state(&mut line, &[size(1)], &Standstill::default());
-    assert_eq!(state, SafeState::Confirmed(vec![size(1)]), "{state}");
+    assert_eq!(state, SafeConfirmation::Confirmed(vec![size(1)]), "{state}");
     let end = line.now() + Span::from_millis(1_000);
     while line.now() < end && line.wait(end) {}
     assert!(word(&line, 0, ram::NIST).abs() <= 20);
@@ -170,10 +171,15 @@ fn two_rings() {
     assert_eq!(line.trouble(), None);
     line.reset_after_denial();
     let state = safe_state(&mut line, &rings, &Standstill::default());
-    assert_eq!(state, SafeState::Confirmed(rings.to_vec()), "{state}");
+    assert_eq!(
+        state,
+        SafeConfirmation::Confirmed(rings.to_vec()),
+        "{state}"
+    );
     line.inject(1, PlacedFault::Drive(2, DriveFault::Off), Moment::Now);
     line.reset_after_denial();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings, &Standstill::default())
+    let SafeConfirmation::NotConfirmed(drives) =
+        safe_state(&mut line, &rings, &Standstill::default())
     else {
         panic!("confirmed");
     };
@@ -187,7 +193,8 @@ fn plain_drives_are_not_confirmed() {
     let bench = Bench::one(Ring::new(size(2), Rate::Baud38400, plain));
     let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)], &Standstill::default())
+    let SafeConfirmation::NotConfirmed(drives) =
+        safe_state(&mut line, &[size(2)], &Standstill::default())
     else {
         panic!("confirmed");
     };

@@ -37,14 +37,14 @@ pub struct Limits {
     /// Frames may be sent that no drive of the rig's file receives: other identifiers, 29 bits.
     pub other_identifiers: bool,
     /// The highest speed that a drive may be told; any where this is `None`.
-    pub max_speed: Option<MaxSpeed>,
+    pub max_speed: Option<HighestSpeed>,
     /// Registers of [`Class::Named`] that the rig's file names.
     pub named: Vec<u8>,
 }
 
 /// The highest speed that a drive may be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MaxSpeed {
+pub enum HighestSpeed {
     /// As 31 and 34 count it: 32767 is 100 %.
     Raw(u16),
     /// In rpm; C8 says what 100 % is.

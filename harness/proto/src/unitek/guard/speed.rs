@@ -1,6 +1,6 @@
 //! The highest speed that a drive may be told.
 
-use super::MaxSpeed;
+use super::HighestSpeed;
 use super::denial::Fast;
 use crate::unitek::words::MODE_LOCK;
 
@@ -17,10 +17,10 @@ pub(super) struct Speed {
 
 impl Speed {
     /// The highest permitted speed as 31 counts it; `None` where C8 is not known.
-    fn most(self, max: MaxSpeed) -> Option<u16> {
+    fn most(self, max: HighestSpeed) -> Option<u16> {
         match max {
-            MaxSpeed::Raw(raw) => Some(raw),
-            MaxSpeed::Rpm(rpm) => {
+            HighestSpeed::Raw(raw) => Some(raw),
+            HighestSpeed::Rpm(rpm) => {
                 let full = u32::from(self.full?);
                 // The nearest, so that a command of exactly this speed passes.
                 let raw = (2 * u32::from(rpm) * 32_767 + full).checked_div(2 * full)?;
@@ -30,7 +30,7 @@ impl Speed {
     }
 
     /// Why a permitted write does not pass while there is a highest speed.
-    pub(super) fn denies(self, max: MaxSpeed, register: u8, value: u16) -> Option<Fast> {
+    pub(super) fn denies(self, max: HighestSpeed, register: u8, value: u16) -> Option<Fast> {
         let size = value.cast_signed().unsigned_abs();
         let bounds_itself = match register {
             // They change what 100 % is, or bring back a whole set of registers with it.

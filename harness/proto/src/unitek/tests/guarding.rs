@@ -1,6 +1,6 @@
 //! The guard: classes, the lock, load, new identifiers (what a write may do to a physical drive).
 
-use super::super::guard::{Class, Denial, Fast, Gate, Limits, MaxSpeed, Missing, NAMED, class};
+use super::super::guard::{Class, Denial, Fast, Gate, HighestSpeed, Limits, Missing, NAMED, class};
 use super::*;
 
 fn gate(limits: Limits) -> Gate {
@@ -211,7 +211,7 @@ fn the_highest_speed() {
     let most = 3277;
     let above = |register| fast(register, Fast::Above { most });
     let unknown = |register| fast(register, Fast::LimitUnknown { most });
-    let mut share = gate(limits(MaxSpeed::Raw(most)));
+    let mut share = gate(limits(HighestSpeed::Raw(most)));
     // 10 % is 3277 (0CCD), -10 % is F333.
     assert_eq!(denied(&mut share, "201#31CE0C"), above(0x31));
     assert_eq!(denied(&mut share, "201#3132F3"), above(0x31));
@@ -240,7 +240,7 @@ fn the_highest_speed() {
         unknown(0x90),
         "34 changed"
     );
-    let mut rpm = gate(limits(MaxSpeed::Rpm(360)));
+    let mut rpm = gate(limits(HighestSpeed::Rpm(360)));
     assert_eq!(
         denied(&mut rpm, "201#310100"),
         fast(0x31, Fast::FullUnknown)
@@ -259,7 +259,7 @@ fn the_highest_speed() {
         fast(0x31, Fast::FullUnknown)
     );
     let mut scale = gate(Limits {
-        max_speed: Some(MaxSpeed::Rpm(360)),
+        max_speed: Some(HighestSpeed::Rpm(360)),
         ..Limits::unlimited()
     });
     for (text, register) in [("201#C8100E", 0xC8), ("201#830000", 0x83)] {

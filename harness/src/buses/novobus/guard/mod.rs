@@ -4,4 +4,4 @@ pub(crate) mod learn;
 pub(crate) mod safe_state;
 
 pub use harness_proto::novobus::guard::{Denial, Found, Guard, Limits, Need};
-pub use safe_state::{NotSafe, SafeState, SafeStep, Standstill, blind_stop, safe_state};
+pub use safe_state::{NotSafe, SafeConfirmation, blind_stop, safe_state};

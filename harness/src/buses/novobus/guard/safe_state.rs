@@ -2,7 +2,7 @@
 
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, OrderNumber, recover};
 use crate::counted::counted;
-use crate::guard::Safe;
+use crate::guard::{Safe, Standstill, StandstillStep};
 use crate::link::lateness::StoodStill;
 use crate::link::{Lead, Line, Octets, Trouble, wait_keeping};
 use crate::medium::{Heard, Medium, Out};
@@ -24,50 +24,20 @@ const ATTEMPTS: u8 = 3;
 /// How often a ring is taken to its safe state where the computer stood still on the way. Drives are asked in vain meanwhile.
 const TURNS: u8 = 3;
 
-/// A step on the way to the safe state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SafeStep {
-    /// Stop on the ramp and stand.
-    Stop,
-    /// Block: no torque, with a nominal speed of 0.
-    Block,
-}
-
-/// How drives are taken to their safe state, and when they count as standing.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Standstill {
-    /// The steps, in this order.
-    pub order: Vec<SafeStep>,
-    /// The speed below which a motor counts as standing, in rpm.
-    pub rpm: f64,
-    /// How long a drive may take to stand.
-    pub within: Span,
-}
-
-impl Default for Standstill {
-    fn default() -> Self {
-        Self {
-            order: vec![SafeStep::Stop, SafeStep::Block],
-            rpm: 5.0,
-            within: Span::from_millis(5_000),
-        }
-    }
-}
-
 /// Whether the bench is in its safe state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[must_use]
-pub enum SafeState {
+pub enum SafeConfirmation {
     /// Every drive reported that it is stopped, blocked and standing. Holds the size of each ring.
     Confirmed(Vec<RingSize>),
     /// These drives are not confirmed; all others are.
     NotConfirmed(Vec<NotSafe>),
 }
 
-impl From<SafeState> for Safe {
-    fn from(state: SafeState) -> Self {
+impl From<SafeConfirmation> for Safe {
+    fn from(state: SafeConfirmation) -> Self {
         Self {
-            confirmed: matches!(state, SafeState::Confirmed(_)),
+            confirmed: matches!(state, SafeConfirmation::Confirmed(_)),
             words: state.to_string(),
         }
     }
@@ -82,7 +52,7 @@ pub struct NotSafe {
     pub why: String,
 }
 
-impl fmt::Display for SafeState {
+impl fmt::Display for SafeConfirmation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Confirmed(rings) => {
@@ -115,15 +85,19 @@ impl fmt::Display for SafeState {
 ///
 /// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop. Where the computer stood still on
 /// the way, which drives cannot tell from a master that has gone, a ring gets up to three attempts.
-pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standstill) -> SafeState {
+pub fn safe_state(
+    line: &mut dyn Line,
+    rings: &[RingSize],
+    standing: &Standstill,
+) -> SafeConfirmation {
     let mut not_safe = Vec::new();
     for (ring, &size) in rings.iter().enumerate() {
         not_safe.extend(ring_to_safe_state(line, ring, size, standing));
     }
     if not_safe.is_empty() {
-        SafeState::Confirmed(rings.to_vec())
+        SafeConfirmation::Confirmed(rings.to_vec())
     } else {
-        SafeState::NotConfirmed(not_safe)
+        SafeConfirmation::NotConfirmed(not_safe)
     }
 }
 
@@ -385,7 +359,7 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
 /// How long `Flags` may take to follow a command; a drive updates them in its next cycle.
 const FLAGS: Span = Span::from_millis(500);
 
-impl SafeStep {
+impl StandstillStep {
     /// The commands of this step (11.8, 14.10).
     fn commands(self) -> Vec<Command> {
         let status = |data| Command::Or {

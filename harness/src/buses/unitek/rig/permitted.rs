@@ -48,12 +48,12 @@ pub fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         max_speed: own.max_speed.map(|most| match most {
             // Rounded down.
             MaxSpeed::Rpm(speed) => {
-                guard::MaxSpeed::Rpm(speed.0.clamp(0.0, 65_535.0).floor() as u16)
+                guard::HighestSpeed::Rpm(speed.0.clamp(0.0, 65_535.0).floor() as u16)
             }
             MaxSpeed::Percent(percent) => {
                 // As a speed command of so many per cent is rounded.
                 let raw = (percent * 32_767.0 / 100.0).round();
-                guard::MaxSpeed::Raw(raw.clamp(0.0, 32_767.0) as u16)
+                guard::HighestSpeed::Raw(raw.clamp(0.0, 32_767.0) as u16)
             }
         }),
         named: named.flat_map(|name| special_register(name)).collect(),

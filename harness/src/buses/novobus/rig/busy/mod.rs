@@ -5,7 +5,8 @@ mod qualified;
 
 use super::run::Run;
 use super::session::Session;
-use crate::buses::novobus::guard::safe_state::{SafeState, Standstill, safe_state};
+use crate::buses::novobus::guard::safe_state::{SafeConfirmation, safe_state};
+use crate::guard::Standstill;
 use crate::library::{Entry, sources};
 use crate::link::Line as _;
 use crate::rig::check::parse;
@@ -144,7 +145,7 @@ fn a_late_computer_confirms_the_safe_state() {
             let state = safe_state(&mut line(drives, stalls), &[size], &Standstill::default());
             assert_eq!(
                 state,
-                SafeState::Confirmed(vec![size]),
+                SafeConfirmation::Confirmed(vec![size]),
                 "seed {seed}, {drives}"
             );
         }
