@@ -8,7 +8,7 @@ use harness_proto::nordac::pkw::Index;
 use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
-use harness_sim::nordac::{Drive, Member, Setup};
+use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineHost, Octet, OctetSegment, Wish};
 
 const EXCHANGES: usize = 1_000;
@@ -55,9 +55,9 @@ fn master() -> LineHost {
 
 fn with_drive() -> Line {
     let first = |number, value| (number, Index::default(), value);
-    let setup = Setup {
+    let setup = InverterSetup {
         parameters: vec![first(1624, 8), first(1621, 2)],
-        ..Setup::default()
+        ..InverterSetup::default()
     };
     let drive = Drive::new(&setup, BusRate::K1500, Instant::START);
     let stations = vec![Member::Host(master()), Member::Drive(drive)];

@@ -14,7 +14,7 @@ use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
 use crate::library::Entry;
-use crate::qualify::{Bench, Qualification};
+use crate::qualify::{Qualification, QualifiedBench};
 use crate::rig::{Played, Run, state};
 use crate::scenario::problem::Problems;
 use std::path::PathBuf;
@@ -78,7 +78,7 @@ pub(super) struct Live<'l, 's> {
     pub(super) output: &'l mut Output,
 }
 
-impl Bench for Live<'_, '_> {
+impl QualifiedBench for Live<'_, '_> {
     type Stop = Stop;
 
     fn play(&mut self, entry: &Entry) -> Result<Played, Stop> {

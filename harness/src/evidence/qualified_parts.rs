@@ -4,7 +4,7 @@ use super::files::sum;
 use super::folder::EvidenceError;
 use super::qualified::{Case, cases, course, is_thorough};
 use super::verify::{Judged, Opened};
-use crate::buses::qualify::{Bench, TRIALS};
+use crate::buses::qualify::{QualifiedBench, TRIALS};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;
@@ -107,7 +107,7 @@ impl Record<'_> {
     }
 }
 
-impl Bench for Record<'_> {
+impl QualifiedBench for Record<'_> {
     type Stop = Infallible;
 
     /// What a part has asked its own drives follows from what it has heard: such a trial may be of another part. What no part has played stays

@@ -10,5 +10,5 @@ pub use crate::buses::rings::qualify::{
     Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
     exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
-pub(crate) use crate::buses::rings::qualify::{Bench, Qualification, QualificationFacts};
+pub(crate) use crate::buses::rings::qualify::{Qualification, QualificationFacts, QualifiedBench};
 pub use crate::rig::{Profile, ProfileError, SettledProperty};

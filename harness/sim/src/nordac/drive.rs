@@ -1,7 +1,7 @@
 //! The drive as a station of a line.
 
 use super::inverter::Inverter;
-use super::setup::Setup;
+use super::setup::InverterSetup;
 use super::slave::{Receiver, Slave};
 use crate::octet_segment::{LineStation, Octet, Wish};
 use harness_proto::line::Received;
@@ -29,7 +29,7 @@ pub struct Drive {
 impl Drive {
     /// A drive that is switched on at `at`.
     #[must_use]
-    pub fn new(setup: &Setup, rate: BusRate, at: Instant) -> Self {
+    pub fn new(setup: &InverterSetup, rate: BusRate, at: Instant) -> Self {
         let inverter = Inverter::new(setup, at);
         Self {
             slave: Slave::new(setup.properties, inverter.settings()),

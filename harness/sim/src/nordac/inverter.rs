@@ -7,7 +7,7 @@ mod course;
 mod show;
 mod task;
 
-use super::Setup;
+use super::InverterSetup;
 use super::faults::{FaultMemory, Past, TIME_OUT};
 use super::frequency::Frequency;
 use super::machine;
@@ -109,7 +109,7 @@ pub struct Inverter {
 impl Inverter {
     /// An inverter that is switched on at `at`.
     #[must_use]
-    pub fn new(setup: &Setup, at: Instant) -> Self {
+    pub fn new(setup: &InverterSetup, at: Instant) -> Self {
         let mut parameters = Parameters::default();
         for (number, index, value) in &setup.parameters {
             let known = Parameter::of(*number);

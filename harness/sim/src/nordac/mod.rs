@@ -22,5 +22,5 @@ pub mod slave;
 
 pub use drive::Drive;
 pub use inverter::Inverter;
-pub use setup::Setup;
+pub use setup::InverterSetup;
 pub use slave::Slave;

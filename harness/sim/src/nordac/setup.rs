@@ -5,7 +5,7 @@ use harness_proto::nordac::properties::Properties;
 
 /// How a simulated drive is set up before power-up.
 #[derive(Clone, Debug, Default)]
-pub struct Setup {
+pub struct InverterSetup {
     /// What the manual leaves open.
     pub properties: Properties,
     /// Whether the PosiCon option is fitted, and its parameters exist (5.6).

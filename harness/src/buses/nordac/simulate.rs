@@ -118,7 +118,7 @@ impl SlaveSetup {
             )
         });
         let parameters = own.into_iter().chain(more);
-        let setup = nordac::Setup {
+        let setup = nordac::InverterSetup {
             properties: self.properties,
             posicon: self.posicon,
             parameters: parameters.collect(),

@@ -93,7 +93,7 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
     let judged = match setup {
         Some(setup) => {
             let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
-            let drives = plan.setup.setup.drives.iter();
+            let drives = plan.setup.drives.iter();
             let drives = drives.map(|own| (own.node, own.identifiers));
             judge(&frames, &drives.collect::<Vec<_>>())
         }

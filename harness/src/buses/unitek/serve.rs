@@ -1,7 +1,7 @@
 //! Simulated UNITEK drives that clients share, in real time.
 
+use super::language::Unitek;
 use super::language::now::{NotNow, now};
-use super::language::{Unitek, plan};
 use super::simulate::{Bench, DriveSetup, Setup};
 use crate::counted::counted;
 use crate::scenario::parse::header::{Part, parse_step, read};
@@ -46,11 +46,11 @@ pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<
     let mut scenario: Scenario<Unitek> = read(header, Part::Header)?;
     scenario.steps.clear();
     let mut plan = settle(&scenario, header, None)?;
-    let own: &mut plan::Bench = &mut plan.setup;
-    let least = u8::from(own.setup.drives.is_empty());
+    let own = &mut plan.setup;
+    let least = u8::from(own.drives.is_empty());
     for node in 1..=drives.unwrap_or(least) {
-        if !own.setup.drives.iter().any(|drive| drive.node == node) {
-            own.setup.drives.push(DriveSetup::new(node));
+        if !own.drives.iter().any(|drive| drive.node == node) {
+            own.drives.push(DriveSetup::new(node));
         }
     }
     Ok(plan)
@@ -66,7 +66,7 @@ pub(crate) struct SharedDrives {
 impl SharedDrives {
     /// A bench with places for clients. Its own host neither sends nor acknowledges.
     pub(crate) fn new(plan: Plan<Unitek>) -> Self {
-        let setup: &Setup = &plan.setup.setup;
+        let setup: &Setup = &plan.setup;
         let mut bench = Bench::with_guests(setup, MOST_CLIENTS);
         bench.segment.keep_no_record();
         if let Some(host) = bench.host() {

@@ -320,7 +320,7 @@ fn a_header_describes_the_drives() {
     };
     let nodes = |drives, text: &str| {
         let plan = bench(drives, Some(&source(text))).expect("a header");
-        let own = plan.setup.setup.drives.iter();
+        let own = plan.setup.drives.iter();
         own.map(|own| (own.node, own.identifiers.0))
             .collect::<Vec<_>>()
     };

@@ -10,7 +10,7 @@ use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::record::{Channel, LineFrame, Trace};
 use harness_sim::segment::{Host, Placed, Segment};
-use harness_sim::unitek::deviation::{Deviant, Deviation};
+use harness_sim::unitek::deviation::{Deviant, Deviation, MasterDeviation};
 use harness_sim::unitek::{Cause, Control, Drive, Inputs, Member, Stimulus};
 use std::any::Any;
 
@@ -77,15 +77,25 @@ pub struct Setup {
     pub rate: BitRate,
     /// The drives.
     pub drives: Vec<DriveSetup>,
+    /// The way in which the bench's own master deviates, if it does.
+    pub master: Option<&'static MasterDeviation>,
 }
 
 impl Setup {
     /// Nodes 1 to `drives` as delivered, at 500 kbit/s.
     #[must_use]
     pub fn of(drives: u8) -> Self {
+        let drives = (1..=drives).map(DriveSetup::new);
+        Self::new(BitRate::K500, drives.collect())
+    }
+
+    /// These drives, behind a master that does not deviate.
+    #[must_use]
+    pub const fn new(rate: BitRate, drives: Vec<DriveSetup>) -> Self {
         Self {
-            rate: BitRate::K500,
-            drives: (1..=drives).map(DriveSetup::new).collect(),
+            rate,
+            drives,
+            master: None,
         }
     }
 

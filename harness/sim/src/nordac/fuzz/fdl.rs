@@ -2,7 +2,7 @@
 
 use crate::fault::Flips;
 use crate::fuzz::{Feature, LONGEST, Notebook};
-use crate::nordac::{Drive, Member, Setup};
+use crate::nordac::{Drive, InverterSetup, Member};
 use crate::octet_segment::{LineHost, Octet, OctetSegment, Wish};
 use crate::record::LineByte;
 use harness_proto::decode::Decoded;
@@ -76,9 +76,9 @@ fn kind(telegram: &Telegram) -> String {
 
 /// Puts octets on a line with one slave.
 fn line(data: &[u8], notes: &mut Notebook<'_>) {
-    let setup = Setup {
+    let setup = InverterSetup {
         parameters: vec![(1624, Index::default(), ADDRESS)],
-        ..Setup::default()
+        ..InverterSetup::default()
     };
     let drive = Drive::new(&setup, RATE, Instant::START);
     let stations = vec![

@@ -1,7 +1,7 @@
 //! Tasks of the parameter channel, one after the other: the answer to each keeps the rules of 3.4.
 
 use crate::fuzz::{Feature, LONGEST, Notebook};
-use crate::nordac::{Inverter, Setup};
+use crate::nordac::{Inverter, InverterSetup};
 use arbitrary::Unstructured;
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::pkw::Index;
@@ -31,7 +31,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     } else {
         PpoType::One
     };
-    let setup = Setup {
+    let setup = InverterSetup {
         properties: properties(head >> 2),
         posicon: head & 2 != 0,
         parameters: Vec::new(),

@@ -5,7 +5,7 @@ use super::heard::Heard;
 use super::telegrams::{ADDRESS, any_telegram, parameters, telegram};
 use crate::fuzz::{LONGEST, Notebook};
 use crate::nordac::reference::ReferenceSlave;
-use crate::nordac::{Drive, Setup};
+use crate::nordac::{Drive, InverterSetup};
 use crate::octet_segment::LineStation;
 use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::line::{LineError, Received};
@@ -154,7 +154,7 @@ fn watched(data: &[u8], reached: &mut impl FnMut(Cell)) {
 impl Pair {
     fn new(properties: Properties) -> Self {
         let at = |number, set, value| (number, Index { element: 0, set }, value);
-        let setup = Setup {
+        let setup = InverterSetup {
             properties,
             posicon: false,
             parameters: vec![

@@ -6,7 +6,7 @@ mod open;
 mod words;
 
 use super::{Inputs, Inverter, Outputs};
-use crate::nordac::Setup;
+use crate::nordac::InverterSetup;
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::{Description, Properties};
 use harness_proto::nordac::words::State;
@@ -43,7 +43,7 @@ impl Bench {
                 .iter()
                 .map(|&(number, value)| first(number, value)),
         );
-        let setup = Setup {
+        let setup = InverterSetup {
             properties,
             posicon,
             parameters: all,

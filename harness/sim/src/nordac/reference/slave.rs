@@ -2,7 +2,7 @@
 //!
 //! It knows whole telegrams and no octets on a line. Behind it stands an inverter of its own.
 
-use crate::nordac::Setup;
+use crate::nordac::InverterSetup;
 use crate::nordac::inverter::{Inverter, Outputs};
 use harness_proto::nordac::properties::Properties;
 use harness_proto::nordac::{Answer, Pkw, PpoType};
@@ -83,7 +83,7 @@ pub struct ReferenceSlave {
 impl ReferenceSlave {
     /// The model after power-up.
     #[must_use]
-    pub fn new(setup: &Setup) -> Self {
+    pub fn new(setup: &InverterSetup) -> Self {
         let inverter = Inverter::new(setup, Instant::START);
         let settings = inverter.settings();
         Self {

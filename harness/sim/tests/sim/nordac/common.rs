@@ -6,7 +6,7 @@ use harness_proto::nordac::properties::Description;
 use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
-use harness_sim::nordac::{Drive, Member, Setup};
+use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineHost, LineStation, Octet, OctetSegment, Wish};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
@@ -31,21 +31,21 @@ fn written(heard: impl Iterator<Item = harness_proto::line::Received>) -> String
 }
 
 /// A setup with this address and these parameters.
-pub(super) fn setup(address: i32, parameters: &[(u16, i32)]) -> Setup {
+pub(super) fn setup(address: i32, parameters: &[(u16, i32)]) -> InverterSetup {
     let mut all = vec![(1624, Index::default(), address)];
     all.extend(
         parameters
             .iter()
             .map(|&(number, raw)| (number, Index::default(), raw)),
     );
-    Setup {
+    InverterSetup {
         parameters: all,
-        ..Setup::default()
+        ..InverterSetup::default()
     }
 }
 
 /// A property with another value.
-pub(super) fn with(mut setup: Setup, name: &str, word: &str) -> Setup {
+pub(super) fn with(mut setup: InverterSetup, name: &str, word: &str) -> InverterSetup {
     let property = Description::of(name).expect("a property");
     let mut properties: Properties = setup.properties;
     assert!(property.set(&mut properties, word), "{name} = {word}");
@@ -65,11 +65,11 @@ pub(super) struct Desk<D = Box<Drive>> {
 }
 
 impl Desk {
-    pub(super) fn new(setup: &Setup) -> Self {
+    pub(super) fn new(setup: &InverterSetup) -> Self {
         Self::at(BusRate::K500, std::slice::from_ref(setup))
     }
 
-    pub(super) fn at(rate: BusRate, setups: &[Setup]) -> Self {
+    pub(super) fn at(rate: BusRate, setups: &[InverterSetup]) -> Self {
         let drives = setups.iter();
         Self::over(
             rate,

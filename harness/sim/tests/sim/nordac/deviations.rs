@@ -9,7 +9,7 @@ use harness_sim::fault::Flips;
 use harness_sim::nordac::deviation::{
     DEVIATIONS, Deviant, Deviation, MASTER_DEVIATIONS, MasterDeviation, deviation, deviations,
 };
-use harness_sim::nordac::{Drive, Setup};
+use harness_sim::nordac::{Drive, InverterSetup};
 use harness_sim::octet_segment::{LineStation, Octet, Wish};
 use harness_sim::record::LineByte;
 use std::collections::BTreeSet;
@@ -328,7 +328,7 @@ fn poke(drive: &mut Drive, at: Instant, line: &str) {
     }
 }
 
-fn setups() -> [(Setup, &'static str); 2] {
+fn setups() -> [(InverterSetup, &'static str); 2] {
     let mut first = setup(8, &[(1621, 2), (1202, 40), (1203, 40)]);
     for (set, raw) in [(1, 20), (2, 60)] {
         first

@@ -9,7 +9,7 @@ use harness_proto::nordac::{IDENT, PpoType};
 use harness_proto::profibus::BusRate;
 use harness_proto::profibus::rate::MIN_TSDR_BITS;
 use harness_proto::time::{Instant, Span};
-use harness_sim::nordac::{Drive, Member, Setup};
+use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineHost, Octet, OctetSegment, Wish};
 
 /// The master's place on the segment, and the drive's.
@@ -37,9 +37,9 @@ impl Segment {
             // 0.5 s.
             (1202, index, 10),
         ];
-        let setup = Setup {
+        let setup = InverterSetup {
             parameters,
-            ..Setup::default()
+            ..InverterSetup::default()
         };
         let drive = Drive::new(&setup, rate, Instant::START);
         let stations = vec![

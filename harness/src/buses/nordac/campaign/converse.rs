@@ -16,7 +16,7 @@ use harness_proto::profibus::rate::SYN_BITS;
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::inverter::Outputs;
-use harness_sim::nordac::{Drive, Member, Setup};
+use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineFaultAt, LineHost, OctetSegment, Wish};
 
 /// The stations.
@@ -157,13 +157,13 @@ struct Desk {
 impl Desk {
     fn new(file: &TelegramCampaignFile, ppo: PpoType) -> Option<Self> {
         let none = Index::default();
-        let setup = Setup {
+        let setup = InverterSetup {
             parameters: vec![
                 (1624, none, ADDRESSES.1.into()),
                 (1621, none, 2),
                 (1622, none, ppo.raw().into()),
             ],
-            ..Setup::default()
+            ..InverterSetup::default()
         };
         let drive = Drive::new(&setup, RATE, Instant::START);
         let stations = vec![Member::Host(LineHost::default()), Member::Drive(drive)];

@@ -28,14 +28,14 @@ pub struct SlaveLine {
     /// The slave's address.
     pub slave: Located,
     /// What the line says.
-    pub what: Setup,
+    pub what: SetupKind,
     /// The whole line.
     pub span: TextSpan,
 }
 
 /// What a header line says about a slave.
 #[derive(Clone, Debug)]
-pub enum Setup {
+pub enum SetupKind {
     /// `slave 8`, `slave 8 ppo 2`, `slave 8 posicon`: it is there.
     There {
         /// The PPO type that it is set to.

@@ -2,8 +2,8 @@
 
 use super::parse::word_name;
 use super::syntax::{
-    Bad, Damage, Header, Job, JobKind, Message, OctetHarm, Outside, ParameterName, Sender, Setup,
-    Step, TelegramHarm, Value, ValueKind, Wanted, Which, WordKind, WordName, WordValue,
+    Bad, Damage, Header, Job, JobKind, Message, OctetHarm, Outside, ParameterName, Sender,
+    SetupKind, Step, TelegramHarm, Value, ValueKind, Wanted, Which, WordKind, WordName, WordValue,
 };
 use crate::scenario::expression::{Expression, Located};
 use harness_sim::fault::Flips;
@@ -21,17 +21,17 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
     (rate.into_iter().collect(), slaves.chain(master).collect())
 }
 
-fn setup(what: &Setup) -> String {
+fn setup(what: &SetupKind) -> String {
     match what {
-        Setup::There { ppo, posicon } => {
+        SetupKind::There { ppo, posicon } => {
             let ppo = ppo.map(|own| format!("ppo {}", own.number()));
             let posicon = posicon.then(|| "posicon".to_owned());
             let words: Vec<_> = ppo.into_iter().chain(posicon).collect();
             words.join(" ")
         }
-        Setup::Property(property, word) => format!("property {} = {word}", property.name),
-        Setup::Parameter(name, own) => assigned(name, own),
-        Setup::Deviates(own) => format!("deviates {}", own.name),
+        SetupKind::Property(property, word) => format!("property {} = {word}", property.name),
+        SetupKind::Parameter(name, own) => assigned(name, own),
+        SetupKind::Deviates(own) => format!("deviates {}", own.name),
     }
 }
 

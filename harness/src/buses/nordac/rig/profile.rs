@@ -4,7 +4,7 @@ use super::known::Known;
 use super::talk::TalkError;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::language::plan::address;
-use crate::buses::nordac::language::syntax::Setup;
+use crate::buses::nordac::language::syntax::SetupKind;
 use crate::rig::Rig;
 use crate::scenario::expression::Scope;
 use crate::scenario::parse::header::{Part, read};
@@ -31,7 +31,7 @@ impl Profiled {
         let read: Result<Scenario<Nordac>, Problems> = read(&source, Part::Header);
         let lines = read.map_or_else(|_| Vec::new(), |own| own.header.slaves);
         let properties = lines.into_iter().filter_map(|line| match line.what {
-            Setup::Property(property, word) => {
+            SetupKind::Property(property, word) => {
                 Some((address(&line.slave, Scope::default()).ok()?, property, word))
             }
             _ => None,

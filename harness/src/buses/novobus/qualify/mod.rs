@@ -20,7 +20,7 @@ pub use eeprom::{dumps, marches};
 pub use hypothesis::{Fit, Hypothesis, explaining};
 pub use pinned::{Pinned, Question, questions};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
-pub(crate) use qualification::{Bench, Qualification, QualificationFacts};
+pub(crate) use qualification::{Qualification, QualificationFacts, QualifiedBench};
 pub use settle::{Answer, answer};
 
 /// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the

@@ -32,7 +32,7 @@ const ENDED: &str = "the run ended before everything was played";
 const PROBED: usize = 3;
 
 /// What plays the scenarios of a qualification: a rig in use, or the record of one.
-pub(crate) trait Bench {
+pub(crate) trait QualifiedBench {
     /// Why nothing more is played.
     type Stop;
 
@@ -177,7 +177,7 @@ impl Qualification {
     ///
     /// # Errors
     /// Those of the bench.
-    pub(crate) fn settle<B: Bench>(mut self, bench: &mut B) -> Result<Qualified, B::Stop> {
+    pub(crate) fn settle<B: QualifiedBench>(mut self, bench: &mut B) -> Result<Qualified, B::Stop> {
         if bench.over() {
             self.findings.note_open(ENDED.to_owned());
             return Ok(self.qualified(None, self.findings.text(None, &[])));
@@ -208,7 +208,7 @@ impl Qualification {
     }
 
     /// Does something with what each of the other parts has played.
-    fn on_others<B: Bench>(
+    fn on_others<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         mut act: impl FnMut(&mut Self, &mut B) -> Result<(), B::Stop>,
@@ -232,7 +232,7 @@ impl Qualification {
     }
 
     /// Plays the conversations that the model alone judges. Whether nothing more can or may be played.
-    fn converse<B: Bench>(&mut self, bench: &mut B) -> Result<bool, B::Stop> {
+    fn converse<B: QualifiedBench>(&mut self, bench: &mut B) -> Result<bool, B::Stop> {
         let drives = self.drives;
         let reaches = |place: usize| place == 0 || self.facts.reached.contains(&place);
         let mut entries = conversations(drives, &reaches).unwrap_or_default();
@@ -270,7 +270,7 @@ impl Qualification {
     }
 
     /// Plays a conversation that is judged by the model; `None` where nothing more can or may be played.
-    fn compare<B: Bench>(
+    fn compare<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         entry: &Entry,
@@ -291,7 +291,12 @@ impl Qualification {
     }
 
     /// Reads the EEPROM of a drive, and writes and restores its cells one by one. Whether nothing more can or may be played.
-    fn march<B: Bench>(&mut self, bench: &mut B, drive: u8, read: &Entry) -> Result<bool, B::Stop> {
+    fn march<B: QualifiedBench>(
+        &mut self,
+        bench: &mut B,
+        drive: u8,
+        read: &Entry,
+    ) -> Result<bool, B::Stop> {
         let Some(played) = self.compare(bench, read)? else {
             return Ok(true);
         };
@@ -308,7 +313,7 @@ impl Qualification {
     }
 
     /// Asks the ring about what differed, so that it shows which drive it was.
-    fn ask_ring<B: Bench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
+    fn ask_ring<B: QualifiedBench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
         if !self.facts.resets {
             return Ok(());
         }
@@ -329,7 +334,7 @@ impl Qualification {
 
     /// Plays again what differed, with the drives' roles exchanged, so that it shows which drive it was. Only where every drive is reset
     /// before: what was written to one must not stay.
-    fn exchange_roles<B: Bench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
+    fn exchange_roles<B: QualifiedBench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
         if !self.facts.resets || self.drives < 2 {
             return Ok(());
         }
@@ -347,7 +352,7 @@ impl Qualification {
 
     /// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that this
     /// header settles; `None` where the run ended early, and no deviation is looked for.
-    fn deviations<B: Bench>(&self, bench: &B, settled: Option<&Header>) -> String {
+    fn deviations<B: QualifiedBench>(&self, bench: &B, settled: Option<&Header>) -> String {
         let known = self.facts.rig.file.deviation.iter();
         let known: Vec<_> = known.map(|entry| entry.name.clone()).collect();
         let seen = self.findings.seen(self.drives, self.facts.exactness);
@@ -385,7 +390,7 @@ impl Qualification {
 
     /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus, or assumed, is part of every later
     /// question and is the second value; a time of a drive is the middle of a span, and no later answer rests on it.
-    fn profile<B: Bench>(&mut self, bench: &mut B) -> Result<(Profile, Header), B::Stop> {
+    fn profile<B: QualifiedBench>(&mut self, bench: &mut B) -> Result<(Profile, Header), B::Stop> {
         let rings: Vec<u8> = self.facts.rig.rings().map(|(_, own)| own.drives).collect();
         let mut profile = Profile {
             schema: 1,
@@ -431,7 +436,7 @@ impl Qualification {
     }
 
     /// Asks a probe in every part.
-    fn ask_all<B: Bench>(
+    fn ask_all<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         probe: &Probe,
@@ -453,7 +458,7 @@ impl Qualification {
     }
 
     /// Asks a probe, and notes that it was asked.
-    fn ask<B: Bench>(
+    fn ask<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         probe: &Probe,
@@ -493,7 +498,7 @@ impl Qualification {
     }
 
     /// Plays a probe, and again where no value explains it. The inner error says why it cannot be asked.
-    fn answer<B: Bench>(
+    fn answer<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         probe: &Probe,
@@ -560,7 +565,7 @@ impl Qualification {
 
 impl Qualification {
     /// Asks a drive that is silent while it tests itself for how long it does. The inner error says why it cannot be asked.
-    fn answer_of_silent<B: Bench>(
+    fn answer_of_silent<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
         (property, drive): (&str, u8),

@@ -169,7 +169,7 @@ impl LineBus for Unitek {
     }
 
     fn simulated(header: &Source) -> Result<Setup, Problems> {
-        Ok(serve::bench(Some(0), Some(header))?.setup.setup)
+        Ok(serve::bench(Some(0), Some(header))?.setup)
     }
 
     fn plant(setup: &mut Setup, drive: u8, name: &str) -> Option<bool> {

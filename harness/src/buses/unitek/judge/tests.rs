@@ -70,7 +70,7 @@ fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) 
         frames.insert(0, other);
     }
     let header = crate::buses::unitek::serve::bench(None, Some(&source)).expect("a header");
-    let drives = header.setup.setup.drives.iter();
+    let drives = header.setup.drives.iter();
     (
         frames,
         drives.map(|own| (own.node, own.identifiers)).collect(),

@@ -11,7 +11,7 @@ pub use play::State;
 pub(crate) use play::written;
 pub(crate) use write::identifier;
 
-use self::plan::{Act, Bench, Planner, WantedFrame};
+use self::plan::{Act, Planner, WantedFrame};
 use self::syntax::{Header, Message, Step};
 use crate::buses::Bus;
 use crate::buses::unitek::report::FrameReport;
@@ -44,7 +44,7 @@ impl Language for Unitek {
     type Header = Header;
     type Message = Message;
     type Step = Step;
-    type Setup = Bench;
+    type Setup = simulate::Setup;
     type Sent = Frame;
     type Wanted = WantedFrame;
     type Act = Act;
@@ -97,16 +97,16 @@ impl Language for Unitek {
         plan::settle(scenario, size, found)
     }
 
-    fn resume(bench: &Bench) -> Planner {
-        plan::resume(bench)
+    fn resume(setup: &simulate::Setup) -> Planner {
+        plan::resume(setup)
     }
 
     fn simulate(plan: &Plan<Self>) -> Box<dyn Link> {
-        Box::new(simulate::Bench::new(&plan.setup.setup))
+        Box::new(simulate::Bench::new(&plan.setup))
     }
 
     fn size(plan: &Plan<Self>) -> String {
-        plan.setup.setup.drives.len().to_string()
+        plan.setup.drives.len().to_string()
     }
 
     fn ports(_: &Plan<Self>) -> usize {

@@ -10,7 +10,7 @@ pub(super) use job::NAMES;
 pub(super) use message::{comment, message};
 pub(super) use value::register_of_force;
 
-use super::syntax::{DriveHarm, FrameHarm, Header, Setup, Step};
+use super::syntax::{DriveHarm, FrameHarm, Header, SetupKind, Step};
 use crate::scenario::expression;
 use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
@@ -190,10 +190,10 @@ fn check(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
 
 impl drive::Line {
     /// The header line that it is; `None` if it is a step.
-    fn into_setup(self, begun: bool) -> Option<Setup> {
+    fn into_setup(self, begun: bool) -> Option<SetupKind> {
         match self {
             Self::Setup(setup) => Some(setup),
-            Self::Outside(outside) => (!begun).then_some(Setup::Outside(outside)),
+            Self::Outside(outside) => (!begun).then_some(SetupKind::Outside(outside)),
             Self::Restart => None,
         }
     }

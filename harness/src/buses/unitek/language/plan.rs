@@ -2,10 +2,10 @@
 
 use super::syntax::{
     Content, DriveHarm, DriveLine, Expect, FrameHarm, Job, JobKind, Message, Outside,
-    PropertyValue, RegisterName, Setup, Step, Value, ValueKind,
+    PropertyValue, RegisterName, SetupKind, Step, Value, ValueKind,
 };
 use super::{Unitek, parse};
-use crate::buses::unitek::simulate::{self, DriveSetup};
+use crate::buses::unitek::simulate::{DriveSetup, Setup};
 use crate::link::{Capability, FrameFault};
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
@@ -21,7 +21,6 @@ use harness_proto::unitek::properties::{Properties, Setting};
 use harness_proto::unitek::units::{Scaling, to_raw};
 use harness_proto::unitek::{Access, Data, Register, Request};
 use harness_sim::unitek::Stimulus;
-use harness_sim::unitek::deviation::MasterDeviation;
 
 /// The most frames that a scenario sends.
 const ROOM: usize = 100_000;
@@ -29,15 +28,6 @@ const ROOM: usize = 100_000;
 const PATIENCE: Span = Span::from_millis(1000);
 /// The highest number of a drive (UNITEK 3.1).
 const MOST_NODES: i64 = 127;
-
-/// The bench of a scenario.
-#[derive(Clone, Debug)]
-pub struct Bench {
-    /// The segment and its drives.
-    pub setup: simulate::Setup,
-    /// How the driver breaks the manual.
-    pub master: Option<&'static MasterDeviation>,
-}
 
 /// A frame that the master must receive.
 #[derive(Clone, Debug)]
@@ -107,7 +97,7 @@ pub enum WantedOutcome {
 /// What settles the steps.
 #[derive(Debug)]
 pub struct Planner {
-    bench: Bench,
+    setup: Setup,
     scope: Scope,
 }
 
@@ -134,18 +124,19 @@ pub(super) fn settle(
         let what = format!("the bench has {size} drives, and the scenario {count}");
         return Err(Problem::new(span, what, "as many `drive` lines expected"));
     }
-    Ok(resume(&Bench {
-        setup: simulate::Setup { rate, drives },
+    Ok(resume(&Setup {
+        rate,
+        drives,
         master: header.master.as_ref().map(|own| own.value),
     }))
 }
 
 /// What settles one more step.
-pub(super) fn resume(bench: &Bench) -> Planner {
-    let count = i64::try_from(bench.setup.drives.len()).unwrap_or(0);
+pub(super) fn resume(setup: &Setup) -> Planner {
+    let count = i64::try_from(setup.drives.len()).unwrap_or(0);
     Planner {
         scope: Scope::new(count),
-        bench: bench.clone(),
+        setup: setup.clone(),
     }
 }
 
@@ -159,14 +150,14 @@ fn apply(line: &DriveLine, drives: &mut Vec<DriveSetup>, rate: BitRate) -> Resul
     });
     let own = &mut drives[place];
     match &line.what {
-        Setup::There { rx, tx } => {
+        SetupKind::There { rx, tx } => {
             own.identifiers.0 = rx.unwrap_or(own.identifiers.0);
             own.identifiers.1 = tx.unwrap_or(own.identifiers.1);
         }
-        Setup::Profile(name) => {
+        SetupKind::Profile(name) => {
             own.properties = Properties::profile(name).unwrap_or(own.properties);
         }
-        Setup::Property(property, value) => {
+        SetupKind::Property(property, value) => {
             let setting = match value {
                 PropertyValue::Word(word) => Setting::Word(word),
                 PropertyValue::Time(time) => Setting::Time(time.on(octet_time(rate))),
@@ -176,9 +167,9 @@ fn apply(line: &DriveLine, drives: &mut Vec<DriveSetup>, rate: BitRate) -> Resul
                 return Err(Problem::new(line.span, what, "a time up to 10s expected"));
             }
         }
-        Setup::Mode(mode) => own.control = Some(*mode),
-        Setup::Deviates(deviation) => own.deviation = Some(deviation),
-        Setup::Outside(outside) => {
+        SetupKind::Mode(mode) => own.control = Some(*mode),
+        SetupKind::Deviates(deviation) => own.deviation = Some(deviation),
+        SetupKind::Outside(outside) => {
             let scaling = scaling(own);
             if let Some(stimulus) = stimulus(outside, Scope::default(), scaling)? {
                 own.apply(stimulus);
@@ -347,7 +338,7 @@ impl DriveSetup {
 impl Planner {
     fn drive(&self, drive: &Located) -> Result<&DriveSetup, Problem> {
         let node = node(drive, self.scope)?;
-        let own = self.bench.setup.drives.iter().find(|own| own.node == node);
+        let own = self.setup.drives.iter().find(|own| own.node == node);
         own.ok_or_else(|| {
             let what = format!("the scenario has no drive {node}");
             let problem = Problem::new(drive.span, what, "a drive of the header expected here");
@@ -514,7 +505,7 @@ impl Settle<Unitek> for Planner {
     }
 
     fn byte_time(&self) -> Span {
-        octet_time(self.bench.setup.rate)
+        octet_time(self.setup.rate)
     }
 
     fn room(&self) -> usize {
@@ -607,8 +598,8 @@ impl Settle<Unitek> for Planner {
         let lines = scenario.header.drives.iter();
         let needs = lines.filter_map(|line| match &line.what {
             // A rig has drives with properties of their own, which are found out.
-            Setup::There { .. } | Setup::Profile(_) | Setup::Property(..) => None,
-            Setup::Outside(Outside::Register(RegisterName::Known { register, .. }, _)) => {
+            SetupKind::There { .. } | SetupKind::Profile(_) | SetupKind::Property(..) => None,
+            SetupKind::Outside(Outside::Register(RegisterName::Known { register, .. }, _)) => {
                 Some(of_register(register))
             }
             _ => Some(Capability::Simulator),
@@ -618,8 +609,8 @@ impl Settle<Unitek> for Planner {
         needs.chain(wrong).collect()
     }
 
-    fn finish(self) -> Bench {
-        self.bench
+    fn finish(self) -> Setup {
+        self.setup
     }
 }
 

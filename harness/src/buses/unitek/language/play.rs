@@ -273,7 +273,7 @@ pub(super) fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault 
 
 /// The write that sets a register of a drive which is not simulated beside the bus.
 fn over_bus(runner: &Runner<'_, Unitek>, node: u8, register: u8, raw: u32) -> Option<Frame> {
-    let drives = &runner.plan.setup.setup.drives;
+    let drives = &runner.plan.setup.drives;
     let own = drives.iter().find(|own| own.node == node)?;
     let data = Data::of(Register::of(register), raw);
     let request = Request::Write { register, data };
@@ -304,7 +304,7 @@ fn look(
     if let Some(drive) = drive {
         return wanted.compare(span, drive.register(wanted.register));
     }
-    let drives = &runner.plan.setup.setup.drives;
+    let drives = &runner.plan.setup.drives;
     let own = drives.iter().find(|own| own.node == node);
     let request = own.and_then(|own| {
         let request = Request::Read {
@@ -360,7 +360,7 @@ fn drive(
 ) -> Result<Outcome, Stop> {
     runner.fetch();
     let plan = runner.plan;
-    let setup = plan.setup.setup.drives.iter().find(|own| own.node == node);
+    let setup = plan.setup.drives.iter().find(|own| own.node == node);
     let (rx, tx) = setup.map_or((0, 0), |own| own.identifiers);
     let deviation = runner.own.deviation;
     let driver = runner.own.drivers.entry(node).or_insert_with(|| Driver {

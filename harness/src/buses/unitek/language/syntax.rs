@@ -28,14 +28,14 @@ pub struct DriveLine {
     /// The drive's number.
     pub drive: Located,
     /// What the line says.
-    pub what: Setup,
+    pub what: SetupKind,
     /// The whole line.
     pub span: TextSpan,
 }
 
 /// What a header line says about a drive.
 #[derive(Clone, Debug)]
-pub enum Setup {
+pub enum SetupKind {
     /// `drive 3`, `drive 3 rx 210 tx 190`: it is there.
     There {
         /// The identifier on which it receives.

@@ -3,7 +3,7 @@
 use super::parse::mode_word;
 use super::syntax::{
     Content, DriveHarm, Expect, FrameHarm, Header, Job, JobKind, Message, Outside, PropertyValue,
-    RegisterName, Setup, Step, Value, ValueKind,
+    RegisterName, SetupKind, Step, Value, ValueKind,
 };
 use crate::scenario::expression::Located;
 use harness_proto::can::Id;
@@ -23,25 +23,25 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
     (rate.into_iter().collect(), drives.chain(master).collect())
 }
 
-fn setup(what: &Setup) -> String {
+fn setup(what: &SetupKind) -> String {
     match what {
-        Setup::There { rx, tx } => {
+        SetupKind::There { rx, tx } => {
             let given = [("rx", *rx), ("tx", *tx)].into_iter();
             let given = given.filter_map(|(name, id)| Some((name, id?)));
             let words: Vec<_> = given.map(|(name, id)| format!("{name} {id:03X}")).collect();
             words.join(" ")
         }
-        Setup::Profile(name) => format!("profile {name}"),
-        Setup::Property(property, value) => {
+        SetupKind::Profile(name) => format!("profile {name}"),
+        SetupKind::Property(property, value) => {
             let value: &dyn Display = match value {
                 PropertyValue::Word(word) => word,
                 PropertyValue::Time(time) => time,
             };
             format!("property {} = {value}", property.name)
         }
-        Setup::Mode(mode) => format!("mode {}", mode_word(*mode)),
-        Setup::Deviates(deviation) => format!("deviates {}", deviation.name),
-        Setup::Outside(own) => outside(own),
+        SetupKind::Mode(mode) => format!("mode {}", mode_word(*mode)),
+        SetupKind::Deviates(deviation) => format!("deviates {}", deviation.name),
+        SetupKind::Outside(own) => outside(own),
     }
 }
 

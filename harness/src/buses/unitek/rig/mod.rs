@@ -136,7 +136,7 @@ pub fn rate(port: &Port) -> BitRate {
 /// # Errors
 /// The lines have mistakes.
 pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
-    let named = serve::bench(Some(0), Some(source))?.setup.setup.drives;
+    let named = serve::bench(Some(0), Some(source))?.setup.drives;
     let axes = axes(port);
     let missing = |drive: &&DriveSetup| axes.iter().all(|axis| axis.node != drive.node);
     if let Some(drive) = named.iter().find(missing) {
@@ -155,8 +155,6 @@ pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
             ..named.cloned().unwrap_or_else(|| DriveSetup::new(axis.node))
         }
     };
-    Ok(Setup {
-        rate: rate(port),
-        drives: axes.iter().copied().map(drive).collect(),
-    })
+    let drives = axes.iter().copied().map(drive);
+    Ok(Setup::new(rate(port), drives.collect()))
 }

@@ -4,7 +4,7 @@ use super::known::Known;
 use crate::buses::unitek::driver::Error;
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::language::plan::{node, octet_time};
-use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
+use crate::buses::unitek::language::syntax::{PropertyValue, SetupKind};
 use crate::rig::Rig;
 use crate::scenario::expression::Scope;
 use crate::scenario::parse::header::{Part, read};
@@ -32,7 +32,7 @@ impl Profiled {
         let read: Result<Scenario<Unitek>, Problems> = read(&source, Part::Header);
         let lines = read.map_or_else(|_| Vec::new(), |own| own.header.drives);
         let properties = lines.into_iter().filter_map(|line| match line.what {
-            Setup::Property(property, value) => {
+            SetupKind::Property(property, value) => {
                 Some((node(&line.drive, Scope::default()).ok()?, property, value))
             }
             _ => None,

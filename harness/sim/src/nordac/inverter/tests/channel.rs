@@ -1,7 +1,7 @@
 //! The parameter channel: the examples of 3.4, every parameter, every error in its order.
 
 use super::{Bench, first, pkw};
-use crate::nordac::{Inverter, Setup};
+use crate::nordac::{Inverter, InverterSetup};
 use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{
@@ -155,10 +155,10 @@ fn symbolic_limits() {
 /// Every parameter reads its factory setting in every set and element, with both tasks.
 #[test]
 fn every_parameter_reads() {
-    let setup = Setup {
+    let setup = InverterSetup {
         posicon: true,
         parameters: vec![first(1622, 1)],
-        ..Setup::default()
+        ..InverterSetup::default()
     };
     let mut inverter = Inverter::new(&setup, Instant::START);
     let mut read = 0;

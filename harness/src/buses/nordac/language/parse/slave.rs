@@ -1,6 +1,6 @@
 //! Lines that begin with `slave`.
 
-use super::super::syntax::{Outside, Setup, Step};
+use super::super::syntax::{Outside, SetupKind, Step};
 use super::value;
 use crate::scenario::expression::{self, Located};
 use crate::scenario::parse::words::{deviation, named, required};
@@ -14,7 +14,7 @@ use harness_sim::nordac::deviation::{Deviation, deviations};
 /// What a line about a slave is.
 pub(super) enum Line {
     /// A header line.
-    Setup(Setup),
+    Setup(SetupKind),
     /// A step.
     Outside(Outside),
 }
@@ -57,13 +57,13 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
         Word::Property => Line::Setup(property(scanner)?),
         Word::Parameter => {
             let (name, value) = value::assigned(scanner)?;
-            Line::Setup(Setup::Parameter(name, value))
+            Line::Setup(SetupKind::Parameter(name, value))
         }
         Word::Deviates => {
             let names: Vec<(&str, &'static Deviation)> =
                 deviations().map(|own| (own.name, own)).collect();
             let line = "`slave 8 deviates NAME`";
-            Line::Setup(Setup::Deviates(deviation(
+            Line::Setup(SetupKind::Deviates(deviation(
                 scanner, &names, "a slave", line,
             )?))
         }
@@ -101,7 +101,7 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
 }
 
 /// `ppo 2`, `posicon`, in either order; both may be left out.
-fn there(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
+fn there(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let (mut ppo, mut posicon) = (None, false);
     while !scanner.at_end() {
         let before = scanner.clone();
@@ -116,7 +116,7 @@ fn there(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
             return Err(scanner.unexpected("the end of the line (it is given twice)"));
         }
     }
-    Ok(Setup::There { ppo, posicon })
+    Ok(SetupKind::There { ppo, posicon })
 }
 
 /// `1` to `4`.
@@ -132,7 +132,7 @@ pub(super) fn ppo_type(scanner: &mut Scanner<'_>) -> Result<PpoType, Problem> {
 }
 
 /// `pzd-invalid = hold`; without `=` as well.
-fn property(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
+fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let before = scanner.clone();
     // Some names begin with the number of a parameter.
     let name = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
@@ -148,7 +148,7 @@ fn property(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
     let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || "-.".contains(c));
     let word = word.map_or("", |own| own.value);
     if property.set(&mut Properties::default(), word) {
-        return Ok(Setup::Property(property, word.to_owned()));
+        return Ok(SetupKind::Property(property, word.to_owned()));
     }
     *scanner = before;
     Err(match property.accepts {

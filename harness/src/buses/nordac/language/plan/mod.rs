@@ -7,7 +7,7 @@ pub use value::{PlannedParameter, PlannedWord};
 use self::value::{parameter, raw, up_to, word};
 use super::Nordac;
 use super::syntax::{
-    Bad, Damage, Job, JobKind, Message, OctetHarm, Outside, Sender, Setup, SlaveLine, Step,
+    Bad, Damage, Job, JobKind, Message, OctetHarm, Outside, Sender, SetupKind, SlaveLine, Step,
     TelegramHarm, Wanted, WordKind, WordName, WordValue,
 };
 use crate::buses::nordac::simulate::{self, SlaveSetup, Stimulus};
@@ -166,18 +166,18 @@ fn apply(line: &SlaveLine, slaves: &mut Vec<SlaveSetup>) -> Result<(), Problem> 
     });
     let own = &mut slaves[place];
     match &line.what {
-        Setup::There { ppo, posicon } => {
+        SetupKind::There { ppo, posicon } => {
             own.ppo = ppo.unwrap_or(own.ppo);
             own.posicon |= posicon;
         }
-        Setup::Property(property, word) => {
+        SetupKind::Property(property, word) => {
             if !property.set(&mut own.properties, word) {
                 let what = format!("the property {} does not take this value", property.name);
                 return Err(Problem::new(line.span, what, "another value expected"));
             }
         }
-        Setup::Deviates(deviation) => own.deviation = Some(deviation),
-        Setup::Parameter(name, given) => {
+        SetupKind::Deviates(deviation) => own.deviation = Some(deviation),
+        SetupKind::Parameter(name, given) => {
             let parameter = parameter(name, Scope::default())?;
             let raw = raw(given, parameter, Scope::default())?;
             let known = parameter.listed(name.span)?;
@@ -467,9 +467,9 @@ impl Settle<Nordac> for Planner {
         let lines = scenario.header.slaves.iter();
         let needs = lines.filter_map(|line| match &line.what {
             // A rig has slaves with properties of their own, which are found out.
-            Setup::There { .. } | Setup::Property(..) => None,
-            Setup::Parameter(..) => Some(Capability::Memory),
-            Setup::Deviates(_) => Some(Capability::Simulator),
+            SetupKind::There { .. } | SetupKind::Property(..) => None,
+            SetupKind::Parameter(..) => Some(Capability::Memory),
+            SetupKind::Deviates(_) => Some(Capability::Simulator),
         });
         let sends = scenario.steps.iter().filter_map(|step| match &step.action {
             Action::Send { message, .. } => Some(message),

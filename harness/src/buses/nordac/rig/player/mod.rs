@@ -518,7 +518,7 @@ impl Player {
     fn other_properties(&self, own: &Own) -> Option<String> {
         let lines = own.scenario.header.slaves.iter();
         let mut named = lines.filter_map(|line| match &line.what {
-            syntax::Setup::Property(property, _) => Some(*property),
+            syntax::SetupKind::Property(property, _) => Some(*property),
             _ => None,
         });
         named.find_map(|property| {

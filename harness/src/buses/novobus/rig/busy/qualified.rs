@@ -8,7 +8,7 @@ use crate::buses::novobus::twin::Twin;
 use crate::cli::fuzz::scope;
 use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swarm, Watcher};
 use crate::library::Entry;
-use crate::qualify::{Bench, Qualification, QualificationFacts};
+use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};
 use crate::rig::Played;
 use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
@@ -32,7 +32,7 @@ impl<'r, 's> Watched<'r, 's> {
     }
 }
 
-impl Bench for Watched<'_, '_> {
+impl QualifiedBench for Watched<'_, '_> {
     type Stop = String;
 
     fn play(&mut self, entry: &Entry) -> Result<Played, String> {

@@ -1,6 +1,6 @@
 //! Lines that begin with `drive`.
 
-use super::super::syntax::{Outside, PropertyValue, Setup, Step};
+use super::super::syntax::{Outside, PropertyValue, SetupKind, Step};
 use super::message::identifier;
 use super::value;
 use crate::scenario::expression::{self, Located};
@@ -15,7 +15,7 @@ use harness_sim::unitek::{Control, Inputs};
 /// What a line about a drive is.
 pub(super) enum Line {
     /// A header line.
-    Setup(Setup),
+    Setup(SetupKind),
     /// A header line or a step.
     Outside(Outside),
     /// A step.
@@ -65,7 +65,7 @@ pub(in super::super) fn mode_word(mode: Control) -> &'static str {
 pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem> {
     let drive = expression::sum(scanner)?;
     if scanner.at_end() {
-        let there = Setup::There { rx: None, tx: None };
+        let there = SetupKind::There { rx: None, tx: None };
         return Ok((drive, Line::Setup(there)));
     }
     let before = scanner.clone();
@@ -76,15 +76,15 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
         }
         Word::Profile => {
             let names = PROFILES.map(|name| (name, name));
-            Line::Setup(Setup::Profile(named(scanner, &names, "a profile")?))
+            Line::Setup(SetupKind::Profile(named(scanner, &names, "a profile")?))
         }
         Word::Property => Line::Setup(property(scanner)?),
-        Word::Mode => Line::Setup(Setup::Mode(named(scanner, &MODES, "a control mode")?)),
+        Word::Mode => Line::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
         Word::Deviates => {
             let names: Vec<(&str, &'static Deviation)> =
                 deviations().map(|own| (own.name, own)).collect();
             let own = deviation(scanner, &names, "a drive", "`drive 1 deviates NAME`")?;
-            Line::Setup(Setup::Deviates(own))
+            Line::Setup(SetupKind::Deviates(own))
         }
         Word::Register => {
             let register = value::register(scanner)?;
@@ -122,7 +122,7 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
 }
 
 /// `rx 210 tx 190`, in either order; one of them may be left out.
-fn identifiers(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
+fn identifiers(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let (mut rx, mut tx) = (None, None);
     while !scanner.at_end() {
         let names = [("rx", true), ("tx", false)];
@@ -141,11 +141,11 @@ fn identifiers(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
             return Err(scanner.unexpected("the end of the line (it is given twice)"));
         }
     }
-    Ok(Setup::There { rx, tx })
+    Ok(SetupKind::There { rx, tx })
 }
 
 /// `map-reply = native`, `homing-time = 20ms`; without `=` as well.
-fn property(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
+fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
     let names: Vec<(&str, &'static Description)> =
         PROPERTIES.iter().map(|own| (own.name, own)).collect();
     let property = named(scanner, &names, "a property")?;
@@ -173,7 +173,7 @@ fn property(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
         }
         Accepts::TimeUpTo(_) => PropertyValue::Time(times::duration(scanner)?),
     };
-    Ok(Setup::Property(property, value))
+    Ok(SetupKind::Property(property, value))
 }
 
 /// `tol = 1`, `tol off`

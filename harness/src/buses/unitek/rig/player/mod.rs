@@ -20,7 +20,7 @@ use crate::buses::unitek::driver::{Driver, Error};
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::language::plan::{node, octet_time};
-use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
+use crate::buses::unitek::language::syntax::{PropertyValue, SetupKind};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
@@ -188,7 +188,7 @@ impl Player {
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
     pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
-        let bench = &own.plan.setup.setup;
+        let bench = &own.plan.setup;
         let axis = |node: u8| self.axes.iter().find(|axis| axis.node == node);
         for drive in &bench.drives {
             let wanted = drive.identifiers;
@@ -411,7 +411,7 @@ impl Player {
             let known = self.known().iter().find(|own| own.axis.node == node)?;
             let mut wanted = known.properties;
             let named: Vec<_> = match &line.what {
-                Setup::Property(property, value) => {
+                SetupKind::Property(property, value) => {
                     let setting = match value {
                         PropertyValue::Word(word) => Setting::Word(word),
                         PropertyValue::Time(time) => Setting::Time(time.on(octet_time(self.rate))),
@@ -419,7 +419,7 @@ impl Player {
                     let _fits = property.set(&mut wanted, setting);
                     vec![*property]
                 }
-                Setup::Profile(name) => {
+                SetupKind::Profile(name) => {
                     wanted = Properties::profile(name)?;
                     let differs = |own: &&_| differs_between_profiles(own);
                     PROPERTIES.iter().filter(differs).collect()
@@ -452,10 +452,7 @@ impl Player {
             let other = other.properties.and_then(|all| all.get(place)).copied();
             known.model(other.unwrap_or(known.properties))
         });
-        let setup = simulate::Setup {
-            rate: self.rate,
-            drives: drives.collect(),
-        };
+        let setup = simulate::Setup::new(self.rate, drives.collect());
         let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
         let mut bench = Bench::new(&setup);
         bench.wait(Instant::START + other.phase);
@@ -504,7 +501,7 @@ impl Player {
             }
         }
         let mut at_rest = Vec::new();
-        for drive in &own.plan.setup.setup.drives {
+        for drive in &own.plan.setup.drives {
             let known = self.known().iter().find(|own| own.axis.node == drive.node);
             let Some(known) = known else { continue };
             for (register, raw) in &drive.registers {

@@ -202,10 +202,7 @@ impl Note {
             }
             _ => right(known, *properties),
         });
-        let setup = simulate::Setup {
-            rate: player.rate,
-            drives: drives.collect(),
-        };
+        let setup = simulate::Setup::new(player.rate, drives.collect());
         let mut bench = Bench::new(&setup);
         for axis in player.axes.iter().cycle().take(heard.into()) {
             let firmware = Request::Read { register: 0x1B };

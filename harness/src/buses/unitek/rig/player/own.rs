@@ -52,7 +52,7 @@ impl Own {
     /// Whether a drive may supervise the time between frames in it (T-Out): every query of the bench would begin that time again.
     pub(super) fn may_time_out(&self, drives: &[Known]) -> bool {
         let held = drives.iter().any(|known| known.cell(TIME_OUT) != 0);
-        let header = self.plan.setup.setup.drives.iter();
+        let header = self.plan.setup.drives.iter();
         let mut header = header.flat_map(|own| &own.registers);
         held || header.any(|(register, _)| *register == TIME_OUT)
             || self.frames().any(|frame| writes(frame, TIME_OUT))
