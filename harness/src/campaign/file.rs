@@ -2,7 +2,7 @@
 
 use super::fault::{LONGEST, LineBit, MAX_GAP, link_place};
 use crate::campaign::class::CaseClass;
-use crate::file::schema::{Step, compare, place, syntax};
+use crate::file::schema::{PathStep, compare, place, syntax};
 use crate::file::values::{LinkName, Time};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
@@ -280,7 +280,7 @@ impl Read<'_> {
         message: impl Into<String>,
         expected: impl Into<String>,
     ) -> Problem {
-        let path: Vec<_> = path.iter().map(|key| Step::from(*key)).collect();
+        let path: Vec<_> = path.iter().map(|key| PathStep::from(*key)).collect();
         Problem::new(place(&self.table, &path), message, expected)
     }
 
@@ -291,7 +291,7 @@ impl Read<'_> {
     }
 
     fn at(&self, key: &str, index: usize, message: String, expected: &str) -> Problem {
-        let path = [Step::from(key), Step::from(index)];
+        let path = [PathStep::from(key), PathStep::from(index)];
         Problem::new(place(&self.table, &path), message, expected)
     }
 

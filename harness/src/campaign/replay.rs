@@ -2,7 +2,7 @@
 
 use super::fault::CaseFaults;
 use super::run::{Campaign, Contradiction};
-use crate::buses::syntax::{Fault, Header, Job, LinkEnds, RingStep};
+use crate::buses::syntax::{FaultStep, Header, JobStep, LinkEnds, RingStep};
 use crate::link::link_name;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::syntax::{Action, Scenario};
@@ -46,13 +46,15 @@ pub fn scenario(campaign: &Campaign, case: &CaseFaults) -> Result<String, Contra
     for fault in case.faults() {
         for (distance, what) in fault.what.lines() {
             let ends = LinkEnds::of_place(drives, fault.link);
-            let fault = Fault::on_link(0, ends, what, fault.byte + distance);
+            let fault = FaultStep::on_link(0, ends, what, fault.byte + distance);
             text.step(&RingStep::Fault(fault).into(), "");
         }
     }
     if campaign.by_driver() {
         for step in &entry.scenario.steps {
-            if let Action::Own(RingStep::Job(Job::Master { .. } | Job::Count(..))) = step.action {
+            if let Action::Own(RingStep::Job(JobStep::Master { .. } | JobStep::Count(..))) =
+                step.action
+            {
                 text.step(step, "");
             }
         }

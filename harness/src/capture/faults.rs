@@ -1,6 +1,6 @@
 //! What was damaged on a link, in the words of the scenario language.
 
-use crate::buses::syntax::{Fault, LinkEnds};
+use crate::buses::syntax::{FaultStep, LinkEnds};
 use crate::scenario::times::Duration;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Span;
@@ -13,11 +13,11 @@ const CUT: usize = 8;
 
 /// The faults of a link. Bytes do not always show what a cable did: a break is assumed to last as long as bytes were
 /// lost behind it, and many lost bytes are taken for a cut. A delay is not seen.
-pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<Fault> {
+pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<FaultStep> {
     let bytes = link.octets();
     let ends = || LinkEnds::between(link.from, link.to);
     let at_byte =
-        |number: u64, fault: LinkFault| Fault::on_link(ring, ends(), fault.into(), number);
+        |number: u64, fault: LinkFault| FaultStep::on_link(ring, ends(), fault.into(), number);
     let mut faults = Vec::new();
     let mut number = 0_u64;
     let mut place = 0;
@@ -33,7 +33,7 @@ pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<Fault> {
                 let start = byte.at - rate.byte_time();
                 let span = break_span(byte, bytes.get(place + lost), rate);
                 let at = Duration::nanos(start.since_start().as_nanos());
-                faults.push(Fault {
+                faults.push(FaultStep {
                     byte: None,
                     at: Some(at),
                     ..own(LinkFault::Break(span))

@@ -31,32 +31,32 @@ pub(crate) fn compare(root: &Value, whole: &str, table: &Spanned<DeTable<'_>>) -
 
 /// A step on the way to a value: a key or a number in a list.
 #[derive(Clone, Copy)]
-pub(crate) enum Step<'a> {
+pub(crate) enum PathStep<'a> {
     Key(&'a str),
     Index(usize),
 }
 
-impl<'a> From<&'a str> for Step<'a> {
+impl<'a> From<&'a str> for PathStep<'a> {
     fn from(key: &'a str) -> Self {
         Self::Key(key)
     }
 }
 
-impl From<usize> for Step<'_> {
+impl From<usize> for PathStep<'_> {
     fn from(index: usize) -> Self {
         Self::Index(index)
     }
 }
 
 /// The place of a value, or of the nearest table around it that is there.
-pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[Step<'_>]) -> TextSpan {
+pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[PathStep<'_>]) -> TextSpan {
     let mut span = span_of(table);
     let mut value: Option<&Spanned<DeValue<'_>>> = None;
     for step in path {
         let next = match (step, value.map(Spanned::get_ref)) {
-            (Step::Key(key), None) => table.get_ref().get(*key),
-            (Step::Key(key), Some(DeValue::Table(table))) => table.get(*key),
-            (Step::Index(index), Some(DeValue::Array(array))) => array.get(*index),
+            (PathStep::Key(key), None) => table.get_ref().get(*key),
+            (PathStep::Key(key), Some(DeValue::Table(table))) => table.get(*key),
+            (PathStep::Index(index), Some(DeValue::Array(array))) => array.get(*index),
             _ => None,
         };
         let Some(next) = next else { break };

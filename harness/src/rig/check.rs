@@ -6,7 +6,7 @@ use super::port_file::Port;
 use super::profile::KnownProfile;
 use super::session_error::SessionError;
 use crate::buses::syntax::Header;
-use crate::file::schema::{Step, compare, place, syntax};
+use crate::file::schema::{PathStep, compare, place, syntax};
 use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
@@ -166,13 +166,13 @@ pub(crate) struct RigCheck<'a> {
 
 impl RigCheck<'_> {
     /// The place of a value, or of the nearest table around it that is there.
-    pub(crate) fn place(&self, path: &[Step<'_>]) -> TextSpan {
+    pub(crate) fn place(&self, path: &[PathStep<'_>]) -> TextSpan {
         place(self.table, path)
     }
 
     pub(crate) fn wrong(
         &mut self,
-        path: &[Step<'_>],
+        path: &[PathStep<'_>],
         message: impl Into<String>,
         expected: impl Into<String>,
     ) {
@@ -197,7 +197,7 @@ impl RigCheck<'_> {
             return (profile, Header::default());
         }
         for (ring, number) in file.rings().zip(["1", "2"]) {
-            let path = [Step::Key("ring"), Step::Key(number)];
+            let path = [PathStep::Key("ring"), PathStep::Key(number)];
             self.endpoint(&path, &ring.endpoint);
         }
         self.one_world();
@@ -279,8 +279,8 @@ impl RigCheck<'_> {
     }
 
     /// Ports that fit their transport.
-    fn endpoint(&mut self, path: &[Step<'_>], endpoint: &Endpoint) {
-        let at = |key| [path, &[Step::Key(key)]].concat();
+    fn endpoint(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
+        let at = |key| [path, &[PathStep::Key(key)]].concat();
         let transport = endpoint.transport.name();
         match (endpoint.transport, &endpoint.port, endpoint.udev.is_empty()) {
             (Transport::Sim, Some(_), _) => {
@@ -346,7 +346,7 @@ impl RigCheck<'_> {
         }
     }
 
-    fn is_physical(&mut self, path: &[Step<'_>], endpoint: &Endpoint) {
+    fn is_physical(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
         if endpoint.transport == Transport::Sim {
             let path = [path, &["transport".into()]].concat();
             self.wrong(
@@ -378,7 +378,7 @@ impl RigCheck<'_> {
     }
 
     /// How many drives the ring has; `None`, and a mistake, where there is no such ring.
-    fn ring(&mut self, path: &[Step<'_>], ring: u8) -> Option<u8> {
+    fn ring(&mut self, path: &[PathStep<'_>], ring: u8) -> Option<u8> {
         let found = self.file.rings().nth(usize::from(ring.saturating_sub(1)));
         if found.is_none() {
             let path = [path, &["ring".into()]].concat();
@@ -391,7 +391,7 @@ impl RigCheck<'_> {
         found.map(|ring| ring.drives)
     }
 
-    fn link(&mut self, path: &[Step<'_>], ring: u8, link: LinkName) {
+    fn link(&mut self, path: &[PathStep<'_>], ring: u8, link: LinkName) {
         let Some(drives) = self.ring(path, ring) else {
             return;
         };
@@ -412,7 +412,7 @@ impl RigCheck<'_> {
     /// No port is named twice.
     fn ports(&mut self) {
         let file = self.file;
-        let mut all: Vec<(Vec<Step<'_>>, &Endpoint)> = Vec::new();
+        let mut all: Vec<(Vec<PathStep<'_>>, &Endpoint)> = Vec::new();
         for (ring, key) in file.rings().zip(["1", "2"]) {
             all.push((vec!["ring".into(), key.into()], &ring.endpoint));
         }
@@ -443,7 +443,7 @@ impl RigCheck<'_> {
     }
 
     /// The drive is one of the ring.
-    pub(crate) fn drive(&mut self, path: &[Step<'_>], ring: u8, address: u8) {
+    pub(crate) fn drive(&mut self, path: &[PathStep<'_>], ring: u8, address: u8) {
         let at = path.split_last().map_or(path, |(_, before)| before);
         let Some(drives) = self.ring(at, ring) else {
             return;
@@ -483,7 +483,7 @@ impl RigCheck<'_> {
     /// Programs have a name, and none of their words holds a zero byte.
     fn programs(&mut self) {
         let file = self.file;
-        let mut all: Vec<(Vec<Step<'_>>, &[String])> = Vec::new();
+        let mut all: Vec<(Vec<PathStep<'_>>, &[String])> = Vec::new();
         for (name, power) in &file.power {
             let entries = [
                 ("on", Some(&power.on)),

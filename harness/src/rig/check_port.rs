@@ -3,10 +3,10 @@
 use super::check::{RigCheck, is_address};
 use super::file::SCHEMA;
 use super::port_file::{CONFIRMATION, Port};
-use crate::file::schema::Step;
+use crate::file::schema::PathStep;
 use crate::file::values::MaxSpeed;
 
-const PORT: [Step<'static>; 2] = [Step::Key("port"), Step::Key("1")];
+const PORT: [PathStep<'static>; 2] = [PathStep::Key("port"), PathStep::Key("1")];
 
 impl RigCheck<'_> {
     /// Checks whether the file has rings or a port, and what it says of the port. Returns whether it has a port in place of rings.
@@ -126,11 +126,11 @@ impl RigCheck<'_> {
         let adapters = adapters.map(|key| (key, port.bus.adapters()));
         let more = port.more().into_iter().map(|key| (key, port.bus.keys()));
         let of_port = adapters.chain(more).map(|(key, own)| {
-            let path = vec![PORT[0], PORT[1], Step::Key(key)];
+            let path = vec![PORT[0], PORT[1], PathStep::Key(key)];
             (path, key, own)
         });
         let of_limits = given.map(|key| {
-            let path = vec![Step::Key("limits"), Step::Key(key)];
+            let path = vec![PathStep::Key("limits"), PathStep::Key(key)];
             (path, key, port.bus.limits())
         });
         let all: Vec<_> = of_port.chain(of_limits).collect();
@@ -146,7 +146,7 @@ impl RigCheck<'_> {
 
     /// One adapter, or simulated drives.
     fn adapter(&mut self, port: &Port) {
-        let at = |key| [PORT[0], PORT[1], Step::Key(key)];
+        let at = |key| [PORT[0], PORT[1], PathStep::Key(key)];
         let sim = self.file.sim.as_ref();
         let adapters = port.adapters();
         match (adapters.first(), adapters.get(1), sim) {
@@ -224,7 +224,13 @@ impl RigCheck<'_> {
 
     /// The lines of `setup` are about drives of the port.
     fn lines(&mut self, port: &Port, lines: &[String]) {
-        let at = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
+        let at = |index: usize| {
+            [
+                PathStep::Key("sim"),
+                PathStep::Key("setup"),
+                PathStep::Index(index),
+            ]
+        };
         let long = |line: &String| line.contains(['\n', '\r']);
         if let Some(index) = lines.iter().position(long) {
             let expected = "one line expected here";
@@ -241,7 +247,12 @@ impl RigCheck<'_> {
         let mut seen: Vec<(u16, usize)> = Vec::new();
         let mut numbers: Vec<u8> = Vec::new();
         for (index, node) in port.drives.iter().enumerate() {
-            let path = [PORT[0], PORT[1], Step::Key("drives"), Step::Index(index)];
+            let path = [
+                PORT[0],
+                PORT[1],
+                PathStep::Key("drives"),
+                PathStep::Index(index),
+            ];
             if let Err((message, expected)) = port.bus.named(*node) {
                 self.wrong(&path, message, expected);
                 continue;
@@ -274,8 +285,8 @@ impl RigCheck<'_> {
             .map(|(at, node)| port.bus.drive(at, *node).0)
             .collect();
         for (index, own) in file.interlock.iter().enumerate() {
-            let entry = [Step::Key("interlock"), Step::Index(index)];
-            let at = |key| [entry[0], entry[1], Step::Key(key)];
+            let entry = [PathStep::Key("interlock"), PathStep::Index(index)];
+            let at = |key| [entry[0], entry[1], PathStep::Key(key)];
             let (key, read) = port.bus.row().interlock;
             let foreign = [
                 ("ring", own.ring != 1),
@@ -316,7 +327,7 @@ impl RigCheck<'_> {
 
     fn port_limits(&mut self, port: &Port) {
         let limits = &self.file.limits.port;
-        let at = |key| [Step::Key("limits"), Step::Key(key)];
+        let at = |key| [PathStep::Key("limits"), PathStep::Key(key)];
         if limits.max_setpoint.is_some() && limits.max_frequency.is_some() {
             let expected = "`max_setpoint` or `max_frequency` expected";
             self.wrong(

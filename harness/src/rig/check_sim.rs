@@ -6,7 +6,7 @@ use super::port_file::Port;
 use super::profile::{KnownProfile, Profile, ProfileLines, ProfileSetup};
 use crate::buses::header::{for_other_rings, parse_lines};
 use crate::buses::syntax::Header;
-use crate::file::schema::Step;
+use crate::file::schema::PathStep;
 use crate::rig::sim::{mistakes, sizes};
 use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::source::{Source, line_number};
@@ -69,7 +69,13 @@ impl RigCheck<'_> {
     pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) -> Header {
         let none = Sim::default();
         let lines = &self.file.sim.as_ref().unwrap_or(&none).setup;
-        let line = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
+        let line = |index: usize| {
+            [
+                PathStep::Key("sim"),
+                PathStep::Key("setup"),
+                PathStep::Index(index),
+            ]
+        };
         let long = |line: &String| line.contains(['\n', '\r']);
         if let Some(index) = lines.iter().position(long) {
             self.wrong(
@@ -108,7 +114,7 @@ impl RigCheck<'_> {
     }
 
     /// Adds a mistake at a value of the rig's file.
-    pub(crate) fn add(&mut self, path: &[Step<'_>], problem: &Problem) {
+    pub(crate) fn add(&mut self, path: &[PathStep<'_>], problem: &Problem) {
         let span = self.place(path);
         self.problems.push(Problem {
             span,

@@ -318,12 +318,12 @@ pub struct Description {
     /// What it decides.
     pub about: &'static str,
     set: fn(&mut Properties, Setting<'_>) -> bool,
-    get: fn(&Properties) -> Value,
+    get: fn(&Properties) -> CurrentSetting,
 }
 
 /// What a property is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Value {
+pub enum CurrentSetting {
     /// One of the property's words.
     Word(&'static str),
     /// A byte.
@@ -332,7 +332,7 @@ pub enum Value {
     Time(Span),
 }
 
-impl fmt::Display for Value {
+impl fmt::Display for CurrentSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Word(word) => f.write_str(word),
@@ -348,7 +348,7 @@ impl fmt::Display for Value {
 impl Description {
     /// What the property is of a drive.
     #[must_use]
-    pub fn of_drive(&self, properties: &Properties) -> Value {
+    pub fn of_drive(&self, properties: &Properties) -> CurrentSetting {
         (self.get)(properties)
     }
 
@@ -385,9 +385,9 @@ macro_rules! properties {
     (@accepts Byte) => { Accepts::Byte };
     (@accepts Time) => { Accepts::TimeUpTo(LONGEST) };
     (@accepts $type:ident) => { Accepts::Words($type::WORDS) };
-    (@get Byte $value:expr) => { Value::Byte($value) };
-    (@get Time $value:expr) => { Value::Time($value) };
-    (@get $type:ident $value:expr) => { Value::Word($value.word()) };
+    (@get Byte $value:expr) => { CurrentSetting::Byte($value) };
+    (@get Time $value:expr) => { CurrentSetting::Time($value) };
+    (@get $type:ident $value:expr) => { CurrentSetting::Word($value.word()) };
     (@value Byte $setting:ident) => { byte($setting) };
     (@value Time $setting:ident) => { time($setting) };
     (@value $type:ident $setting:ident) => {

@@ -257,7 +257,7 @@ impl Setpoint {
 
 /// The words of one step of an exchange. What is not given stays as it is in the step before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Step {
+pub struct ExchangeStep {
     /// STW.
     pub control: Option<u16>,
     /// HSW.
@@ -272,11 +272,11 @@ pub struct Step {
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn steps(texts: &[String]) -> Result<Vec<Step>, String> {
-    let mut steps = vec![Step::default()];
+pub fn steps(texts: &[String]) -> Result<Vec<ExchangeStep>, String> {
+    let mut steps = vec![ExchangeStep::default()];
     for text in texts {
         if text == THEN {
-            steps.push(Step::default());
+            steps.push(ExchangeStep::default());
             continue;
         }
         let expected = "STW=047F, HSW=50%, HSW=20Hz, PZD3=0000, PZD4=2000 or `then` expected";
@@ -298,7 +298,7 @@ pub fn steps(texts: &[String]) -> Result<Vec<Step>, String> {
             ));
         }
     }
-    match steps.iter().any(|own| *own == Step::default()) {
+    match steps.iter().any(|own| *own == ExchangeStep::default()) {
         true => Err("a step has no words: STW=047E, for example, expected".to_owned()),
         false => Ok(steps),
     }
@@ -472,7 +472,7 @@ mod tests {
         };
         let found = read("STW=047E then stw=0x047F HSW=-50% PZD4=0FFF").expect("two steps");
         assert_eq!(found[0].control, Some(0x047E));
-        let second = Step {
+        let second = ExchangeStep {
             control: Some(0x047F),
             setpoint: Some(Setpoint::Raw(0xE000)),
             third: None,

@@ -3,7 +3,7 @@
 //! The master repeats a request without a reply, and starts the slave again where that does not help, or where the slave has left the
 //! exchange. Every request begins at its own time, so that a repetition does not shift what follows.
 
-use super::file::{Step, TelegramCampaignFile};
+use super::file::{CampaignStep, TelegramCampaignFile};
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::nordac::master::{Exchange, Startup};
@@ -119,7 +119,7 @@ pub(super) enum MasterOctets {
 pub(super) fn converse(
     file: &TelegramCampaignFile,
     ppo: PpoType,
-    steps: &[Step],
+    steps: &[CampaignStep],
     fault: Option<LineFaultAt>,
 ) -> Option<Conversation> {
     let mut desk = Desk::new(file, ppo)?;
@@ -201,23 +201,23 @@ impl Desk {
         self.now = self.now.max(to);
     }
 
-    fn step(&mut self, step: Step) -> StepEnd {
+    fn step(&mut self, step: CampaignStep) -> StepEnd {
         for _ in 0..=MOST_STARTS {
             let done = match step {
-                Step::Wait(time) => {
+                CampaignStep::Wait(time) => {
                     self.run(self.now + time);
                     Ok(StepEnd::Waited)
                 }
-                Step::Start => self.start().map(|()| StepEnd::Started),
-                Step::Exchange(control, setpoint) => {
+                CampaignStep::Start => self.start().map(|()| StepEnd::Started),
+                CampaignStep::Exchange(control, setpoint) => {
                     self.exchange.outputs.words[..2].copy_from_slice(&[control, setpoint]);
                     self.once().map(|(inputs, _)| StepEnd::Exchanged(inputs))
                 }
-                Step::Read(parameter) => {
+                CampaignStep::Read(parameter) => {
                     self.exchange.read(&parameter);
                     self.task()
                 }
-                Step::Write(parameter, raw) => {
+                CampaignStep::Write(parameter, raw) => {
                     self.exchange.write(&parameter, raw);
                     self.task()
                 }

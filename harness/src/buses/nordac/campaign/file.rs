@@ -30,7 +30,7 @@ pub struct TelegramCampaignFile {
     /// The PPO type, 1 to 4; 1 where nothing is said.
     #[serde(default = "one")]
     pub ppo: u8,
-    /// What the master does, see [`Step`].
+    /// What the master does, see [`CampaignStep`].
     pub steps: Vec<String>,
     /// The kinds of faults.
     pub faults: Vec<FaultName>,
@@ -120,7 +120,7 @@ impl FaultName {
 
 /// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum CampaignStep {
     /// `start`: Slave_Diag, Set_Prm, Chk_Cfg, Slave_Diag.
     Start,
     /// `exchange 047F 2000`: one Data_Exchange with this control word and setpoint.
@@ -149,7 +149,9 @@ pub(super) fn is_of_this_bus(text: &str) -> bool {
 ///
 /// # Errors
 /// What is wrong, where, and what is expected.
-pub(super) fn read(text: &str) -> Result<(TelegramCampaignFile, PpoType, Vec<Step>), String> {
+pub(super) fn read(
+    text: &str,
+) -> Result<(TelegramCampaignFile, PpoType, Vec<CampaignStep>), String> {
     let file: TelegramCampaignFile = toml::from_str(text).map_err(|error| error.to_string())?;
     if file.schema != 1 {
         return Err(format!(
@@ -186,7 +188,7 @@ pub(super) fn read(text: &str) -> Result<(TelegramCampaignFile, PpoType, Vec<Ste
     }
     let read = |(index, text): (usize, &String)| {
         let step = step(text).and_then(|step| match step {
-            Step::Read(_) | Step::Write(..) if !ppo.has_pkw() => Err(format!(
+            CampaignStep::Read(_) | CampaignStep::Write(..) if !ppo.has_pkw() => Err(format!(
                 "{ppo} has no parameter channel: ppo = 1 or 2 is expected"
             )),
             step => Ok(step),
@@ -203,7 +205,7 @@ pub(super) fn read(text: &str) -> Result<(TelegramCampaignFile, PpoType, Vec<Ste
 }
 
 /// One step.
-fn step(text: &str) -> Result<Step, String> {
+fn step(text: &str) -> Result<CampaignStep, String> {
     let words: Vec<_> = text.split_whitespace().collect();
     let parameter = |name: &str| ParameterRef::parse(name).map_err(|error| error.to_string());
     let word = |text: &str| {
@@ -213,18 +215,18 @@ fn step(text: &str) -> Result<Step, String> {
         word.ok_or_else(|| format!("`{text}` is no word: four hexadecimal digits are expected"))
     };
     Ok(match words[..] {
-        ["start"] => Step::Start,
-        ["exchange", control, setpoint] => Step::Exchange(word(control)?, word(setpoint)?),
-        ["read", name] => Step::Read(parameter(name)?),
+        ["start"] => CampaignStep::Start,
+        ["exchange", control, setpoint] => CampaignStep::Exchange(word(control)?, word(setpoint)?),
+        ["read", name] => CampaignStep::Read(parameter(name)?),
         ["write", name, "=", value] => {
             let own = parameter(name)?;
             let raw = value.parse().ok().and_then(|number| own.parameter.raw_of(number));
-            Step::Write(own, raw.ok_or_else(|| format!("`{value}` is no value of {name}: a raw decimal number that fits it is expected"))?)
+            CampaignStep::Write(own, raw.ok_or_else(|| format!("`{value}` is no value of {name}: a raw decimal number that fits it is expected"))?)
         }
         ["wait", time] => {
             let time: Option<u64> = time.strip_suffix("ms").and_then(|digits| digits.parse().ok());
             let time = time.filter(|time| (1..=10_000).contains(time));
-            Step::Wait(Span::from_millis(time.ok_or("1ms to 10000ms are expected behind `wait`")?))
+            CampaignStep::Wait(Span::from_millis(time.ok_or("1ms to 10000ms are expected behind `wait`")?))
         }
         _ => return Err("this is no step: `start`, `exchange STW HSW`, `read PNU`, `write PNU = NUMBER` or `wait TIME` is expected".to_owned()),
     })

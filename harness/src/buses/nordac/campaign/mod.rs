@@ -10,7 +10,7 @@ pub mod file;
 mod tests;
 
 pub use converse::{Conversation, SlaveState, StepEnd};
-pub use file::{Step, TelegramCampaignFile};
+pub use file::{CampaignStep, TelegramCampaignFile};
 
 use crate::buses::Bus;
 use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
@@ -96,7 +96,7 @@ pub struct TelegramCampaign {
     text: String,
     file: TelegramCampaignFile,
     ppo: PpoType,
-    steps: Vec<Step>,
+    steps: Vec<CampaignStep>,
     /// The conversation without a fault.
     sound: Conversation,
     /// The cases, in order of telegrams.

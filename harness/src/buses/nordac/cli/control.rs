@@ -8,7 +8,7 @@ use super::bench::driver;
 use crate::buses::commands::{OutputForm, SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
 use crate::buses::nordac::rig::{Inverters, Session};
-use crate::buses::nordac::value::{Setpoint, Step, percentage, status, steps};
+use crate::buses::nordac::value::{ExchangeStep, Setpoint, percentage, status, steps};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -75,7 +75,7 @@ pub(super) fn exchange(
         let longest = longest_hold(session);
         let mut driver = driver(session);
         driver.join(slave)?;
-        let hertz = |own: &Step| matches!(own.setpoint, Some(Setpoint::Tenths(_)));
+        let hertz = |own: &ExchangeStep| matches!(own.setpoint, Some(Setpoint::Tenths(_)));
         let maximum = supervised(&mut driver, slave, steps.iter().any(hertz))?;
         let mut words = [0; 4];
         let mut all = Vec::new();
@@ -144,7 +144,7 @@ fn hold(
 }
 
 /// The words of a step.
-fn next(before: [u16; 4], step: &Step, slave: u8, maximum: i64) -> Result<[u16; 4], Error> {
+fn next(before: [u16; 4], step: &ExchangeStep, slave: u8, maximum: i64) -> Result<[u16; 4], Error> {
     let [control, setpoint, third, fourth] = before;
     let setpoint = match step.setpoint {
         None => setpoint,

@@ -11,7 +11,7 @@ mod write;
 pub use jobs::KnownSlaves;
 
 use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
-use self::syntax::{Header, Message, Step};
+use self::syntax::{Header, Message, TelegramStep};
 use crate::buses::Bus;
 use crate::buses::nordac::report::TelegramReport;
 use crate::buses::nordac::simulate;
@@ -41,7 +41,7 @@ impl Language for Nordac {
 
     type Header = Header;
     type Message = Message;
-    type Step = Step;
+    type Step = TelegramStep;
     type Setup = simulate::Setup;
     type Sent = SentTelegram;
     type Wanted = WantedOctet;
@@ -79,7 +79,10 @@ impl Language for Nordac {
         parse::message(scanner)
     }
 
-    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<Step, Problem>> {
+    fn step(
+        opening: Opening<'_>,
+        scanner: &mut Scanner<'_>,
+    ) -> Option<Result<TelegramStep, Problem>> {
         parse::step(opening, scanner)
     }
 
@@ -157,7 +160,7 @@ impl Language for Nordac {
         write::message(message)
     }
 
-    fn write_step(step: &Step) -> String {
+    fn write_step(step: &TelegramStep) -> String {
         write::step(step)
     }
 }

@@ -8,7 +8,7 @@ mod value;
 pub(super) use job::{NAMES, word_name};
 pub(super) use telegram::message;
 
-use super::syntax::{Header, OctetHarm, Sender, SlaveLine, Step, TelegramHarm};
+use super::syntax::{Header, OctetHarm, Sender, SlaveLine, TelegramHarm, TelegramStep};
 use crate::scenario::expression;
 use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
@@ -127,19 +127,19 @@ fn slave_line(
 pub(super) fn step(
     opening: Opening<'_>,
     scanner: &mut Scanner<'_>,
-) -> Option<Result<Step, Problem>> {
+) -> Option<Result<TelegramStep, Problem>> {
     Some(match opening {
         Opening::Fault => fault(scanner),
         Opening::Check => check(scanner),
         Opening::Word(word) => match word.value {
             "slave" => slave::step(scanner),
-            name => return Some(job::job(name, scanner)?.map(Step::Job)),
+            name => return Some(job::job(name, scanner)?.map(TelegramStep::Job)),
         },
     })
 }
 
 /// `byte 7: drop`, `slave 8 byte 3: flip 0`, `master telegram 3: lost`, `slave 8: off`
-fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+fn fault(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
     let sender = if scanner.eat_word("master") {
         Sender::Master
     } else if scanner.eat_word("slave") {
@@ -152,7 +152,7 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
     {
         let names = [("off", false), ("on", true)];
         let on = named(scanner, &names, "a fault of a slave")?;
-        return Ok(Step::Power(slave.clone(), on));
+        return Ok(TelegramStep::Power(slave.clone(), on));
     }
     let counted = [("byte", true), ("telegram", false)];
     let of_octet = named(scanner, &counted, "what the fault happens to")?;
@@ -161,8 +161,8 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
         return Err(scanner.unexpected("`:` and the fault, as in `! slave 8 byte 3: drop`"));
     }
     Ok(match of_octet {
-        true => Step::Octet(sender, number, octet_harm(scanner)?),
-        false => Step::Telegram(sender, number, telegram_harm(scanner)?),
+        true => TelegramStep::Octet(sender, number, octet_harm(scanner)?),
+        false => TelegramStep::Telegram(sender, number, telegram_harm(scanner)?),
     })
 }
 
@@ -201,13 +201,13 @@ fn octet_harm(scanner: &mut Scanner<'_>) -> Result<OctetHarm, Problem> {
 }
 
 /// `quiet`, `slave 8 parameter 1202 = 100`
-fn check(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+fn check(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
     let checks = [("quiet", true), ("slave", false)];
     if named(scanner, &checks, "a check")? {
-        return Ok(Step::Quiet);
+        return Ok(TelegramStep::Quiet);
     }
     let slave = expression::sum(scanner)?;
     required(scanner, &["parameter"])?;
     let (name, value) = value::assigned(scanner)?;
-    Ok(Step::Parameter(slave, name, value))
+    Ok(TelegramStep::Parameter(slave, name, value))
 }

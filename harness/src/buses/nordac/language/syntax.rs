@@ -46,7 +46,7 @@ pub enum SetupKind {
     /// `property pzd-invalid = hold`.
     Property(&'static Description, String),
     /// `parameter 1205 = 70.0Hz`.
-    Parameter(ParameterName, Value),
+    Parameter(ParameterName, WrittenValue),
     /// `deviates NAME`.
     Deviates(&'static Deviation),
 }
@@ -75,7 +75,7 @@ pub enum Which {
 
 /// A value as written.
 #[derive(Clone, Debug)]
-pub struct Value {
+pub struct WrittenValue {
     /// What is written.
     pub kind: ValueKind,
     /// Where it stands.
@@ -126,7 +126,7 @@ pub enum Damage {
 
 /// A step of this bus.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum TelegramStep {
     /// `! slave 8 byte 3: flip 0`.
     Octet(Sender, Located, OctetHarm),
     /// `! slave 8 telegram 3: lost`.
@@ -138,9 +138,9 @@ pub enum Step {
     /// `? quiet`.
     Quiet,
     /// `? slave 8 parameter 1202 = 100`.
-    Parameter(Located, ParameterName, Value),
+    Parameter(Located, ParameterName, WrittenValue),
     /// `read 8 1202 = 5s`.
-    Job(Job),
+    Job(JobStep),
 }
 
 /// Whose octets or telegrams are counted.
@@ -190,7 +190,7 @@ pub enum Outside {
 
 /// A job of the master.
 #[derive(Clone, Debug)]
-pub struct Job {
+pub struct JobStep {
     /// The slave.
     pub slave: Located,
     /// What is to be done.
@@ -217,7 +217,7 @@ pub enum JobKind {
     /// `read 8 1202 = 5s`.
     Read(ParameterName, Option<Wanted>),
     /// `write 8 1205.3 = 50.0Hz`, with `error 2` behind it where it must be refused.
-    Write(ParameterName, Value, Option<Located>),
+    Write(ParameterName, WrittenValue, Option<Located>),
     /// `on 8`.
     On,
     /// `off 8`.
@@ -232,7 +232,7 @@ pub enum JobKind {
 #[derive(Clone, Debug)]
 pub enum Wanted {
     /// `= 5s`.
-    Value(Value),
+    Value(WrittenValue),
     /// `error 3`: the number of the error.
     Error(Located),
 }

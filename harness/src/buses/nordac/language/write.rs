@@ -2,8 +2,9 @@
 
 use super::parse::word_name;
 use super::syntax::{
-    Bad, Damage, Header, Job, JobKind, Message, OctetHarm, Outside, ParameterName, Sender,
-    SetupKind, Step, TelegramHarm, Value, ValueKind, Wanted, Which, WordKind, WordName, WordValue,
+    Bad, Damage, Header, JobKind, JobStep, Message, OctetHarm, Outside, ParameterName, Sender,
+    SetupKind, TelegramHarm, TelegramStep, ValueKind, Wanted, Which, WordKind, WordName, WordValue,
+    WrittenValue,
 };
 use crate::scenario::expression::{Expression, Located};
 use harness_sim::fault::Flips;
@@ -35,7 +36,7 @@ fn setup(what: &SetupKind) -> String {
     }
 }
 
-fn assigned(name: &ParameterName, own: &Value) -> String {
+fn assigned(name: &ParameterName, own: &WrittenValue) -> String {
     format!("parameter {} = {}", parameter(name), value(own))
 }
 
@@ -78,7 +79,7 @@ fn parameter(name: &ParameterName) -> String {
     text
 }
 
-fn value(value: &Value) -> String {
+fn value(value: &WrittenValue) -> String {
     match &value.kind {
         ValueKind::Raw(raw) => raw.to_string(),
         ValueKind::Given(given) => given.clone(),
@@ -113,9 +114,9 @@ fn flips(flips: Flips) -> String {
 }
 
 /// Any other step.
-pub(super) fn step(step: &Step) -> String {
+pub(super) fn step(step: &TelegramStep) -> String {
     match step {
-        Step::Octet(sender, byte, own) => {
+        TelegramStep::Octet(sender, byte, own) => {
             let number = &byte.expression;
             format!(
                 "! {}byte {number}: {}",
@@ -123,7 +124,7 @@ pub(super) fn step(step: &Step) -> String {
                 octet_harm(own)
             )
         }
-        Step::Telegram(sender, telegram, own) => {
+        TelegramStep::Telegram(sender, telegram, own) => {
             let number = &telegram.expression;
             let harm = match own {
                 TelegramHarm::Plain(own) => own.to_string(),
@@ -131,16 +132,16 @@ pub(super) fn step(step: &Step) -> String {
             };
             format!("! {}telegram {number}: {harm}", self::sender(sender))
         }
-        Step::Power(slave, on) => {
+        TelegramStep::Power(slave, on) => {
             let what = if *on { "on" } else { "off" };
             format!("! slave {}: {what}", slave.expression)
         }
-        Step::Outside(slave, own) => format!("slave {} {}", slave.expression, outside(own)),
-        Step::Quiet => "? quiet".to_owned(),
-        Step::Parameter(slave, name, own) => {
+        TelegramStep::Outside(slave, own) => format!("slave {} {}", slave.expression, outside(own)),
+        TelegramStep::Quiet => "? quiet".to_owned(),
+        TelegramStep::Parameter(slave, name, own) => {
             format!("? slave {} {}", slave.expression, assigned(name, own))
         }
-        Step::Job(own) => job(own),
+        TelegramStep::Job(own) => job(own),
     }
 }
 
@@ -160,7 +161,7 @@ fn octet_harm(harm: &OctetHarm) -> String {
     }
 }
 
-fn job(job: &Job) -> String {
+fn job(job: &JobStep) -> String {
     let slave = &job.slave.expression;
     match &job.what {
         JobKind::Start { ppo, watchdog } => {

@@ -4,7 +4,7 @@ use super::case::{Act, ActKind, Case, Harm, Talk, To};
 use super::oracle::sent;
 use super::play::MasterView;
 use crate::buses::novobus::language::syntax::{
-    Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
+    FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
 };
 use crate::buses::novobus::twin::answering;
 use crate::scenario::expression::Located;
@@ -82,7 +82,7 @@ pub fn text(case: &Case, page: &Surroundings<'_>) -> String {
         };
         for (link, byte, harm) in faults.by_ref().take(own) {
             let ends = LinkEnds::of_place(case.drives, usize::from(link));
-            let fault = Fault::on_link(case.ring(), ends, kind(harm), byte);
+            let fault = FaultStep::on_link(case.ring(), ends, kind(harm), byte);
             text.step(&RingStep::Fault(fault).into(), "");
         }
     }
@@ -106,7 +106,7 @@ fn steps(text: &mut Text, act: &Act, case: &Case) {
         }
         ActKind::Power { drive, on } => {
             let power = if on { DriveFault::On } else { DriveFault::Off };
-            let fault = Fault {
+            let fault = FaultStep {
                 ring,
                 what: FaultKind::Drive(Located::number(drive.into()), power),
                 byte: None,

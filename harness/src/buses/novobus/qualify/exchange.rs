@@ -1,7 +1,7 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
-use crate::buses::novobus::language::syntax::{self, Fault, LinkEnds, RingStep};
+use crate::buses::novobus::language::syntax::{self, FaultStep, LinkEnds, RingStep};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
@@ -295,7 +295,7 @@ impl Sent {
                 }
                 [Piece::Fault(byte, fault)] => {
                     let ends = LinkEnds::of_place(drives, 0);
-                    let fault = Fault::on_link(0, ends, (*fault).into(), *byte);
+                    let fault = FaultStep::on_link(0, ends, (*fault).into(), *byte);
                     vec![RingStep::Fault(fault).into()]
                 }
                 run => {

@@ -1,6 +1,6 @@
 //! The conditions of interlocks in a rig's file: cells and inputs of an ND21, and the mistakes that can stand there.
 
-use crate::file::schema::Step;
+use crate::file::schema::PathStep;
 use crate::file::values::ValueError;
 use crate::rig::check::RigCheck;
 use crate::rig::file::{Interlock, Level};
@@ -80,8 +80,8 @@ fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
 
 impl RigCheck<'_> {
     /// One entry of `[[interlock]]`.
-    pub(crate) fn interlock(&mut self, path: &[Step<'_>], interlock: &Interlock) {
-        let at = |key| [path, &[Step::Key(key)]].concat();
+    pub(crate) fn interlock(&mut self, path: &[PathStep<'_>], interlock: &Interlock) {
+        let at = |key| [path, &[PathStep::Key(key)]].concat();
         self.drive(&at("drive"), interlock.ring, interlock.drive);
         let bounds = [("min", &interlock.min), ("max", &interlock.max)];
         match (&interlock.cell, &interlock.input) {

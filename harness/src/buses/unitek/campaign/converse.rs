@@ -1,6 +1,6 @@
 //! A conversation of the master with a drive on a segment.
 
-use super::file::{FrameCampaignFile, Step};
+use super::file::{CampaignStep, FrameCampaignFile};
 use harness_proto::can::{BitRate, Frame, Heard};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Event, Job, Master, Outcome, Trouble};
@@ -114,7 +114,7 @@ pub(super) enum MasterFrame {
 /// Plays the steps, with a fault or without.
 pub(super) fn converse(
     file: &FrameCampaignFile,
-    steps: &[Step],
+    steps: &[CampaignStep],
     fault: Option<Placed>,
 ) -> Conversation {
     let mut desk = Desk::new(file);
@@ -171,13 +171,13 @@ impl Desk {
         }
     }
 
-    fn step(&mut self, step: Step) -> JobEnd {
+    fn step(&mut self, step: CampaignStep) -> JobEnd {
         match step {
-            Step::Wait(time) => {
+            CampaignStep::Wait(time) => {
                 self.run(self.now + time);
                 JobEnd::Waited
             }
-            Step::Job(job) => self.job(job),
+            CampaignStep::Job(job) => self.job(job),
         }
     }
 

@@ -24,7 +24,7 @@ pub struct FrameCampaignFile {
     pub bus: String,
     /// What the campaign shows, in a line.
     pub title: String,
-    /// What the master does, see [`Step`].
+    /// What the master does, see [`CampaignStep`].
     pub steps: Vec<String>,
     /// The kinds of faults.
     pub faults: Vec<FaultName>,
@@ -89,7 +89,7 @@ impl FrameExpect {
 
 /// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum CampaignStep {
     /// `read REGISTER`, `write REGISTER = HEX`, `cycle REGISTER MS`, `stop REGISTER`, `start-up`: a job, to its end.
     Job(Job),
     /// `wait MS`.
@@ -138,7 +138,7 @@ pub(super) fn is_of_this_bus(text: &str) -> bool {
 ///
 /// # Errors
 /// What is wrong, where, and what is expected.
-pub(super) fn read(text: &str) -> Result<(FrameCampaignFile, Vec<Step>), String> {
+pub(super) fn read(text: &str) -> Result<(FrameCampaignFile, Vec<CampaignStep>), String> {
     let file: FrameCampaignFile = toml::from_str(text).map_err(|error| error.to_string())?;
     if file.schema != 1 {
         return Err(format!(
@@ -180,27 +180,27 @@ pub(super) fn read(text: &str) -> Result<(FrameCampaignFile, Vec<Step>), String>
 }
 
 /// One step.
-fn step(text: &str) -> Result<Step, String> {
+fn step(text: &str) -> Result<CampaignStep, String> {
     let words: Vec<_> = text.split_whitespace().collect();
     let register = |name: &str| Register::named(name).map_err(|error| error.to_string());
     Ok(match words[..] {
-        ["read", name] => Step::Job(Job::Read { register: register(name)?.number }),
-        ["stop", name] => Step::Job(Job::Stop { register: register(name)?.number }),
+        ["read", name] => CampaignStep::Job(Job::Read { register: register(name)?.number }),
+        ["stop", name] => CampaignStep::Job(Job::Stop { register: register(name)?.number }),
         ["write", name, "=", value] => {
             let register = register(name)?;
             let raw = u32::from_str_radix(value, 16).ok().filter(|raw| raw & !register.mask() == 0);
             let width = register.width.bits() / 4;
             let raw = raw.ok_or_else(|| format!("`{value}` is no value of {name}: at most {width} hexadecimal digits are expected"))?;
-            Step::Job(Job::Write { register: register.number, data: Data::of(register, raw) })
+            CampaignStep::Job(Job::Write { register: register.number, data: Data::of(register, raw) })
         }
         ["cycle", name, time] => {
             let every = millis(time)?;
             let every = u8::try_from(every).ok().filter(|every| (1..=254).contains(every));
             let every = every.ok_or_else(|| format!("`{time}` is no interval: 1ms to 254ms are expected"))?;
-            Step::Job(Job::Cycle { register: register(name)?.number, every })
+            CampaignStep::Job(Job::Cycle { register: register(name)?.number, every })
         }
-        ["start-up"] => Step::Job(Job::StartUp { patience: Span::from_millis(300) }),
-        ["wait", time] => Step::Wait(Span::from_millis(millis(time)?)),
+        ["start-up"] => CampaignStep::Job(Job::StartUp { patience: Span::from_millis(300) }),
+        ["wait", time] => CampaignStep::Wait(Span::from_millis(millis(time)?)),
         _ => return Err("this is no step: `read REGISTER`, `write REGISTER = HEX`, `cycle REGISTER TIME`, `stop REGISTER`, `start-up` or `wait TIME` is expected".to_owned()),
     })
 }

@@ -8,7 +8,7 @@ mod converse;
 pub mod file;
 
 pub use converse::{Conversation, JobEnd};
-pub use file::{FrameCampaignFile, Step};
+pub use file::{CampaignStep, FrameCampaignFile};
 
 use crate::buses::Bus;
 use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
@@ -111,7 +111,7 @@ pub struct FrameCampaign {
     text: String,
     /// What its file says.
     pub file: FrameCampaignFile,
-    steps: Vec<Step>,
+    steps: Vec<CampaignStep>,
     /// The conversation without a fault.
     sound: Conversation,
     /// The cases, in order of frames.

@@ -12,7 +12,7 @@ pub(crate) use play::written;
 pub(crate) use write::identifier;
 
 use self::plan::{Act, Planner, WantedFrame};
-use self::syntax::{Header, Message, Step};
+use self::syntax::{FrameStep, Header, Message};
 use crate::buses::Bus;
 use crate::buses::unitek::report::FrameReport;
 use crate::buses::unitek::simulate;
@@ -43,7 +43,7 @@ impl Language for Unitek {
 
     type Header = Header;
     type Message = Message;
-    type Step = Step;
+    type Step = FrameStep;
     type Setup = simulate::Setup;
     type Sent = Frame;
     type Wanted = WantedFrame;
@@ -85,7 +85,7 @@ impl Language for Unitek {
         parse::message(scanner)
     }
 
-    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<Step, Problem>> {
+    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<FrameStep, Problem>> {
         parse::step(opening, scanner)
     }
 
@@ -158,7 +158,7 @@ impl Language for Unitek {
         write::message(message)
     }
 
-    fn write_step(step: &Step) -> String {
+    fn write_step(step: &FrameStep) -> String {
         write::step(step)
     }
 }

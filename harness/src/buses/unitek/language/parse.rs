@@ -10,7 +10,7 @@ pub(super) use job::NAMES;
 pub(super) use message::{comment, message};
 pub(super) use value::register_of_force;
 
-use super::syntax::{DriveHarm, FrameHarm, Header, SetupKind, Step};
+use super::syntax::{DriveHarm, FrameHarm, FrameStep, Header, SetupKind};
 use crate::scenario::expression;
 use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
@@ -128,20 +128,20 @@ fn drive_line(
 pub(super) fn step(
     opening: Opening<'_>,
     scanner: &mut Scanner<'_>,
-) -> Option<Result<Step, Problem>> {
+) -> Option<Result<FrameStep, Problem>> {
     Some(match opening {
         Opening::Fault => fault(scanner),
         Opening::Check => check(scanner),
         Opening::Word(word) => match word.value {
             "drive" => drive::step(scanner),
-            "master" => job::by_driver(scanner).map(Step::Master),
-            name => return Some(job::job(name, scanner)?.map(Step::Job)),
+            "master" => job::by_driver(scanner).map(FrameStep::Master),
+            name => return Some(job::job(name, scanner)?.map(FrameStep::Job)),
         },
     })
 }
 
 /// `frame 3: lost`, `drive 1: off`
-fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+fn fault(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     let places = [("frame", true), ("drive", false)];
     let of_frame = named(scanner, &places, "where the fault is")?;
     let number = expression::sum(scanner)?;
@@ -154,7 +154,7 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
             ("on", DriveHarm::On),
             ("bus-off", DriveHarm::BusOff),
         ];
-        return Ok(Step::Drive(
+        return Ok(FrameStep::Drive(
             number,
             named(scanner, &kinds, "a fault of a drive")?,
         ));
@@ -172,20 +172,20 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
         FrameHarm::Delay(_) => FrameHarm::Delay(times::duration(scanner)?),
         harm => harm,
     };
-    Ok(Step::Frame(number, harm))
+    Ok(FrameStep::Frame(number, harm))
 }
 
 /// `quiet`, `drive 1 register 6E = 11E1CA10`
-fn check(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+fn check(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     let checks = [("quiet", true), ("drive", false)];
     if named(scanner, &checks, "a check")? {
-        return Ok(Step::Quiet);
+        return Ok(FrameStep::Quiet);
     }
     let drive = expression::sum(scanner)?;
     required(scanner, &["register"])?;
     let register = value::register(scanner)?;
     let expect = value::expect(scanner, &register)?;
-    Ok(Step::Register(drive, register, expect))
+    Ok(FrameStep::Register(drive, register, expect))
 }
 
 impl drive::Line {

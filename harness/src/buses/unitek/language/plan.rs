@@ -1,8 +1,8 @@
 //! A scenario settled: drives as they are switched on, frames and what they must be, jobs as frames.
 
 use super::syntax::{
-    Content, DriveHarm, DriveLine, Expect, FrameHarm, Job, JobKind, Message, Outside,
-    PropertyValue, RegisterName, SetupKind, Step, Value, ValueKind,
+    Content, DriveHarm, DriveLine, Expect, FrameHarm, FrameStep, JobKind, JobStep, Message,
+    Outside, PropertyValue, RegisterName, SetupKind, ValueKind, WrittenValue,
 };
 use super::{Unitek, parse};
 use crate::buses::unitek::simulate::{DriveSetup, Setup};
@@ -285,7 +285,12 @@ fn register(name: &RegisterName, scope: Scope) -> Result<&'static Register, Prob
 }
 
 /// Contents of a register.
-fn raw(value: &Value, register: &Register, scope: Scope, scaling: Scaling) -> Result<u32, Problem> {
+fn raw(
+    value: &WrittenValue,
+    register: &Register,
+    scope: Scope,
+    scaling: Scaling,
+) -> Result<u32, Problem> {
     let too_wide = |shown: String| {
         let what = format!(
             "{shown} does not fit into register {:02X} ({}), which has {} bits",
@@ -376,7 +381,7 @@ impl Planner {
     }
 
     /// A job that is compiled to one frame.
-    fn job(&self, job: &Job, span: TextSpan) -> Result<Act, Problem> {
+    fn job(&self, job: &JobStep, span: TextSpan) -> Result<Act, Problem> {
         let drive = self.drive(&job.drive)?;
         let (rx, tx) = drive.identifiers;
         let encoded = |request: Request| {
@@ -423,7 +428,7 @@ impl Planner {
     }
 
     /// A job of the driver.
-    fn by_driver(&self, job: &Job) -> Result<Act, Problem> {
+    fn by_driver(&self, job: &JobStep) -> Result<Act, Problem> {
         let drive = self.drive(&job.drive)?;
         let number = |name| register(name, self.scope).map(|own| own.number);
         let (own, wanted) = match &job.what {
@@ -546,12 +551,12 @@ impl Settle<Unitek> for Planner {
 
     fn act(
         &mut self,
-        step: &Step,
+        step: &FrameStep,
         span: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<Act, Problem> {
         Ok(match step {
-            Step::Frame(number, harm) => {
+            FrameStep::Frame(number, harm) => {
                 needs.push(Capability::Interposer);
                 let frame = number.value(self.scope)?;
                 let Some(frame) = u64::try_from(frame).ok().filter(|own| *own > 0) else {
@@ -560,14 +565,14 @@ impl Settle<Unitek> for Planner {
                 };
                 Act::Frame(frame, self.fault(*harm))
             }
-            Step::Drive(drive, harm) => {
+            FrameStep::Drive(drive, harm) => {
                 needs.push(match harm {
                     DriveHarm::Off | DriveHarm::On => Capability::Power,
                     DriveHarm::BusOff => Capability::Simulator,
                 });
                 Act::Harm(self.drive(drive)?.node, *harm)
             }
-            Step::Outside(drive, outside) => {
+            FrameStep::Outside(drive, outside) => {
                 needs.push(match outside {
                     Outside::Restart => Capability::Power,
                     Outside::Register(name, _) => of_register(register(name, self.scope)?),
@@ -575,14 +580,14 @@ impl Settle<Unitek> for Planner {
                 });
                 self.outside(drive, outside)?
             }
-            Step::Quiet => Act::Quiet,
-            Step::Register(drive, name, expect) => {
+            FrameStep::Quiet => Act::Quiet,
+            FrameStep::Register(drive, name, expect) => {
                 let own = self.drive(drive)?;
                 let register = register(name, self.scope)?;
                 Act::Register(own.node, self.wanted(expect, register, own)?)
             }
-            Step::Job(job) => self.job(job, span)?,
-            Step::Master(job) => self.by_driver(job)?,
+            FrameStep::Job(job) => self.job(job, span)?,
+            FrameStep::Master(job) => self.by_driver(job)?,
         })
     }
 

@@ -68,11 +68,11 @@ pub enum PropertyValue {
 #[derive(Clone, Debug)]
 pub enum Outside {
     /// `register 52 = 3000`.
-    Register(RegisterName, Value),
+    Register(RegisterName, WrittenValue),
     /// `input run low`.
     Input(&'static str, bool),
     /// `force tol = 1`, or `force tol off`.
-    Force(&'static str, Option<Value>),
+    Force(&'static str, Option<WrittenValue>),
     /// `restart`: off and on. A step only.
     Restart,
 }
@@ -93,7 +93,7 @@ pub enum RegisterName {
 
 /// Contents of a register as written.
 #[derive(Clone, Debug)]
-pub struct Value {
+pub struct WrittenValue {
     /// What is written.
     pub kind: ValueKind,
     /// Where it stands.
@@ -115,9 +115,9 @@ pub enum ValueKind {
 #[derive(Clone, Debug)]
 pub struct Expect {
     /// The value.
-    pub value: Value,
+    pub value: WrittenValue,
     /// `+-1%`: how far it may be off.
-    pub tolerance: Option<Value>,
+    pub tolerance: Option<WrittenValue>,
 }
 
 /// A frame behind `>` or `<`.
@@ -144,7 +144,7 @@ pub enum Content {
 
 /// A step of this bus.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum FrameStep {
     /// `! frame 3: lost`.
     Frame(Located, FrameHarm),
     /// `! drive 1: off`.
@@ -156,9 +156,9 @@ pub enum Step {
     /// `? drive 1 register 6E = 11E1CA10`.
     Register(Located, RegisterName, Expect),
     /// `read 1 SPEED_ACTUAL = 50%`.
-    Job(Job),
+    Job(JobStep),
     /// `master start-up 1`: a job of the driver.
-    Master(Job),
+    Master(JobStep),
 }
 
 /// What happens to a frame.
@@ -191,7 +191,7 @@ pub enum DriveHarm {
 
 /// A job of the master.
 #[derive(Clone, Debug)]
-pub struct Job {
+pub struct JobStep {
     /// The drive.
     pub drive: Located,
     /// What is to be done.
@@ -204,7 +204,7 @@ pub enum JobKind {
     /// `read 1 STATUS = 0181`.
     Read(RegisterName, Option<Expect>),
     /// `write 1 SPEED_CMD = 10%`.
-    Write(RegisterName, Value),
+    Write(RegisterName, WrittenValue),
     /// `every 1 SPEED_ACTUAL 100ms`.
     Every(RegisterName, Duration),
     /// `stop-every 1 SPEED_ACTUAL`.

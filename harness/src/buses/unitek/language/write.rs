@@ -2,8 +2,8 @@
 
 use super::parse::mode_word;
 use super::syntax::{
-    Content, DriveHarm, Expect, FrameHarm, Header, Job, JobKind, Message, Outside, PropertyValue,
-    RegisterName, SetupKind, Step, Value, ValueKind,
+    Content, DriveHarm, Expect, FrameHarm, FrameStep, Header, JobKind, JobStep, Message, Outside,
+    PropertyValue, RegisterName, SetupKind, ValueKind, WrittenValue,
 };
 use crate::scenario::expression::Located;
 use harness_proto::can::Id;
@@ -71,7 +71,7 @@ fn counted(number: &Located) -> String {
     format!("({})", number.expression)
 }
 
-fn value(value: &Value) -> String {
+fn value(value: &WrittenValue) -> String {
     match &value.kind {
         ValueKind::Raw(raw, digits) => format!("{raw:0digits$X}"),
         ValueKind::Given(decimal, given) => {
@@ -117,9 +117,9 @@ pub(crate) fn identifier(id: Id) -> String {
 }
 
 /// Any other step.
-pub(super) fn step(step: &Step) -> String {
+pub(super) fn step(step: &FrameStep) -> String {
     match step {
-        Step::Frame(number, harm) => {
+        FrameStep::Frame(number, harm) => {
             let harm = match harm {
                 FrameHarm::Lost => "lost".to_owned(),
                 FrameHarm::Doubled => "doubled".to_owned(),
@@ -130,7 +130,7 @@ pub(super) fn step(step: &Step) -> String {
             };
             format!("! frame {}: {harm}", number.expression)
         }
-        Step::Drive(drive, harm) => {
+        FrameStep::Drive(drive, harm) => {
             let harm = match harm {
                 DriveHarm::Off => "off",
                 DriveHarm::On => "on",
@@ -138,9 +138,9 @@ pub(super) fn step(step: &Step) -> String {
             };
             format!("! drive {}: {harm}", drive.expression)
         }
-        Step::Outside(drive, own) => format!("drive {} {}", drive.expression, outside(own)),
-        Step::Quiet => "? quiet".to_owned(),
-        Step::Register(drive, name, own) => {
+        FrameStep::Outside(drive, own) => format!("drive {} {}", drive.expression, outside(own)),
+        FrameStep::Quiet => "? quiet".to_owned(),
+        FrameStep::Register(drive, name, own) => {
             let drive = &drive.expression;
             format!(
                 "? drive {drive} register {} = {}",
@@ -148,12 +148,12 @@ pub(super) fn step(step: &Step) -> String {
                 expect(own)
             )
         }
-        Step::Job(own) => job(own),
-        Step::Master(own) => format!("master {}", job(own)),
+        FrameStep::Job(own) => job(own),
+        FrameStep::Master(own) => format!("master {}", job(own)),
     }
 }
 
-fn job(job: &Job) -> String {
+fn job(job: &JobStep) -> String {
     let drive = &job.drive.expression;
     match &job.what {
         JobKind::Read(name, None) => format!("read {drive} {}", register(name)),

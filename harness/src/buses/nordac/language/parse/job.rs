@@ -1,6 +1,6 @@
 //! Jobs of the master: `exchange 8 STW=047F HSW=50%`.
 
-use super::super::syntax::{Job, JobKind, Wanted, WordKind, WordName, WordValue};
+use super::super::syntax::{JobKind, JobStep, Wanted, WordKind, WordName, WordValue};
 use super::{slave, value};
 use crate::scenario::expression;
 use crate::scenario::parse::words::{equals, named};
@@ -44,11 +44,11 @@ pub(in super::super) fn word_name(word: WordName, sent: bool) -> &'static str {
 }
 
 /// Reads the rest of a job; `None` if there is none of this name.
-pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
+pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<JobStep, Problem>> {
     NAMES.contains(&name).then(|| one(name, scanner))
 }
 
-fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let slave = expression::sum(scanner)?;
     let what = match name {
         "start" => start(scanner)?,
@@ -78,7 +78,7 @@ fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
         "quick-stop" => JobKind::QuickStop,
         _ => JobKind::Acknowledge,
     };
-    Ok(Job { slave, what })
+    Ok(JobStep { slave, what })
 }
 
 /// `ppo 1 watchdog 300ms`, in either order; both may be left out.

@@ -1,6 +1,6 @@
 //! Lines that begin with `slave`.
 
-use super::super::syntax::{Outside, SetupKind, Step};
+use super::super::syntax::{Outside, SetupKind, TelegramStep};
 use super::value;
 use crate::scenario::expression::{self, Located};
 use crate::scenario::parse::words::{deviation, named, required};
@@ -87,11 +87,11 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
 }
 
 /// A line that begins with `slave`, as a step.
-pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
     let before = scanner.clone();
     let (slave, line) = line(scanner)?;
     match line {
-        Line::Outside(outside) => Ok(Step::Outside(slave, outside)),
+        Line::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
         // A time stands in front of it.
         Line::Setup(_) => {
             *scanner = before;

@@ -1,6 +1,6 @@
 //! Parameters and their values: `1205.3 = 50.0Hz`, `"Accel. time" = 5s`.
 
-use super::super::syntax::{ParameterName, Value, ValueKind, Which};
+use super::super::syntax::{ParameterName, ValueKind, Which, WrittenValue};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::parse::words::equals;
 use crate::scenario::problem::{Problem, nearest};
@@ -11,7 +11,9 @@ use harness_proto::nordac::{PARAMETERS, Parameter};
 const MOST_DIGITS: usize = 12;
 
 /// `1205.3 = 50.0Hz`
-pub(super) fn assigned(scanner: &mut Scanner<'_>) -> Result<(ParameterName, Value), Problem> {
+pub(super) fn assigned(
+    scanner: &mut Scanner<'_>,
+) -> Result<(ParameterName, WrittenValue), Problem> {
     let name = parameter(scanner)?;
     equals(scanner)?;
     Ok((name, value(scanner)?))
@@ -85,10 +87,10 @@ fn which(scanner: &mut Scanner<'_>) -> Result<Which, Problem> {
 }
 
 /// A raw decimal number, or a number with its unit.
-pub(super) fn value(scanner: &mut Scanner<'_>) -> Result<Value, Problem> {
+pub(super) fn value(scanner: &mut Scanner<'_>) -> Result<WrittenValue, Problem> {
     let here = scanner.here();
     let kind = kind(scanner)?;
-    Ok(Value {
+    Ok(WrittenValue {
         kind,
         span: scanner.since(here),
     })

@@ -7,8 +7,8 @@ pub use value::{PlannedParameter, PlannedWord};
 use self::value::{parameter, raw, up_to, word};
 use super::Nordac;
 use super::syntax::{
-    Bad, Damage, Job, JobKind, Message, OctetHarm, Outside, Sender, SetupKind, SlaveLine, Step,
-    TelegramHarm, Wanted, WordKind, WordName, WordValue,
+    Bad, Damage, JobKind, JobStep, Message, OctetHarm, Outside, Sender, SetupKind, SlaveLine,
+    TelegramHarm, TelegramStep, Wanted, WordKind, WordName, WordValue,
 };
 use crate::buses::nordac::simulate::{self, SlaveSetup, Stimulus};
 use crate::link::Capability;
@@ -259,7 +259,7 @@ impl Planner {
         Ok(PlannedAct::Outside(address, stimulus))
     }
 
-    fn job(&self, job: &Job) -> Result<PlannedAct, Problem> {
+    fn job(&self, job: &JobStep) -> Result<PlannedAct, Problem> {
         let slave = self.slave(&job.slave)?;
         let words = |words: &[(WordName, WordValue)]| {
             let own = words
@@ -410,12 +410,12 @@ impl Settle<Nordac> for Planner {
 
     fn act(
         &mut self,
-        step: &Step,
+        step: &TelegramStep,
         _: TextSpan,
         needs: &mut Vec<Capability>,
     ) -> Result<PlannedAct, Problem> {
         Ok(match step {
-            Step::Octet(sender, byte, harm) => {
+            TelegramStep::Octet(sender, byte, harm) => {
                 needs.push(Capability::Interposer);
                 let fault = match harm {
                     OctetHarm::Plain(fault) => *fault,
@@ -423,7 +423,7 @@ impl Settle<Nordac> for Planner {
                 };
                 self.fault(sender, byte, LineFault::Octet(fault))?
             }
-            Step::Telegram(sender, telegram, harm) => {
+            TelegramStep::Telegram(sender, telegram, harm) => {
                 needs.push(Capability::Interposer);
                 let fault = match harm {
                     TelegramHarm::Plain(fault) => *fault,
@@ -431,19 +431,19 @@ impl Settle<Nordac> for Planner {
                 };
                 self.fault(sender, telegram, LineFault::Telegram(fault))?
             }
-            Step::Power(slave, on) => {
+            TelegramStep::Power(slave, on) => {
                 needs.push(Capability::Power);
                 PlannedAct::Power(self.slave(slave)?.address, *on)
             }
-            Step::Outside(slave, what) => {
+            TelegramStep::Outside(slave, what) => {
                 needs.push(match what {
                     Outside::Restart => Capability::Power,
                     Outside::Link(_) | Outside::Fault { .. } => Capability::Simulator,
                 });
                 self.outside(self.slave(slave)?.address, what)?
             }
-            Step::Quiet => PlannedAct::Quiet,
-            Step::Parameter(slave, name, value) => {
+            TelegramStep::Quiet => PlannedAct::Quiet,
+            TelegramStep::Parameter(slave, name, value) => {
                 let own = parameter(name, self.scope)?;
                 own.listed(name.span)?;
                 PlannedAct::Parameter(
@@ -452,7 +452,7 @@ impl Settle<Nordac> for Planner {
                     raw(value, own, self.scope)?,
                 )
             }
-            Step::Job(job) => self.job(job)?,
+            TelegramStep::Job(job) => self.job(job)?,
         })
     }
 

@@ -1,7 +1,7 @@
 //! Parameters, values and words, settled.
 
 use crate::buses::nordac::language::syntax::{
-    ParameterName, Value, ValueKind, Which, WordKind, WordValue,
+    ParameterName, ValueKind, Which, WordKind, WordValue, WrittenValue,
 };
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::problem::{Problem, TextSpan};
@@ -93,7 +93,7 @@ fn set_of(set: &Located, scope: Scope) -> Result<u8, Problem> {
 
 /// The raw number of a value, in the 32 bits of PWE1 and PWE2; the high half of a word is 0.
 pub(super) fn raw(
-    value: &Value,
+    value: &WrittenValue,
     parameter: PlannedParameter,
     scope: Scope,
 ) -> Result<u32, Problem> {

@@ -4,7 +4,7 @@ use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
 use crate::buses::novobus::language::syntax::{
-    CellPlace, DriveRange, Job, JobKind, MasterCall, Written,
+    CellPlace, DriveRange, JobKind, JobStep, MasterCall, Written,
 };
 use crate::scenario::expression;
 use crate::scenario::pattern::{self, Pattern};
@@ -60,7 +60,7 @@ pub(crate) fn names() -> Vec<&'static str> {
 }
 
 /// Reads the text after a job's name; `None` if there is no such job.
-pub(crate) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
+pub(crate) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<JobStep, Problem>> {
     match name {
         "recover" => Some(recover(scanner)),
         "exchange" => Some(exchange(scanner)),
@@ -72,8 +72,8 @@ pub(crate) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, P
     }
 }
 
-fn recover(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
-    Ok(Job::Recover(which_ring(scanner)?))
+fn recover(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
+    Ok(JobStep::Recover(which_ring(scanner)?))
 }
 
 /// `ring 2`, or nothing for the first one.
@@ -90,10 +90,10 @@ pub(crate) fn which_ring(scanner: &mut Scanner<'_>) -> Result<usize, Problem> {
     Ok(ring)
 }
 
-fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+fn exchange(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let drive = one(scanner)?;
     let (send, receive) = process_data(scanner)?;
-    Ok(Job::Exchange {
+    Ok(JobStep::Exchange {
         drive,
         send,
         receive,
@@ -159,14 +159,14 @@ pub(crate) fn driver_command(
     Some(job)
 }
 
-fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let drive = one(scanner)?;
     let (place, data) = operands(form, scanner)?;
     let tolerance = match &data {
         Some(data) if form.data == Data::Read => tolerance(scanner, data)?,
         _ => None,
     };
-    Ok(Job::Command {
+    Ok(JobStep::Command {
         kind: form.kind,
         drive,
         place,

@@ -3,7 +3,7 @@
 use super::job::{driver_command, process_data, which_ring};
 use super::value::eeprom_place;
 use super::words::{drives, equals};
-use crate::buses::novobus::language::syntax::{DriveRange, Job, MasterCall, WrittenTarget};
+use crate::buses::novobus::language::syntax::{DriveRange, JobStep, MasterCall, WrittenTarget};
 use crate::scenario::expression;
 use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
@@ -29,14 +29,14 @@ const CALLS: [&str; 11] = [
 const MOST_CALLS: usize = 64;
 
 /// Reads what stands behind `master`: one call, or several behind semicolons that go out together.
-pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let once = scanner.eat_word("once");
     let mut ahead = scanner.clone();
     if !once && ahead.eat_word("count") {
         *scanner = ahead;
         let ring = which_ring(scanner)?;
         equals(scanner)?;
-        return Ok(Job::Count(ring, expression::sum(scanner)?));
+        return Ok(JobStep::Count(ring, expression::sum(scanner)?));
     }
     let mut calls = Vec::new();
     loop {
@@ -60,7 +60,7 @@ pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
         }
         calls.push((drives, call));
         if !scanner.eat(";") {
-            return Ok(Job::Master { calls, once });
+            return Ok(JobStep::Master { calls, once });
         }
         if calls.len() == MOST_CALLS {
             return Err(scanner.unexpected("the end of the line (no more jobs fit into one line)"));

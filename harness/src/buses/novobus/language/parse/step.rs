@@ -4,8 +4,8 @@ use super::drive::{self, DriveLine};
 use super::value::place as cell;
 use super::words::{drives, named, required, ring_prefix};
 use crate::buses::novobus::language::syntax::{
-    CellRecording, Check, DriveCheck, DriveRange, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks,
-    RingStep, SetupKind,
+    CellRecording, Check, DriveCheck, DriveRange, FaultKind, FaultStep, LinkEnds, LinkFaultKind,
+    Looks, RingStep, SetupKind,
 };
 use crate::scenario::expression::{self, Located};
 use crate::scenario::language::Opening;
@@ -93,13 +93,13 @@ fn record(scanner: &mut Scanner<'_>) -> Result<CellRecording, Problem> {
     })
 }
 
-fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
+fn fault(scanner: &mut Scanner<'_>) -> Result<FaultStep, Problem> {
     if scanner.eat_word("drive") {
         let ring = ring_prefix(scanner);
         let drive = expression::sum(scanner)?;
         let (byte, at) = place(scanner)?;
         let what = drive_fault(scanner, drive)?;
-        return Ok(Fault {
+        return Ok(FaultStep {
             ring,
             what,
             byte,
@@ -109,7 +109,7 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
     let (ring, link, ends) = link(scanner)?;
     let (byte, at) = place(scanner)?;
     let kind = link_fault(scanner)?;
-    Ok(Fault {
+    Ok(FaultStep {
         ring,
         what: FaultKind::Link(link, ends, kind),
         byte,

@@ -3,7 +3,7 @@
 use super::planner::Planner;
 use super::setup::number_bytes;
 use super::types::{CellTest, NumberCheck, PlannedCell, RingAct, setups_of};
-use crate::buses::novobus::language::syntax::{CellPlace, Job, JobKind, Relation, Written};
+use crate::buses::novobus::language::syntax::{CellPlace, JobKind, JobStep, Relation, Written};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, TextSpan};
 use harness_proto::nd21;
@@ -17,14 +17,14 @@ use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::novobus::telegram::{Address, Telegram};
 
 impl Planner {
-    pub(crate) fn job(&self, job: &Job) -> Result<RingAct, Problem> {
+    pub(crate) fn job(&self, job: &JobStep) -> Result<RingAct, Problem> {
         match job {
-            Job::Recover(ring) => {
+            JobStep::Recover(ring) => {
                 self.ring(*ring, TextSpan::default())?;
                 Ok(RingAct::Recover(*ring))
             }
-            Job::Master { calls, once } => self.master(calls, *once),
-            Job::Count(ring, number) => {
+            JobStep::Master { calls, once } => self.master(calls, *once),
+            JobStep::Count(ring, number) => {
                 self.ring(*ring, number.span)?;
                 let drives = number.value(self.size(*ring))?;
                 let drives = u8::try_from(drives).map_err(|_| {
@@ -36,7 +36,7 @@ impl Planner {
                 })?;
                 Ok(RingAct::Count(*ring, drives))
             }
-            Job::Exchange {
+            JobStep::Exchange {
                 drive,
                 send,
                 receive,
@@ -50,7 +50,7 @@ impl Planner {
                 };
                 self.telegram(ring, k, drive.from.span, Some(word), &[], answer)
             }
-            Job::Command {
+            JobStep::Command {
                 kind,
                 drive,
                 place,

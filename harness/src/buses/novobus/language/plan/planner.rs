@@ -7,7 +7,7 @@ use crate::buses::Stimulus;
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{
-    Check, DriveRange, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
+    Check, DriveRange, FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
 };
 use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
 use crate::scenario::expression::{Located, Scope};
@@ -270,7 +270,7 @@ impl Planner {
         }
     }
 
-    fn fault(&self, fault: &Fault, needs: &mut Vec<Capability>) -> Result<RingAct, Problem> {
+    fn fault(&self, fault: &FaultStep, needs: &mut Vec<Capability>) -> Result<RingAct, Problem> {
         let size = self.size(fault.ring);
         let last = self.rings.get(fault.ring);
         let last = last.map_or(0, |ring| usize::from(ring.drives()));

@@ -9,7 +9,7 @@ use crate::scenario::quantity::{Quantity, Tolerance};
 
 /// A job as written.
 #[derive(Clone, Debug)]
-pub enum Job {
+pub enum JobStep {
     /// `recover`: 17 zeros and the check sequence (ND21 9.8), on the given ring.
     Recover(usize),
     /// `exchange K SEND = RECEIVE`: process data (ND21 9.4).
@@ -114,7 +114,7 @@ pub enum JobKind {
     DeleteError,
 }
 
-impl Job {
+impl JobStep {
     /// The capability of a rig that the job needs in addition to the bus itself.
     pub(crate) fn needs(&self) -> Option<Capability> {
         match self {

@@ -9,5 +9,5 @@ pub(crate) mod step;
 pub use cell::{CellCheck, CellPlace, Relation, Written};
 pub use check::{Check, Condition, DriveCheck, Ending, Showing};
 pub use header::{DriveRange, Header, Influence, RingRange, Setup, SetupKind};
-pub use job::{Job, JobKind, MasterCall, WrittenTarget};
-pub use step::{CellRecording, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, RingStep};
+pub use job::{JobKind, JobStep, MasterCall, WrittenTarget};
+pub use step::{CellRecording, FaultKind, FaultStep, LinkEnds, LinkFaultKind, Looks, RingStep};

@@ -3,7 +3,7 @@
 use super::cell::CellPlace;
 use super::check::{Check, DriveCheck};
 use super::header::{DriveRange, Influence};
-use super::job::Job;
+use super::job::JobStep;
 use crate::buses::novobus::language::Novobus;
 use crate::scenario::expression::Located;
 use crate::scenario::syntax::{Action, Step};
@@ -15,7 +15,7 @@ use harness_sim::fault::{DriveFault, Flips, LinkFault};
 #[derive(Clone, Debug)]
 pub enum RingStep {
     /// `!`: a fault.
-    Fault(Fault),
+    Fault(FaultStep),
     /// `?`: a check.
     Check(Check),
     /// `until`: time passes until a check holds, at most this long.
@@ -25,7 +25,7 @@ pub enum RingStep {
     /// `record`: cells are recorded from here on, or no longer.
     Record(CellRecording),
     /// A job of the master.
-    Job(Job),
+    Job(JobStep),
 }
 
 impl From<RingStep> for Step<Novobus> {
@@ -59,7 +59,7 @@ pub enum Looks {
 
 /// A fault as written.
 #[derive(Clone, Debug)]
-pub struct Fault {
+pub struct FaultStep {
     /// Which ring, counted from 0.
     pub ring: usize,
     /// Where and what.
@@ -70,7 +70,7 @@ pub struct Fault {
     pub at: Option<Duration>,
 }
 
-impl Fault {
+impl FaultStep {
     /// A fault on a link of a ring, counted from 0, at a byte, counted from 1.
     #[must_use]
     pub fn on_link(ring: usize, ends: LinkEnds, kind: LinkFaultKind, byte: u64) -> Self {

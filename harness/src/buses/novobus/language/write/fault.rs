@@ -1,11 +1,11 @@
 //! Faults.
 
 use super::{link, ring_prefix};
-use crate::buses::novobus::language::syntax::{Fault, FaultKind, LinkFaultKind};
+use crate::buses::novobus::language::syntax::{FaultKind, FaultStep, LinkFaultKind};
 use harness_sim::fault::LinkFault;
 
 /// What stands behind `!`: `98->97 byte 10: flip 0`, `drive 3 @20ms: off`.
-pub(crate) fn fault(fault: &Fault) -> String {
+pub(crate) fn fault(fault: &FaultStep) -> String {
     let place = match (&fault.byte, fault.at) {
         (Some(byte), _) => format!(" byte {byte}"),
         (None, Some(at)) => format!(" @{at}"),

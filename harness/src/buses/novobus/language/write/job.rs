@@ -3,21 +3,21 @@
 use super::{cell, drives, which_ring};
 use crate::buses::novobus::language::parse::job::FORMS;
 use crate::buses::novobus::language::syntax::{
-    CellPlace, DriveRange, Job, JobKind, MasterCall, Written, WrittenTarget,
+    CellPlace, DriveRange, JobKind, JobStep, MasterCall, Written, WrittenTarget,
 };
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::Tolerance;
 
 /// `read-byte 95 FE13 = 88`, `recover`, `master reference 1`
-pub(crate) fn job(job: &Job) -> String {
+pub(crate) fn job(job: &JobStep) -> String {
     match job {
-        Job::Recover(ring) => format!("recover{}", which_ring(*ring)),
-        Job::Exchange {
+        JobStep::Recover(ring) => format!("recover{}", which_ring(*ring)),
+        JobStep::Exchange {
             drive,
             send,
             receive,
         } => format!("exchange {}", exchange(drive, send, receive.as_ref())),
-        Job::Command {
+        JobStep::Command {
             kind,
             drive,
             place,
@@ -29,12 +29,12 @@ pub(crate) fn job(job: &Job) -> String {
             (place.as_ref(), data.as_ref()),
             tolerance.as_ref(),
         ),
-        Job::Master { calls, once } => {
+        JobStep::Master { calls, once } => {
             let calls: Vec<_> = calls.iter().map(|(drive, own)| call(drive, own)).collect();
             let once = if *once { "once " } else { "" };
             format!("master {once}{}", calls.join("; "))
         }
-        Job::Count(ring, number) => format!("master count{} = {number}", which_ring(*ring)),
+        JobStep::Count(ring, number) => format!("master count{} = {number}", which_ring(*ring)),
     }
 }
 

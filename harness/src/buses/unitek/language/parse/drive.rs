@@ -1,6 +1,6 @@
 //! Lines that begin with `drive`.
 
-use super::super::syntax::{Outside, PropertyValue, SetupKind, Step};
+use super::super::syntax::{FrameStep, Outside, PropertyValue, SetupKind};
 use super::message::identifier;
 use super::value;
 use crate::scenario::expression::{self, Located};
@@ -106,12 +106,12 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
 }
 
 /// A line that begins with `drive`, as a step.
-pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     let before = scanner.clone();
     let (drive, line) = line(scanner)?;
     match line {
-        Line::Outside(outside) => Ok(Step::Outside(drive, outside)),
-        Line::Restart => Ok(Step::Outside(drive, Outside::Restart)),
+        Line::Outside(outside) => Ok(FrameStep::Outside(drive, outside)),
+        Line::Restart => Ok(FrameStep::Outside(drive, Outside::Restart)),
         // A time stands in front of it.
         Line::Setup(_) => {
             *scanner = before;

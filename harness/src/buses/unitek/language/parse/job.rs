@@ -1,6 +1,6 @@
 //! Jobs of the master: `read 1 SPEED_ACTUAL = 50%`, and those of the driver behind `master`.
 
-use super::super::syntax::{Job, JobKind};
+use super::super::syntax::{JobKind, JobStep};
 use super::value;
 use crate::scenario::expression;
 use crate::scenario::parse::words::{equals, named, required};
@@ -16,18 +16,18 @@ pub(in super::super) const NAMES: [&str; 6] =
 pub(in super::super) const DRIVER: [&str; 5] = ["read", "write", "every", "stop-every", "start-up"];
 
 /// Reads the rest of a job; `None` if there is none of this name.
-pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
+pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<JobStep, Problem>> {
     NAMES.contains(&name).then(|| one(name, scanner))
 }
 
 /// Reads what stands behind `master`.
-pub(super) fn by_driver(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+pub(super) fn by_driver(scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let names = DRIVER.map(|name| (name, name));
     let name = named(scanner, &names, "what the driver is to do")?;
     one(name, scanner)
 }
 
-fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<JobStep, Problem> {
     let drive = expression::sum(scanner)?;
     let what = match name {
         "lock" => JobKind::Lock,
@@ -57,5 +57,5 @@ fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
             }
         }
     };
-    Ok(Job { drive, what })
+    Ok(JobStep { drive, what })
 }

@@ -1,6 +1,6 @@
 //! Registers and their contents: `SPEED_ACTUAL = 50%`, `52 = 3000`.
 
-use super::super::syntax::{Expect, RegisterName, Value, ValueKind};
+use super::super::syntax::{Expect, RegisterName, ValueKind, WrittenValue};
 use crate::scenario::expression;
 use crate::scenario::parse::words::equals;
 use crate::scenario::problem::{Problem, nearest};
@@ -101,10 +101,13 @@ pub(super) fn expect(
 }
 
 /// Contents: hexadecimal digits as they are, or a decimal number with a unit.
-pub(super) fn value(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<Value, Problem> {
+pub(super) fn value(
+    scanner: &mut Scanner<'_>,
+    unit: Option<Unit>,
+) -> Result<WrittenValue, Problem> {
     let here = scanner.here();
     let kind = kind(scanner, unit)?;
-    Ok(Value {
+    Ok(WrittenValue {
         kind,
         span: scanner.since(here),
     })
