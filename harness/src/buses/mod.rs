@@ -71,8 +71,8 @@ use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
-use crate::serve::frames::FrameJob;
-use crate::serve::{Job, ServeEnd, ServeError, ServeHost, serve};
+use crate::serve::frames::FramePlace;
+use crate::serve::{ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt, serve};
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
@@ -548,13 +548,13 @@ impl Bus {
 pub(crate) fn serve_frames(
     bus: Bus,
     (drives, header): (Option<u8>, Option<&Source>),
-    job: &FrameJob,
+    options: &ServeOptions<FramePlace>,
     host: &mut dyn ServeHost,
 ) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
         Bus::Unitek => {
             let plan = unitek::serve::bench(drives, header)?;
-            Ok(unitek::serve::serve(plan, job, host))
+            Ok(unitek::serve::serve(plan, options, host))
         }
         Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
     }
@@ -575,7 +575,7 @@ pub(crate) const fn shares_octets(bus: Bus) -> bool {
     matches!(bus, Bus::Nordac)
 }
 
-/// Serves simulated drives of a shared line of octets, those with these addresses and those of a header, to a master at each place of the job.
+/// Serves simulated drives of a shared line of octets, those with these addresses and those of a header, to a master at each place of the options.
 ///
 /// # Errors
 /// The header has mistakes, or the bus has no such line.
@@ -583,14 +583,14 @@ pub(crate) fn serve_octets(
     bus: Bus,
     (slaves, header): (Option<&[u8]>, Option<&Source>),
     marks: ErrorMarks,
-    job: &Job,
+    options: &ServeOptions<ServedAt>,
     host: &mut dyn ServeHost,
 ) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
         Bus::Nordac => {
             let plan = nordac::serve::bench(slaves, header)?;
-            let server = nordac::serve::SegmentServer::new(plan, job.places.len(), marks);
-            Ok(serve(server, job, host))
+            let server = nordac::serve::SegmentServer::new(plan, options.places.len(), marks);
+            Ok(serve(server, options, host))
         }
         Bus::Novobus | Bus::Unitek => Ok(Err(ServeError::Medium)),
     }

@@ -7,7 +7,7 @@ use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_any_rig;
 use super::run::{of_rig, select};
-use super::run_rig::{PlayOrder, Stop, over, play, show, work};
+use super::run_rig::{EarlyEnd, PlayOrder, over, play, show, work};
 use super::run_segment;
 use super::tally::EarlierVerdicts;
 use crate::buses::syntax::Header;
@@ -15,7 +15,7 @@ use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualifiedBench};
-use crate::rig::{Played, Run, state};
+use crate::rig::{PlayedScenario, Run, state};
 use crate::scenario::problem::Problems;
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -79,9 +79,9 @@ pub(super) struct Live<'l, 's> {
 }
 
 impl QualifiedBench for Live<'_, '_> {
-    type Stop = Stop;
+    type Stop = EarlyEnd;
 
-    fn play(&mut self, entry: &Entry) -> Result<Played, Stop> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, EarlyEnd> {
         let (_, played) = play(self.run, entry, self.folder.as_deref_mut())?;
         Ok(played)
     }
@@ -94,17 +94,17 @@ impl QualifiedBench for Live<'_, '_> {
         self.run.twin_with(header)
     }
 
-    fn tell(&mut self, text: &str) -> Result<(), Stop> {
+    fn tell(&mut self, text: &str) -> Result<(), EarlyEnd> {
         Ok(self.output.result(text)?)
     }
 
-    fn show(&mut self, entry: &Entry, played: &Played) -> Result<(), Stop> {
+    fn show(&mut self, entry: &Entry, played: &PlayedScenario) -> Result<(), EarlyEnd> {
         Ok(show(entry, played, self.output)?)
     }
 }
 
 /// Settles what is left of a qualification, and writes its files.
-pub(super) fn settle(course: Qualification, mut live: Live<'_, '_>) -> Result<Exit, Stop> {
+pub(super) fn settle(course: Qualification, mut live: Live<'_, '_>) -> Result<Exit, EarlyEnd> {
     let qualified = course.settle(&mut live)?;
     if let Some(folder) = live.folder {
         if let Some(profile) = &qualified.profile {

@@ -15,7 +15,7 @@ use crate::link::{Line, Octets, Trouble};
 use crate::qualify::{Qualification, QualificationFacts};
 use crate::report::html::Head;
 use crate::report::plot::plot;
-use crate::rig::{Keeper, Played, Rig, Run, Session, SessionError, UseOptions};
+use crate::rig::{Keeper, PlayedScenario, Rig, Run, Session, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
@@ -49,25 +49,25 @@ pub(crate) struct PlayOrder {
 }
 
 /// Why work ends early.
-pub(crate) enum Stop {
+pub(crate) enum EarlyEnd {
     Session(SessionError),
     Evidence(EvidenceError),
     Output(std::io::Error),
 }
 
-impl From<SessionError> for Stop {
+impl From<SessionError> for EarlyEnd {
     fn from(error: SessionError) -> Self {
         Self::Session(error)
     }
 }
 
-impl From<EvidenceError> for Stop {
+impl From<EvidenceError> for EarlyEnd {
     fn from(error: EvidenceError) -> Self {
         Self::Evidence(error)
     }
 }
 
-impl From<std::io::Error> for Stop {
+impl From<std::io::Error> for EarlyEnd {
     fn from(error: std::io::Error) -> Self {
         Self::Output(error)
     }
@@ -106,16 +106,16 @@ pub(crate) fn work(
         output,
     ) {
         Ok(exit) => exit,
-        Err(Stop::Session(error)) => {
+        Err(EarlyEnd::Session(error)) => {
             output.complain(&error.to_string());
             exit_of(&error)
         }
-        Err(Stop::Evidence(error)) => {
+        Err(EarlyEnd::Evidence(error)) => {
             output.complain(&error.to_string());
             folder = None;
             Exit::of_evidence(&error)
         }
-        Err(Stop::Output(error)) => output.unwritable(&error),
+        Err(EarlyEnd::Output(error)) => output.unwritable(&error),
     };
     let (end, exit) = give_back(session, exit, output);
     let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
@@ -204,7 +204,7 @@ fn all(
     job: &PlayOrder,
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
-) -> Result<Exit, Stop> {
+) -> Result<Exit, EarlyEnd> {
     let mut run = match Run::new(session) {
         Ok(run) => run,
         Err(problems) => {
@@ -251,7 +251,11 @@ pub(super) fn worse(scenarios: Exit, all: Exit) -> Exit {
 }
 
 /// Reports the outcome of a conversation of a qualification.
-pub(super) fn show(entry: &Entry, played: &Played, output: &mut Output) -> std::io::Result<()> {
+pub(super) fn show(
+    entry: &Entry,
+    played: &PlayedScenario,
+    output: &mut Output,
+) -> std::io::Result<()> {
     let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
     let text = line(entry, &played.outcome, output);
     output.result(&text)?;
@@ -272,10 +276,10 @@ pub(super) trait Course {
         &mut self,
         entry: &Entry,
         folder: Option<&mut Folder>,
-    ) -> Result<(String, Played), Stop>;
+    ) -> Result<(String, PlayedScenario), EarlyEnd>;
 
     /// Notes what came of it.
-    fn note(&mut self, entry: &Entry, name: &str, played: &Played, output: &mut Output);
+    fn note(&mut self, entry: &Entry, name: &str, played: &PlayedScenario, output: &mut Output);
 
     /// Whether nothing more can or may be played; says why.
     fn over(&mut self, output: &mut Output) -> bool;
@@ -296,11 +300,11 @@ impl Course for OnRings<'_> {
         &mut self,
         entry: &Entry,
         folder: Option<&mut Folder>,
-    ) -> Result<(String, Played), Stop> {
+    ) -> Result<(String, PlayedScenario), EarlyEnd> {
         play(&mut self.run, entry, folder)
     }
 
-    fn note(&mut self, entry: &Entry, name: &str, played: &Played, _: &mut Output) {
+    fn note(&mut self, entry: &Entry, name: &str, played: &PlayedScenario, _: &mut Output) {
         // Those for another bus are no part of a qualification of this one.
         if let Some(course) = self.course.as_mut().filter(|_| entry.plan.is_some()) {
             course.note(name, played);
@@ -319,7 +323,7 @@ pub(super) fn course_of(
     job: &PlayOrder,
     (mut folder, mut page): (Option<&mut Folder>, Option<&mut Page>),
     output: &mut Output,
-) -> Result<Exit, Stop> {
+) -> Result<Exit, EarlyEnd> {
     let bar = progress_bar(entries.len(), output.progress);
     let name = course.name();
     let mut cases = Cases::new(&name, job.junit.as_deref());
@@ -328,10 +332,10 @@ pub(super) fn course_of(
     for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());
         let (name, played) = match course.play(entry, folder.as_deref_mut()) {
-            Err(Stop::Session(error)) => {
+            Err(EarlyEnd::Session(error)) => {
                 cases.note(entry, &Outcome::rig_error(error.to_string()), &[]);
                 cases.write(Exit::RigError, output);
-                return Err(Stop::Session(error));
+                return Err(EarlyEnd::Session(error));
             }
             played => played?,
         };
@@ -370,12 +374,12 @@ pub(super) fn play(
     run: &mut Run<'_>,
     entry: &Entry,
     folder: Option<&mut Folder>,
-) -> Result<(String, Played), Stop> {
+) -> Result<(String, PlayedScenario), EarlyEnd> {
     let own = || entry.short_name().to_owned();
     let Some(plan) = &entry.plan else {
         let outcome = Outcome::skipped(Skip::not_on_rig(entry.scenario.bus));
         let attempts = Vec::new();
-        return Ok((own(), Played { outcome, attempts }));
+        return Ok((own(), PlayedScenario { outcome, attempts }));
     };
     let Some(folder) = folder else {
         return Ok((own(), run.play(plan, None)?));
@@ -387,8 +391,8 @@ pub(super) fn play(
 pub(super) fn keep(
     entry: &Entry,
     folder: &mut Folder,
-    play: impl FnOnce(&mut dyn Keeper) -> Result<Played, SessionError>,
-) -> Result<(String, Played), Stop> {
+    play: impl FnOnce(&mut dyn Keeper) -> Result<PlayedScenario, SessionError>,
+) -> Result<(String, PlayedScenario), EarlyEnd> {
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
     let played = play(&mut kept);
     let name = kept.finish()?;

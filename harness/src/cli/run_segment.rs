@@ -4,12 +4,12 @@ use super::exit::Exit;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
-use super::run_rig::{Course, PlayOrder, Stop, course_of, keep, reports, show, worse};
+use super::run_rig::{Course, EarlyEnd, PlayOrder, course_of, keep, reports, show, worse};
 use crate::buses::run_on;
 use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;
-use crate::rig::{Played, Rig, UseOptions};
+use crate::rig::{PlayedScenario, Rig, UseOptions};
 use crate::signals::interrupt_flag;
 
 /// Plays scenarios on a rig with a port, and gives the rig back in its safe state.
@@ -46,16 +46,16 @@ pub(crate) fn work(
         output,
     ) {
         Ok(exit) => exit,
-        Err(Stop::Session(error)) => {
+        Err(EarlyEnd::Session(error)) => {
             output.complain(&error.to_string());
             exit_of(&error)
         }
-        Err(Stop::Evidence(error)) => {
+        Err(EarlyEnd::Evidence(error)) => {
             output.complain(&error.to_string());
             folder = None;
             Exit::of_evidence(&error)
         }
-        Err(Stop::Output(error)) => output.unwritable(&error),
+        Err(EarlyEnd::Output(error)) => output.unwritable(&error),
     };
     let exit = exit_of_end(course.run.trouble().as_ref(), exit, output);
     let end = course
@@ -75,7 +75,7 @@ fn all(
     job: &PlayOrder,
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
-) -> Result<Exit, Stop> {
+) -> Result<Exit, EarlyEnd> {
     if job.qualify && course.run.qualified("", false).is_none() {
         output.complain("drives of this bus cannot be qualified; use `run --rig`");
         return Ok(Exit::Usage);
@@ -109,7 +109,7 @@ fn qualify(
     course: &mut SegmentCourse<'_>,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
-) -> Result<Exit, Stop> {
+) -> Result<Exit, EarlyEnd> {
     let sources = course.run.conversations();
     let mut whole = true;
     for source in sources {
@@ -159,7 +159,7 @@ impl Course for SegmentCourse<'_> {
         &mut self,
         entry: &Entry,
         folder: Option<&mut Folder>,
-    ) -> Result<(String, Played), Stop> {
+    ) -> Result<(String, PlayedScenario), EarlyEnd> {
         let name = entry.short_name().to_owned();
         match folder {
             None => Ok((name, self.run.play(&entry.source, None)?)),
@@ -169,7 +169,7 @@ impl Course for SegmentCourse<'_> {
         }
     }
 
-    fn note(&mut self, _: &Entry, _: &str, _: &Played, output: &mut Output) {
+    fn note(&mut self, _: &Entry, _: &str, _: &PlayedScenario, output: &mut Output) {
         for note in self.run.notes() {
             output.say(&format!("  note: {note}\n"));
         }

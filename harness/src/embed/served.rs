@@ -3,7 +3,9 @@
 use super::Error;
 use crate::buses::drives::released;
 use crate::medium::ErrorMarks;
-use crate::serve::{EndRequest, Job, Pace, ServeError, ServeHost, ServedAt, Server, serve_until};
+use crate::serve::{
+    EndRequest, Pace, ServeError, ServeHost, ServeOptions, ServedAt, Server, serve_until,
+};
 use std::io;
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
@@ -29,14 +31,15 @@ impl Served {
     pub fn ring(drives: u8, setup: &str, address: &str) -> Result<Self, Error> {
         let (plan, link) = released(drives, setup)?;
         let server = Server::new(plan, link, Pace::Line, ErrorMarks::None);
-        let job = Job {
+        let options = ServeOptions {
             places: vec![ServedAt::Tcp(address.to_owned())],
-            ..Job::default()
+            ..ServeOptions::default()
         };
         let (handle, ending) = EndRequest::by_handle().map_err(ServeError::Wait)?;
         let (listens, listening) = channel();
-        let thread =
-            spawn(move || serve_until(ending, server, &job, &mut Teller(listens)).map(|_end| ()));
+        let thread = spawn(move || {
+            serve_until(ending, server, &options, &mut Teller(listens)).map(|_end| ())
+        });
         let Ok(address) = listening.recv() else {
             return Err(match thread.join() {
                 Ok(Err(error)) => error.into(),

@@ -6,7 +6,7 @@ use super::verify::{Judged, Opened};
 use crate::library::Entry;
 use crate::link::{LinkEvent, Replay};
 use crate::rig::run::not_played;
-use crate::rig::{Again as Retries, Attempt, Played, Rig, attempts_of};
+use crate::rig::{Again as Retries, Attempt, PlayedScenario, Rig, attempts_of};
 use crate::scenario::run::{DENIED, Outcome, Skip, Why};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -102,7 +102,7 @@ impl Settling<'_> {
             [] => self.opened.skipped(&entry, remarks).unwrap_or_else(|| {
                 Outcome::rig_error("nothing keeps it from being played, and it was not".to_owned())
             }),
-            _ => Played::of(settled(attempts)).outcome,
+            _ => PlayedScenario::of(settled(attempts)).outcome,
         };
         must("verdict", verdict, outcome.verdict.name());
         let found = outcome.finding.as_ref().map(|found| found.message.as_str());

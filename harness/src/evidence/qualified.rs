@@ -10,7 +10,7 @@ use crate::buses::twin::Twin;
 use crate::library::Entry;
 use crate::rig::run::twin;
 use crate::rig::segment::Qualified;
-use crate::rig::{Attempt, Played};
+use crate::rig::{Attempt, PlayedScenario};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
@@ -97,7 +97,7 @@ pub(super) struct Case {
     pub(super) name: String,
     /// The sum of its text.
     pub(super) sum: String,
-    pub(super) played: Played,
+    pub(super) played: PlayedScenario,
     /// Whether the rig's line was lost in it, or the like.
     pub(super) ends_the_run: bool,
 }
@@ -124,7 +124,7 @@ pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>
                     .ok_or_else(|| format!("case {name}: an attempt cannot be judged again"))?;
                 let played = match attempts.is_empty() {
                     true => not_played(verdict, remarks),
-                    false => Played::of(attempts),
+                    false => PlayedScenario::of(attempts),
                 };
                 cases.push_back(Case {
                     name: name.clone(),
@@ -139,9 +139,9 @@ pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>
     Ok(cases)
 }
 
-fn not_played(verdict: &str, remarks: &[String]) -> Played {
+fn not_played(verdict: &str, remarks: &[String]) -> PlayedScenario {
     let verdict = Verdict::ALL.into_iter().find(|own| own.name() == verdict);
-    Played {
+    PlayedScenario {
         outcome: Outcome {
             verdict: verdict.unwrap_or(Verdict::Skipped),
             remarks: remarks.to_vec(),
@@ -222,7 +222,7 @@ enum Stop {
 impl QualifiedBench for Record<'_> {
     type Stop = Stop;
 
-    fn play(&mut self, entry: &Entry) -> Result<Played, Stop> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Stop> {
         let case = self.cases.pop_front().ok_or(Stop::Missing)?;
         if case.sum != sum(entry.source.text.as_bytes()) {
             return Err(Stop::Other(case.name));
@@ -243,7 +243,7 @@ impl QualifiedBench for Record<'_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &Played) -> Result<(), Stop> {
+    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), Stop> {
         Ok(())
     }
 }

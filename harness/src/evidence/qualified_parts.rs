@@ -8,7 +8,7 @@ use crate::buses::qualify::{QualifiedBench, TRIALS};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;
-use crate::rig::Played;
+use crate::rig::PlayedScenario;
 use crate::rig::run::twin;
 use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
@@ -99,7 +99,7 @@ struct Record<'p> {
 
 impl Record<'_> {
     /// The first case of this text that was not asked for yet.
-    fn take(&mut self, sum: &str) -> Option<Played> {
+    fn take(&mut self, sum: &str) -> Option<PlayedScenario> {
         let place = self.cases.iter().position(|case| case.sum == sum)?;
         let case = self.cases.remove(place)?;
         self.over |= case.ends_the_run;
@@ -112,13 +112,13 @@ impl QualifiedBench for Record<'_> {
 
     /// What a part has asked its own drives follows from what it has heard: such a trial may be of another part. What no part has played stays
     /// open.
-    fn play(&mut self, entry: &Entry) -> Result<Played, Infallible> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Infallible> {
         let (name, sum) = (entry.short_name(), sum(entry.source.text.as_bytes()));
         let is_trial = TRIALS.iter().any(|own| name.starts_with(own));
         let own = self.take(&sum);
         let mut others = self.others.iter_mut().filter(|_| is_trial);
         let played = own.or_else(|| others.find_map(|other| other.take(&sum)));
-        Ok(played.unwrap_or_else(|| Played::skipped(Why::RunEnded.into())))
+        Ok(played.unwrap_or_else(|| PlayedScenario::skipped(Why::RunEnded.into())))
     }
 
     fn over(&mut self) -> bool {
@@ -141,7 +141,7 @@ impl QualifiedBench for Record<'_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &Played) -> Result<(), Infallible> {
+    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), Infallible> {
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use super::folder::capture;
 use super::record::RecordLine;
 use super::verify::{Opened, text_of};
 use crate::link::{LinkEvent, Sink};
-use crate::rig::{Alarm, Attempt, Keeper, Played, Run, Session, UseOptions};
+use crate::rig::{Alarm, Attempt, Keeper, PlayedScenario, Run, Session, UseOptions};
 use crate::scenario::run::{Outcome, Skip};
 use std::path::Path;
 use std::sync::Arc;
@@ -90,7 +90,7 @@ fn scenario(
     let outcome = match &entry.plan {
         None => Outcome::skipped(Skip::not_on_rig(entry.scenario.bus)),
         Some(plan) => match run.play(plan, Some(&mut tape)) {
-            Ok(Played { outcome, .. }) => outcome,
+            Ok(PlayedScenario { outcome, .. }) => outcome,
             Err(error) => Outcome::rig_error(error.to_string()),
         },
     };

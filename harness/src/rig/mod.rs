@@ -38,7 +38,7 @@ pub use open::OpenRigError;
 pub(crate) use open::{line_rate, stated_rate};
 pub(crate) use permitted::{limits, standing};
 pub(crate) use played::{Again, attempts_of};
-pub use played::{Attempt, Played};
+pub use played::{Attempt, PlayedScenario};
 pub use profile::{
     KnownProfile, Profile, ProfileError, ProfileLines, ProfileSetup, SettledProperty,
 };

@@ -121,14 +121,14 @@ impl Attempt {
 
 /// A scenario that was played as often as the rig's file says.
 #[derive(Clone, Debug)]
-pub struct Played {
+pub struct PlayedScenario {
     /// The outcome of all attempts together.
     pub outcome: Outcome,
     /// The attempts, in order; none where it was skipped.
     pub attempts: Vec<Attempt>,
 }
 
-impl Played {
+impl PlayedScenario {
     pub(crate) fn skipped(skip: Skip) -> Self {
         Self {
             outcome: Outcome::skipped(skip),
@@ -306,7 +306,7 @@ mod tests {
 
     fn of(ends: &[(Verdict, &str)]) -> Verdict {
         let attempts = ends.iter().map(|(verdict, why)| attempt(*verdict, why));
-        Played::of(attempts.collect()).outcome.verdict
+        PlayedScenario::of(attempts.collect()).outcome.verdict
     }
 
     #[test]
@@ -398,7 +398,7 @@ mod tests {
     }
 
     fn tells(attempts: Vec<Attempt>) -> bool {
-        Played::of(attempts).telling(true).is_some()
+        PlayedScenario::of(attempts).telling(true).is_some()
     }
 
     #[test]
@@ -411,12 +411,12 @@ mod tests {
     fn a_reason_is_told_once() {
         let same = vec![attempt(Failed, SILENT), attempt(Failed, SILENT)];
         let told = ["2 attempts: failed, failed", SILENT];
-        let mut remarks = Played::of(same).outcome.remarks;
+        let mut remarks = PlayedScenario::of(same).outcome.remarks;
         remarks.sort_unstable();
         assert_eq!(remarks, told);
         let passed = vec![attempt(Failed, SILENT), attempt(Passed, "well")];
         let told = ["well", "2 attempts: failed, passed", SILENT];
-        assert_eq!(Played::of(passed).outcome.remarks, told);
+        assert_eq!(PlayedScenario::of(passed).outcome.remarks, told);
     }
 
     #[test]
@@ -440,7 +440,7 @@ mod tests {
     fn bytes_that_are_late_each_time_are_told_and_blame_no_drive() {
         let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
         let each_time = |attempts: Vec<Attempt>| {
-            let played = Played::of(attempts);
+            let played = PlayedScenario::of(attempts);
             assert!(played.telling(true).is_none());
             assert_eq!(
                 played.telling(false).is_some(),

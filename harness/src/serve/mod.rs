@@ -22,4 +22,4 @@ pub(crate) use control::first;
 pub use place::{ClientRole, ControlPlace, Inner, Pace, ServedAt};
 pub use served::ServedBus;
 pub(crate) use shell::{EndRequest, serve_until};
-pub use shell::{Job, ServeEnd, ServeError, ServeHost, serve};
+pub use shell::{ServeEnd, ServeError, ServeHost, ServeOptions, serve};

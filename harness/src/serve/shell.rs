@@ -25,10 +25,10 @@ const CHUNK: usize = 4096;
 const AWAKE: Span = Span::from_micros(60);
 
 /// What is served where, and for how long.
-#[derive(Clone, Debug, Default)]
-pub struct Job {
-    /// Where each seat of the server is served, in order: its rings, then its inner links.
-    pub places: Vec<ServedAt>,
+#[derive(Clone, Debug)]
+pub struct ServeOptions<P> {
+    /// Where: each seat of a server of octets in order, its rings, then its inner links; or a bus of frames.
+    pub places: Vec<P>,
     /// Where lines of control come from, if there are any.
     pub control: Option<ControlPlace>,
     /// Where the live page is served, if it is.
@@ -39,6 +39,20 @@ pub struct Job {
     pub once: bool,
     /// How long it goes on, if not until a signal comes.
     pub length: Option<Span>,
+}
+
+impl<P> Default for ServeOptions<P> {
+    /// Nowhere, without a page, until a signal comes.
+    fn default() -> Self {
+        Self {
+            places: Vec::new(),
+            control: None,
+            page: None,
+            allow_remote: false,
+            once: false,
+            length: None,
+        }
+    }
 }
 
 /// Why serving has ended.
@@ -108,17 +122,17 @@ pub trait ServeHost {
     }
 }
 
-/// Serves rings until the job is done. Links to pseudo terminals are removed on every way out.
+/// Serves rings until its options end it. Links to pseudo terminals are removed on every way out.
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve(
     server: impl ServedBus,
-    job: &Job,
+    options: &ServeOptions<ServedAt>,
     host: &mut dyn ServeHost,
 ) -> Result<ServeEnd, ServeError> {
     let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
-    serve_until(ending, server, job, host)
+    serve_until(ending, server, options, host)
 }
 
 /// The same, until `ending`.
@@ -128,31 +142,31 @@ pub fn serve(
 pub(crate) fn serve_until(
     ending: EndRequest,
     mut server: impl ServedBus,
-    job: &Job,
+    options: &ServeOptions<ServedAt>,
     host: &mut dyn ServeHost,
 ) -> Result<ServeEnd, ServeError> {
-    if job.places.len() != server.seats() {
+    if options.places.len() != server.seats() {
         let inner = server.seats() - server.masters();
         return Err(ServeError::Places {
-            given: job.places.len().saturating_sub(inner),
+            given: options.places.len().saturating_sub(inner),
             rings: server.masters(),
         });
     }
     let mut ends = Vec::new();
-    for place in &job.places {
+    for place in &options.places {
         ends.push(match place {
-            ServedAt::Tcp(address) => Seat::Tcp(Tcp::listen(address, job.allow_remote)?),
+            ServedAt::Tcp(address) => Seat::Tcp(Tcp::listen(address, options.allow_remote)?),
             ServedAt::Pty(path) => Seat::Pty(Pty::open(path)?),
             ServedAt::Nowhere => Seat::Nowhere,
         });
     }
-    let control = job.control.as_ref();
+    let control = options.control.as_ref();
     let control = control
-        .map(|place| ControlStream::open(place, job.allow_remote))
+        .map(|place| ControlStream::open(place, options.allow_remote))
         .transpose()?;
-    let page = job.page.as_ref();
+    let page = options.page.as_ref();
     let stage = page
-        .map(|place| Stage::open(place, job.allow_remote, server.live()))
+        .map(|place| Stage::open(place, options.allow_remote, server.live()))
         .transpose()?;
     let mut shell = Shell {
         stage,
@@ -168,7 +182,7 @@ pub(crate) fn serve_until(
         gone: false,
     };
     shell.announce()?;
-    shell.run(job)
+    shell.run(options)
 }
 
 /// What ends serving from outside, as a stream that is readable then.
@@ -270,9 +284,9 @@ impl Shell<'_> {
         Ok(())
     }
 
-    fn run(&mut self, job: &Job) -> Result<ServeEnd, ServeError> {
+    fn run(&mut self, options: &ServeOptions<ServedAt>) -> Result<ServeEnd, ServeError> {
         wake_on_time();
-        let end = job.length.map(|length| Instant::START + length);
+        let end = options.length.map(|length| Instant::START + length);
         loop {
             if end.is_some_and(|end| end <= self.clock.now()) {
                 return Ok(ServeEnd::TimeOver);
@@ -305,7 +319,7 @@ impl Shell<'_> {
             {
                 stage.work(self.server.live(), now);
             }
-            if job.once && self.gone {
+            if options.once && self.gone {
                 return Ok(ServeEnd::ClientsGone);
             }
         }

@@ -9,8 +9,8 @@ use crate::scenario::plan::{Plan, plan as settle, plan_step};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
-use crate::serve::frames::{FrameJob, MOST_CLIENTS, SharedBus, serve_frames};
-use crate::serve::{ControlAnswer, ServeEnd, ServeError, ServeHost, first};
+use crate::serve::frames::{FramePlace, MOST_CLIENTS, SharedBus, serve_frames};
+use crate::serve::{ControlAnswer, ServeEnd, ServeError, ServeHost, ServeOptions, first};
 use crate::web::LiveView;
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
@@ -21,16 +21,16 @@ use harness_sim::unitek::Member;
 /// The registers that `state` shows without others: MODE, STATUS, errors, ready, speed, position.
 const STATE: [u8; 6] = [0x51, 0x40, 0x8F, 0xE2, 0x30, 0x6D];
 
-/// Serves drives until the job is done.
+/// Serves drives until its options end it.
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails.
 pub(crate) fn serve(
     plan: Plan<Unitek>,
-    job: &FrameJob,
+    options: &ServeOptions<FramePlace>,
     host: &mut dyn ServeHost,
 ) -> Result<ServeEnd, ServeError> {
-    serve_frames(SharedDrives::new(plan), job, host)
+    serve_frames(SharedDrives::new(plan), options, host)
 }
 
 /// The bench of a header, and nodes 1 to `drives` on it. By default that is node 1, if the header has no drive.

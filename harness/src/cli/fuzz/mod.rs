@@ -12,7 +12,7 @@ use super::output::Output;
 use clap::Subcommand;
 
 pub(crate) use line::LineFuzz;
-pub(crate) use rig::{Use, on_ports, scope, sizes, tell};
+pub(crate) use rig::{on_ports, scope, sizes, tell};
 pub(crate) use verify::verify;
 
 /// The commands of `fuzz`.

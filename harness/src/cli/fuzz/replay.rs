@@ -1,6 +1,6 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
-use super::rig::{Use, on_ports, rings, scope, simulated, sizes, tell};
+use super::rig::{on_ports, rings, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::buses::line_fuzz;
 use crate::cli::args::{WIRE_TIME_HELP, duration};
@@ -14,7 +14,7 @@ use crate::explore::{
 };
 use crate::guard::Limits;
 use crate::regular::{self, Links};
-use crate::rig::Rig;
+use crate::rig::{Rig, UseOptions};
 use clap::Args;
 use harness_proto::time::Span;
 use std::path::{Path, PathBuf};
@@ -75,12 +75,13 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
         let campaign = campaign(arguments, &rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);
     }
-    let how = Use {
-        purpose: "fuzz replay",
+    let options = UseOptions {
+        purpose: "fuzz replay".to_owned(),
         allow_motion: arguments.allow_motion,
         wait: arguments.wait.unwrap_or_default(),
+        ..UseOptions::default()
     };
-    on_ports(&rig, &how, output, |run, output| {
+    on_ports(&rig, options, output, |run, output| {
         let scope = scope(run);
         let limits = scope.limits;
         let campaign = campaign(

@@ -10,14 +10,6 @@ use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Rig, Run, Session, UseOptions};
 use crate::scenario::run::start_anew;
 use crate::signals::interrupt_flag;
-use std::time::Duration;
-
-/// How a rig is used.
-pub(crate) struct Use {
-    pub(crate) purpose: &'static str,
-    pub(crate) allow_motion: bool,
-    pub(crate) wait: Duration,
-}
 
 /// Tells why exploring ended early, and gives the exit code for it.
 pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
@@ -35,18 +27,14 @@ pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
 /// Opens a rig with ports, works on it, and gives it back in its safe state.
 pub(crate) fn on_ports(
     rig: &Rig,
-    how: &Use,
+    options: UseOptions,
     output: &mut Output,
     work: impl FnOnce(&mut Run<'_>, &mut Output) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
     let options = UseOptions {
-        purpose: how.purpose.to_owned(),
-        wait: how.wait,
-        allow_motion: how.allow_motion,
-        ill_as_well: false,
-        keeps_lines: false,
         interrupt: interrupt_flag(),
         alarm: alarm(),
+        ..options
     };
     let mut session = match Session::open(rig, &options) {
         Ok(session) => session,

@@ -1,6 +1,6 @@
 //! `drivebench fuzz run`.
 
-use super::rig::{Use, on_ports, scope, simulated, sizes, tell};
+use super::rig::{on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::buses::{Bus, deviations, line_fuzz};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
@@ -16,7 +16,7 @@ use crate::explore::{
 };
 use crate::guard::Limits;
 use crate::partition::Partition;
-use crate::rig::{Rig, state};
+use crate::rig::{Rig, UseOptions, state};
 use crate::scenario::problem::nearest;
 use clap::Args;
 use harness_proto::time::Span;
@@ -211,12 +211,13 @@ fn on_rings(
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);
     }
-    let how = Use {
-        purpose: "fuzz",
+    let options = UseOptions {
+        purpose: "fuzz".to_owned(),
         allow_motion: arguments.allow_motion,
         wait: arguments.wait.unwrap_or_default(),
+        ..UseOptions::default()
     };
-    on_ports(&rig, &how, output, |run, output| {
+    on_ports(&rig, options, output, |run, output| {
         let scope = scope(run);
         let mut target = match OnRig::new(run, scope.limits) {
             Ok(target) => target,

@@ -12,7 +12,7 @@ use crate::medium::Medium;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::segment::SegmentRun;
 use crate::rig::segment::run::{PortPlayer, PortRun};
-use crate::rig::{End, Ends, Played, Rig, SessionError, UseOptions};
+use crate::rig::{End, Ends, PlayedScenario, Rig, SessionError, UseOptions};
 use harness_proto::time::Span;
 
 /// A bench that stays open between requests.
@@ -39,7 +39,7 @@ pub(crate) trait HeldBench {
     ///
     /// # Errors
     /// [`Failure`]: the bench cannot be used any more, or not for scenarios.
-    fn play(&mut self, entry: &Entry) -> Result<Played, Failure>;
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure>;
 
     /// Does a line of the scenario language to simulated drives at once: a fault, or what happens to a drive from outside the bus.
     ///
@@ -160,7 +160,7 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         D::pass(self.session(), time)
     }
 
-    fn play(&mut self, entry: &Entry) -> Result<Played, Failure> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure> {
         if self.session().listens_only() {
             return Err(Failure::refused(
                 "scenarios send, and the rig's file says `listen_only = true`",

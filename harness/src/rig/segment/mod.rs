@@ -3,7 +3,7 @@
 pub(crate) mod observed;
 pub(crate) mod run;
 
-use super::{End, Keeper, Played, Rig, SessionError};
+use super::{End, Keeper, PlayedScenario, Rig, SessionError};
 use crate::link::{Capability, LinkEvent, Trouble};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
@@ -83,7 +83,7 @@ pub(crate) trait SegmentRun {
         &mut self,
         source: &Source,
         keeper: Option<&mut dyn Keeper>,
-    ) -> Result<Played, SessionError>;
+    ) -> Result<PlayedScenario, SessionError>;
 
     /// The scenarios that a qualification plays behind the selected ones.
     fn conversations(&self) -> Vec<Source> {

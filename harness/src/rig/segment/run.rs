@@ -5,7 +5,9 @@ use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::port_session::{PortDrives, PortSession, failed};
-use crate::rig::{Again, Attempt, End, Keeper, Played, Rig, SessionError, UseOptions, attempts_of};
+use crate::rig::{
+    Again, Attempt, End, Keeper, PlayedScenario, Rig, SessionError, UseOptions, attempts_of,
+};
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
@@ -209,13 +211,13 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
         &mut self,
         source: &Source,
         mut keeper: Option<&mut dyn Keeper>,
-    ) -> Result<Played, SessionError> {
+    ) -> Result<PlayedScenario, SessionError> {
         let own = match read::<P>(source) {
             Ok(own) => Arc::new(own),
-            Err(skip) => return Ok(Played::skipped(skip)),
+            Err(skip) => return Ok(PlayedScenario::skipped(skip)),
         };
         if let Some(skip) = self.player.not_begun(&own) {
-            return Ok(Played::skipped(skip.on_port()));
+            return Ok(PlayedScenario::skipped(skip.on_port()));
         }
         let real = !self.session.rig().is_simulated();
         let most = attempts_of(self.session.rig(), real, false);
@@ -235,7 +237,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
             attempts.push(attempt);
             let more = self.again.after(&attempts, most);
             if !more || self.over.is_some() || self.session.link().trouble().is_some() {
-                return Ok(Played::of(attempts));
+                return Ok(PlayedScenario::of(attempts));
             }
         }
     }

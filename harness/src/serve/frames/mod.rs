@@ -9,7 +9,7 @@ mod shell;
 
 pub use server::{FrameServer, MOST_CLIENTS};
 pub use session::Protocol;
-pub use shell::{FrameJob, FramePlace, serve_frames};
+pub use shell::{FramePlace, serve_frames};
 
 use super::ControlAnswer;
 use crate::web::LiveView;

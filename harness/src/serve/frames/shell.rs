@@ -3,14 +3,14 @@
 use super::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
 use crate::counted::counted;
 use crate::port::wake_on_time;
+use crate::serve::ServedAt;
 use crate::serve::arrival::Client;
 use crate::serve::clock::Clock;
 use crate::serve::control_stream::ControlStream;
 use crate::serve::pty::{Change, Pty};
-use crate::serve::shell::{EndRequest, ServeEnd, ServeError, ServeHost};
+use crate::serve::shell::{EndRequest, ServeEnd, ServeError, ServeHost, ServeOptions};
 use crate::serve::stage::Stage;
 use crate::serve::tcp::Listener;
-use crate::serve::{ControlPlace, ServedAt};
 use harness_proto::time::{Instant, Span};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io;
@@ -27,39 +27,22 @@ pub struct FramePlace {
     pub at: ServedAt,
 }
 
-/// What is served where, and for how long.
-#[derive(Clone, Debug, Default)]
-pub struct FrameJob {
-    /// Where the bus is served.
-    pub places: Vec<FramePlace>,
-    /// Where lines of control come from, if there are any.
-    pub control: Option<ControlPlace>,
-    /// Where the live page is served, if it is.
-    pub page: Option<String>,
-    /// Whether sockets may listen at addresses that other machines reach.
-    pub allow_remote: bool,
-    /// Whether the end comes when the clients have gone.
-    pub once: bool,
-    /// How long it goes on, if not until a signal comes.
-    pub length: Option<Span>,
-}
-
-/// Serves a bus until the job is done. Links to pseudo terminals are removed on every way out.
+/// Serves a bus until its options end it. Links to pseudo terminals are removed on every way out.
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve_frames<B: SharedBus>(
     mut bus: B,
-    job: &FrameJob,
+    options: &ServeOptions<FramePlace>,
     host: &mut dyn ServeHost,
 ) -> Result<ServeEnd, ServeError> {
     let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
     let mut doors = Vec::new();
     let mut seats = Vec::new();
-    for FramePlace { protocol, at } in &job.places {
+    for FramePlace { protocol, at } in &options.places {
         match at {
             ServedAt::Tcp(address) => {
-                doors.push((*protocol, Listener::open(address, job.allow_remote)?));
+                doors.push((*protocol, Listener::open(address, options.allow_remote)?));
             }
             ServedAt::Pty(path) => seats.push(Seat {
                 protocol: *protocol,
@@ -72,13 +55,13 @@ pub fn serve_frames<B: SharedBus>(
             ServedAt::Nowhere => {}
         }
     }
-    let control = job.control.as_ref();
+    let control = options.control.as_ref();
     let control = control
-        .map(|place| ControlStream::open(place, job.allow_remote))
+        .map(|place| ControlStream::open(place, options.allow_remote))
         .transpose()?;
-    let page = job.page.as_ref();
+    let page = options.page.as_ref();
     let stage = page
-        .map(|place| Stage::open(place, job.allow_remote, bus.live()))
+        .map(|place| Stage::open(place, options.allow_remote, bus.live()))
         .transpose()?;
     let started = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     let mut shell = Shell {
@@ -94,7 +77,7 @@ pub fn serve_frames<B: SharedBus>(
         gone: false,
     };
     shell.announce()?;
-    shell.run(job)
+    shell.run(options)
 }
 
 /// A place for a client: a pseudo terminal, or an accepted connection.
@@ -156,9 +139,9 @@ impl<B: SharedBus> Shell<'_, B> {
         Ok(())
     }
 
-    fn run(&mut self, job: &FrameJob) -> Result<ServeEnd, ServeError> {
+    fn run(&mut self, options: &ServeOptions<FramePlace>) -> Result<ServeEnd, ServeError> {
         wake_on_time();
-        let end = job.length.map(|length| Instant::START + length);
+        let end = options.length.map(|length| Instant::START + length);
         loop {
             if end.is_some_and(|end| end <= self.clock.now()) {
                 return Ok(ServeEnd::TimeOver);
@@ -194,7 +177,7 @@ impl<B: SharedBus> Shell<'_, B> {
             {
                 stage.work(self.server.bus().live(), now);
             }
-            if job.once && self.gone {
+            if options.once && self.gone {
                 return Ok(ServeEnd::ClientsGone);
             }
         }

@@ -142,12 +142,12 @@ pub enum Event {
         reply: Reply,
     },
     /// Something is not as it should be.
-    Trouble(Trouble),
+    Disturbance(Disturbance),
 }
 
 /// What is not as it should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trouble {
+pub enum Disturbance {
     /// A frame with the drive's identifier that is no reply.
     Odd(NoReply),
     /// A reply to no request, of no cycle: late, doubled, asked for by another master, or of another drive with the same

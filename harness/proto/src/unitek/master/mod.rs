@@ -24,7 +24,7 @@
 mod job;
 mod slots;
 
-pub use job::{Event, Job, JobId, Options, Outcome, Refused, Trouble};
+pub use job::{Disturbance, Event, Job, JobId, Options, Outcome, Refused};
 pub use slots::Slot;
 
 use super::frame::{CYCLES, Data, NoReply, Reply, Request};
@@ -357,7 +357,7 @@ impl Master {
         let reply = match reply {
             Ok(reply) => reply,
             Err(NoReply::OtherIdentifier) => return,
-            Err(odd) => return self.report(Event::Trouble(Trouble::Odd(odd))),
+            Err(odd) => return self.report(Event::Disturbance(Disturbance::Odd(odd))),
         };
         let answers = self.answers(now, reply);
         let status = reply.register == 0x40 && self.mode & MODE_EVENT != 0;
@@ -370,9 +370,9 @@ impl Master {
             _ if status => self.report(Event::Status { reply }),
             Heard::Early(after) => {
                 let register = reply.register;
-                self.report(Event::Trouble(Trouble::Early { register, after }));
+                self.report(Event::Disturbance(Disturbance::Early { register, after }));
             }
-            Heard::Other => self.report(Event::Trouble(Trouble::Unasked { reply })),
+            Heard::Other => self.report(Event::Disturbance(Disturbance::Unasked { reply })),
         }
     }
 
@@ -451,8 +451,8 @@ impl Master {
 
     /// The time is `now`: requests without a reply are repeated or given up, and missing cyclic frames are reported.
     pub fn handle_timeout(&mut self, now: Instant) {
-        while let Some(trouble) = self.slots.missing(now, self.options.cycle_tolerance) {
-            self.report(Event::Trouble(trouble));
+        while let Some(disturbance) = self.slots.missing(now, self.options.cycle_tolerance) {
+            self.report(Event::Disturbance(disturbance));
         }
         let Some(current) = &mut self.current else {
             return;

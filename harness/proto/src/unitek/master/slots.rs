@@ -1,7 +1,7 @@
 //! The cycles that a master has started, and the supervision of their intervals.
 
 use super::super::frame::CYCLES;
-use super::job::Trouble;
+use super::job::Disturbance;
 use crate::time::{Instant, Span};
 
 /// A cycle under supervision.
@@ -84,7 +84,7 @@ impl Slots {
         }
     }
 
-    /// A cycle was stopped; frames of it that come until `until` are no trouble.
+    /// A cycle was stopped; frames of it that come until `until` are no disturbance.
     pub(super) fn stop(&mut self, register: u8, until: Instant) {
         for slot in self.slots.iter_mut().flatten() {
             if slot.register == register {
@@ -123,12 +123,12 @@ impl Slots {
     }
 
     /// A frame that is missing at `now`; the next one is due one interval later.
-    pub(super) fn missing(&mut self, now: Instant, tolerance: Span) -> Option<Trouble> {
+    pub(super) fn missing(&mut self, now: Instant, tolerance: Span) -> Option<Disturbance> {
         let mut slots = self.slots.iter_mut().flatten();
         let slot = slots.find(|slot| slot.stopped.is_none() && slot.next + tolerance <= now)?;
         slot.missed += 1;
         slot.next = slot.next.max(now - tolerance - slot.interval()) + slot.interval();
-        Some(Trouble::Missing {
+        Some(Disturbance::Missing {
             register: slot.register,
         })
     }

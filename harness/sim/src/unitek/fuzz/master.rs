@@ -7,7 +7,7 @@ use harness_proto::can::{Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{CYCLES, DEFAULT_RX, DEFAULT_TX};
 use harness_proto::unitek::master::{
-    Event, Job, JobId, Master, Options, Outcome, Refused, Trouble,
+    Disturbance, Event, Job, JobId, Master, Options, Outcome, Refused,
 };
 use harness_proto::unitek::properties::{Dlc4, Properties};
 use harness_proto::unitek::words::MODE_LOCK;
@@ -372,12 +372,12 @@ impl Play {
                 Event::Ended { id, outcome } => self.ended(id, outcome, notes),
                 Event::Cyclic { .. } => notes.note(|| Feature::new("5.2", "reported", "cyclic")),
                 Event::Status { .. } => notes.note(|| Feature::new("5.2", "reported", "status")),
-                Event::Trouble(trouble) => {
-                    let what = match trouble {
-                        Trouble::Odd(_) => "odd",
-                        Trouble::Unasked { .. } => "unasked",
-                        Trouble::Missing { .. } => "missing",
-                        Trouble::Early { .. } => "early",
+                Event::Disturbance(disturbance) => {
+                    let what = match disturbance {
+                        Disturbance::Odd(_) => "odd",
+                        Disturbance::Unasked { .. } => "unasked",
+                        Disturbance::Missing { .. } => "missing",
+                        Disturbance::Early { .. } => "early",
                     };
                     notes.note(|| {
                         Feature::new(

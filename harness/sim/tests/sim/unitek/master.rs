@@ -3,7 +3,7 @@
 use super::common::Desk;
 use harness_proto::can::{Frame, Heard};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Event, Job, Master, Options, Outcome, Refused, Trouble};
+use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Options, Outcome, Refused};
 use harness_proto::unitek::properties::{Description, Properties, Setting};
 use harness_proto::unitek::{Data, Reply};
 use harness_sim::segment::{FrameFault, Placed};
@@ -66,12 +66,12 @@ impl Bench {
         panic!("{job:?} does not end");
     }
 
-    fn troubles(&self) -> Vec<Trouble> {
-        let trouble = |event: &Event| match event {
-            Event::Trouble(trouble) => Some(*trouble),
+    fn disturbances(&self) -> Vec<Disturbance> {
+        let disturbance = |event: &Event| match event {
+            Event::Disturbance(disturbance) => Some(*disturbance),
             _ => None,
         };
-        self.events.iter().filter_map(trouble).collect()
+        self.events.iter().filter_map(disturbance).collect()
     }
 
     fn fault(&mut self, station: usize, frame: u64, fault: FrameFault) {
@@ -114,7 +114,7 @@ fn replies_of_both_widths() {
         bench.job(Job::Read { register: 0x40 }),
         Outcome::Read(reply(0x40, Data::Long(0x0101)))
     );
-    assert_eq!(bench.troubles(), []);
+    assert_eq!(bench.disturbances(), []);
 }
 
 /// A write is read back: it holds, is refused by a read only register, or cannot be known.
@@ -188,8 +188,8 @@ fn requests_without_a_reply() {
         ));
         bench.run(50);
         assert_eq!(
-            bench.troubles(),
-            [Trouble::Unasked {
+            bench.disturbances(),
+            [Disturbance::Unasked {
                 reply: reply(0x1B, Data::Short(472))
             }],
             "{fault:?}"
@@ -218,7 +218,7 @@ fn cycles_are_supervised() {
         Outcome::Read(_)
     ));
     bench.run(100);
-    assert_eq!(bench.troubles(), []);
+    assert_eq!(bench.disturbances(), []);
     // One frame is lost, and a foreign frame comes too early.
     let sent = bench
         .desk
@@ -228,22 +228,25 @@ fn cycles_are_supervised() {
         .count() as u64;
     bench.fault(1, sent + 3, FrameFault::Lost);
     bench.run(100);
-    assert_eq!(bench.troubles(), [Trouble::Missing { register: 0x30 }]);
+    assert_eq!(
+        bench.disturbances(),
+        [Disturbance::Missing { register: 0x30 }]
+    );
     // A frame 3 ms behind the last one: sent twice, or by another drive.
     let last = bench.master.slots().next().unwrap().last;
     let doubled: Frame = "181#30000000".parse().unwrap();
     let early = Span::from_millis(3);
     bench.master.handle_frame(last + early, &doubled);
     bench.run(1);
-    let expected = Trouble::Early {
+    let expected = Disturbance::Early {
         register: 0x30,
         after: early,
     };
-    assert_eq!(bench.troubles()[1..], [expected]);
-    let before = bench.troubles().len();
+    assert_eq!(bench.disturbances()[1..], [expected]);
+    let before = bench.disturbances().len();
     assert_eq!(bench.job(Job::Stop { register: 0x30 }), Outcome::Sent);
     bench.run(100);
-    assert_eq!(bench.troubles().len(), before);
+    assert_eq!(bench.disturbances().len(), before);
     assert_eq!(bench.master.slots().count(), 0);
 
     for register in 0xE2..=0xE9 {
@@ -328,7 +331,7 @@ fn status_by_event() {
         reply: reply(0x40, Data::Long(0x0121)),
     };
     assert!(bench.events.contains(&status), "{:?}", bench.events);
-    assert_eq!(bench.troubles(), []);
+    assert_eq!(bench.disturbances(), []);
 }
 
 /// ex 1 under both readings: the master finds the drive at the identifier that it uses.
@@ -355,6 +358,6 @@ fn new_identifiers() {
             "{word}"
         );
         assert_eq!(bench.master.identifiers().0, rx);
-        assert_eq!(bench.troubles(), []);
+        assert_eq!(bench.disturbances(), []);
     }
 }

@@ -10,7 +10,7 @@ use crate::cli::output::Output;
 use crate::cli::shell::{HeldBench, HeldRecord, record_from_now};
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
-use crate::rig::{End, Played, Rig, Run, Session, SessionError, Shared, UseOptions};
+use crate::rig::{End, PlayedScenario, Rig, Run, Session, SessionError, Shared, UseOptions};
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, plan_step};
 use crate::scenario::run::{Now, now};
@@ -150,7 +150,7 @@ impl HeldBench for HeldRings {
         }
     }
 
-    fn play(&mut self, entry: &Entry) -> Result<Played, Failure> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure> {
         let Some(plan) = entry.plan.clone() else {
             return Err(Failure::refused(format!(
                 "{}: the scenario is for another bus",

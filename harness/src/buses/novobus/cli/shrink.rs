@@ -1,7 +1,7 @@
 //! `drivebench shrink` for a finding on rings.
 
 use crate::cli::exit::Exit;
-use crate::cli::fuzz::{Use, on_ports, scope, sizes, tell};
+use crate::cli::fuzz::{on_ports, scope, sizes, tell};
 use crate::cli::output::Output;
 use crate::cli::rig_failure::find_rig;
 use crate::cli::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
@@ -10,7 +10,7 @@ use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{
     Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, RingSetup, Target,
 };
-use crate::rig::Run;
+use crate::rig::{Run, UseOptions};
 use harness_sim::novobus::deviation::deviations;
 use std::path::Path;
 
@@ -50,14 +50,15 @@ pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::i
         ));
         return Ok(Exit::Usage);
     }
-    let how = Use {
-        purpose: "shrink",
+    let options = UseOptions {
+        purpose: "shrink".to_owned(),
         allow_motion: arguments.allow_motion,
         wait: arguments.wait.unwrap_or_default(),
+        ..UseOptions::default()
     };
     let most = arguments.runs.unwrap_or(RUNS_ON_RIG);
     let start = explained(&finding, output);
-    on_ports(&rig, &how, output, |run, output| {
+    on_ports(&rig, options, output, |run, output| {
         let small = on_rig(&finding, start, most, run);
         settle(&finding, &path, small, output)
     })

@@ -11,10 +11,9 @@ use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;
 use crate::scenario::argument::duration;
 use crate::scenario::source::Source;
-use crate::serve::frames::FrameJob;
 use crate::serve::{
-    ClientRole, ControlPlace, Inner, Job, Pace, ServeEnd, ServeError, ServeHost, ServedAt, Server,
-    serve,
+    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt,
+    Server, serve,
 };
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
@@ -286,17 +285,22 @@ fn octets(
         &others,
         "--tcp or --pty, a place for each master, and --slaves",
     )?;
-    let job = Job {
-        places: places(arguments, 1).collect(),
+    let options = options(arguments, places(arguments, 1).collect());
+    let header = header(arguments)?;
+    let slaves = (arguments.frames.slaves.as_deref(), header.as_ref());
+    buses::serve_octets(bus, slaves, arguments.marks, &options, output).map_err(Failure::from)
+}
+
+/// What the arguments say of serving at these places.
+fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
+    ServeOptions {
+        places,
         control: control(arguments),
         page: arguments.web.clone(),
         allow_remote: arguments.allow_remote,
         once: arguments.once,
         length: arguments.length,
-    };
-    let header = header(arguments)?;
-    let slaves = (arguments.frames.slaves.as_deref(), header.as_ref());
-    buses::serve_octets(bus, slaves, arguments.marks, &job, output).map_err(Failure::from)
+    }
 }
 
 /// Serves the drives of a bus of frames.
@@ -320,17 +324,10 @@ fn frames(
         &rings,
         "--slcan, --slcan-pty or --socketcand, and --drives",
     )?;
-    let job = FrameJob {
-        places: arguments.frames.places(),
-        control: control(arguments),
-        page: arguments.web.clone(),
-        allow_remote: arguments.allow_remote,
-        once: arguments.once,
-        length: arguments.length,
-    };
+    let options = options(arguments, arguments.frames.places());
     let header = header(arguments)?;
     let drives = (arguments.frames.drives, header.as_ref());
-    Ok(buses::serve_frames(bus, drives, &job, output)?)
+    Ok(buses::serve_frames(bus, drives, &options, output)?)
 }
 
 /// Serves the rings of a simulated bench.
@@ -357,16 +354,10 @@ fn rings(
     let inner = inner(arguments, &sizes)?;
     let mut server = Server::new(plan, link, pace, arguments.marks);
     inner.iter().for_each(|(inner, _)| server.add(*inner));
-    let places = inner.into_iter().map(|(_, place)| place);
-    let job = Job {
-        places: self::places(arguments, sizes.len()).chain(places).collect(),
-        control: control(arguments),
-        page: arguments.web.clone(),
-        allow_remote: arguments.allow_remote,
-        once: arguments.once,
-        length: arguments.length,
-    };
-    Ok(serve(server, &job, output))
+    let inner = inner.into_iter().map(|(_, place)| place);
+    let places = places(arguments, sizes.len()).chain(inner);
+    let options = options(arguments, places.collect());
+    Ok(serve(server, &options, output))
 }
 
 impl ServeHost for Output {

@@ -5,7 +5,7 @@ use super::diagnose::{Named, RingSeen};
 use super::pinned::Pinned;
 use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::counted::counted;
-use crate::rig::{Attempt, Driven, Played};
+use crate::rig::{Attempt, Driven, PlayedScenario};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
@@ -75,7 +75,7 @@ impl Findings {
     }
 
     /// Notes the outcome of a scenario.
-    pub(super) fn note(&mut self, name: &str, played: &Played) {
+    pub(super) fn note(&mut self, name: &str, played: &PlayedScenario) {
         let Some(last) = played.last_played() else {
             self.skipped += 1;
             return;
@@ -97,7 +97,7 @@ impl Findings {
     }
 
     /// Notes a conversation that another part has played, and whose bytes or verdict are not those of the first part. It is not counted again.
-    pub(super) fn note_other_part(&mut self, name: &str, played: &Played) {
+    pub(super) fn note_other_part(&mut self, name: &str, played: &PlayedScenario) {
         let Some(last) = played.last_played() else {
             self.open.push(format!("{name}: not played there"));
             return;
@@ -109,14 +109,14 @@ impl Findings {
         }
     }
 
-    fn note_unequal(&mut self, name: &str, why: &str, played: &Played, last: &Attempt) {
+    fn note_unequal(&mut self, name: &str, why: &str, played: &PlayedScenario, last: &Attempt) {
         let flaky = played.outcome.verdict == Verdict::Flaky;
         self.unsettled += usize::from(differs(last) || flaky);
         self.open.push(format!("{name}: {why}"));
     }
 
     /// Why a scenario was not compared to its end, or not equal; `None` where it was both.
-    fn why_open(&self, played: &Played, last: &Attempt) -> Option<&'static str> {
+    fn why_open(&self, played: &PlayedScenario, last: &Attempt) -> Option<&'static str> {
         let differs = differs(last);
         let left_out = last.comparisons.iter().any(|own| own.left_out);
         let whole = last.comparisons.len() == last.conversations.len() && !left_out;
@@ -145,7 +145,7 @@ impl Findings {
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
-    pub(super) fn note_attempts(&mut self, name: &str, played: &Played) {
+    pub(super) fn note_attempts(&mut self, name: &str, played: &PlayedScenario) {
         self.failed |= played.outcome.verdict == Verdict::Failed;
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
@@ -186,7 +186,7 @@ impl Findings {
 
     /// Notes an attempt with the drives' roles exchanged: to whom the byte belonged at which it differed, if it did. `None` where it says
     /// nothing.
-    pub(super) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
+    pub(super) fn note_exchanged(&mut self, played: &PlayedScenario) -> Option<Option<Meant>> {
         let last = played.last_played().and_then(Attempt::sound)?;
         let found = match (differs(last), self.sighting(last)) {
             (true, Some(sighting)) => Some(sighting.meant),

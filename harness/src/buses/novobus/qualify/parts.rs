@@ -6,7 +6,7 @@
 use super::settle::{Answer, between};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Conversation, Done};
-use crate::rig::Played;
+use crate::rig::PlayedScenario;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use std::collections::BTreeMap;
@@ -64,7 +64,7 @@ impl Parts {
     }
 
     /// Whether a conversation gave the same bytes and the same verdict in the first part.
-    pub(super) fn repeats(&mut self, name: &str, played: &Played) -> bool {
+    pub(super) fn repeats(&mut self, name: &str, played: &PlayedScenario) -> bool {
         if !self.several {
             return false;
         }

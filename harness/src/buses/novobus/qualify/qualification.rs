@@ -16,7 +16,7 @@ use crate::buses::novobus::twin::{Exactness, SILENCED, Twin};
 use crate::library::Entry;
 use crate::link::{Link as _, Octets as _};
 use crate::rig::segment::Qualified;
-use crate::rig::{Attempt, Played, Profile, Rig, Run};
+use crate::rig::{Attempt, PlayedScenario, Profile, Rig, Run};
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -40,7 +40,7 @@ pub(crate) trait QualifiedBench {
     ///
     /// # Errors
     /// Nothing more can be played.
-    fn play(&mut self, entry: &Entry) -> Result<Played, Self::Stop>;
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Self::Stop>;
 
     /// Whether nothing more may be played.
     fn over(&mut self) -> bool;
@@ -74,7 +74,7 @@ pub(crate) trait QualifiedBench {
     ///
     /// # Errors
     /// It cannot be written.
-    fn show(&mut self, entry: &Entry, played: &Played) -> Result<(), Self::Stop>;
+    fn show(&mut self, entry: &Entry, played: &PlayedScenario) -> Result<(), Self::Stop>;
 }
 
 /// What is known of a qualification before anything is played.
@@ -150,7 +150,7 @@ impl Qualification {
     }
 
     /// Notes the outcome of a selected scenario.
-    pub(crate) fn note(&mut self, name: &str, played: &Played) {
+    pub(crate) fn note(&mut self, name: &str, played: &PlayedScenario) {
         self.findings.note(name, played);
         self.ill = played.shows_an_ill_rig();
         self.assume(played);
@@ -165,7 +165,7 @@ impl Qualification {
     }
 
     /// Takes over the choices with which a scenario was compared, for what is asked of the ring later.
-    fn assume(&mut self, played: &Played) {
+    fn assume(&mut self, played: &PlayedScenario) {
         if self.assumed.setups.is_empty() {
             let assumed = played.attempts.iter().map(|own| &own.assumed);
             let found = assumed.into_iter().find(|own| !own.setups.is_empty());
@@ -258,7 +258,7 @@ impl Qualification {
     }
 
     /// Notes which drives hold bytes back. Where times are exact the model has judged them.
-    fn measure(&mut self, played: &Played) {
+    fn measure(&mut self, played: &PlayedScenario) {
         let last = played.last_played().and_then(Attempt::sound);
         let last = last.and_then(|own| own.conversations.last());
         let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
@@ -274,7 +274,7 @@ impl Qualification {
         &mut self,
         bench: &mut B,
         entry: &Entry,
-    ) -> Result<Option<Played>, B::Stop> {
+    ) -> Result<Option<PlayedScenario>, B::Stop> {
         let played = bench.play(entry)?;
         bench.show(entry, &played)?;
         let name = entry.short_name();

@@ -11,7 +11,7 @@ use crate::guard::Guarded;
 use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
-use crate::rig::{Again, Attempt, Played, Rig, SessionError, attempts_of};
+use crate::rig::{Again, Attempt, PlayedScenario, Rig, SessionError, attempts_of};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{
@@ -134,13 +134,13 @@ impl<'s> Run<'s> {
         &mut self,
         plan: &Plan,
         mut keeper: Option<&mut dyn Keeper>,
-    ) -> Result<Played, SessionError> {
+    ) -> Result<PlayedScenario, SessionError> {
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let way = self.way();
         let recording = Recording::new(self.session.link(), &mut forgotten);
         let lacks = not_played(plan, &recording, &way.rings);
         if let Some(skip) = self.denied(plan, lacks) {
-            return Ok(Played::skipped(skip));
+            return Ok(PlayedScenario::skipped(skip));
         }
         let mut attempts = Vec::new();
         let real = self.exactness.tolerance > Span::ZERO;
@@ -158,7 +158,7 @@ impl<'s> Run<'s> {
             attempts.push(attempt);
             let again = self.again.after(&attempts, most);
             if !again || self.session.link().trouble().is_some() {
-                return Ok(Played::of(attempts));
+                return Ok(PlayedScenario::of(attempts));
             }
         }
     }

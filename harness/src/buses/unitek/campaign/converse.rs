@@ -3,7 +3,7 @@
 use super::file::{CampaignStep, FrameCampaignFile};
 use harness_proto::can::{BitRate, Frame, Heard};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Event, Job, Master, Outcome, Trouble};
+use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Outcome};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::segment::{Host, Placed, Segment};
@@ -89,7 +89,7 @@ pub struct Conversation {
     /// How each step ended.
     pub ends: Vec<JobEnd>,
     /// What the master reported besides, in its words.
-    pub troubles: Vec<String>,
+    pub disturbances: Vec<String>,
     /// Frames that the master sent.
     pub sent: u64,
     /// The frames on the bus, in order; a repetition by a controller is left out.
@@ -134,7 +134,7 @@ pub(super) fn converse(
     });
     Conversation {
         ends,
-        troubles: desk.troubles,
+        disturbances: desk.disturbances,
         sent: desk.sent,
         frames,
         state,
@@ -148,7 +148,7 @@ struct Desk {
     master: Master,
     now: Instant,
     sent: u64,
-    troubles: Vec<String>,
+    disturbances: Vec<String>,
     ended: Option<Outcome>,
     log: Vec<MasterFrame>,
 }
@@ -165,7 +165,7 @@ impl Desk {
             master: Master::new(DEFAULT_RX, DEFAULT_TX, file.options()),
             now: Instant::START,
             sent: 0,
-            troubles: Vec::new(),
+            disturbances: Vec::new(),
             ended: None,
             log: Vec::new(),
         }
@@ -234,7 +234,7 @@ impl Desk {
         while let Some(event) = self.master.poll_event() {
             match event {
                 Event::Ended { outcome, .. } => self.ended = Some(outcome),
-                Event::Trouble(trouble) => self.troubles.push(words(trouble)),
+                Event::Disturbance(disturbance) => self.disturbances.push(words(disturbance)),
                 Event::Cyclic { .. } | Event::Status { .. } => {}
             }
         }
@@ -272,12 +272,12 @@ fn plain(outcome: Outcome) -> Outcome {
 }
 
 /// What the master reports, in words.
-fn words(trouble: Trouble) -> String {
-    match trouble {
-        Trouble::Odd(why) => format!("a frame that is no reply: {why}"),
-        Trouble::Unasked { reply } => format!("{:02X} comes unasked", reply.register),
-        Trouble::Missing { register } => format!("a cyclic frame of {register:02X} is missing"),
-        Trouble::Early { register, after } => {
+fn words(disturbance: Disturbance) -> String {
+    match disturbance {
+        Disturbance::Odd(why) => format!("a frame that is no reply: {why}"),
+        Disturbance::Unasked { reply } => format!("{:02X} comes unasked", reply.register),
+        Disturbance::Missing { register } => format!("a cyclic frame of {register:02X} is missing"),
+        Disturbance::Early { register, after } => {
             format!("{register:02X} comes {after} behind the last one")
         }
     }

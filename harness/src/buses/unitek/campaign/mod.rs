@@ -168,9 +168,9 @@ impl FrameCampaign {
                 end.words()
             )));
         }
-        if let Some(trouble) = sound.troubles.first() {
+        if let Some(disturbance) = sound.disturbances.first() {
             return Err(wrong(format!(
-                "the master reports {trouble} without any fault; give the steps more time"
+                "the master reports {disturbance} without any fault; give the steps more time"
             )));
         }
         let faults = file.faults();
@@ -213,7 +213,7 @@ impl FrameCampaign {
     }
 
     fn class(&self, played: &Conversation) -> FrameClass {
-        let reported = !played.troubles.is_empty() || !played.ends.iter().all(JobEnd::is_well);
+        let reported = !played.disturbances.is_empty() || !played.ends.iter().all(JobEnd::is_well);
         if reported {
             FrameClass::Noticed
         } else if played.ends != self.sound.ends || played.state != self.sound.state {
@@ -237,7 +237,7 @@ impl FrameOutcome {
             .filter(|(_, end)| !end.is_well());
         let jobs = jobs.map(|(step, end)| format!("step {}: {}", step + 1, end.words()));
         let parts: Vec<_> = jobs
-            .chain(played.troubles.iter().cloned())
+            .chain(played.disturbances.iter().cloned())
             .take(4)
             .collect();
         if parts.is_empty() {
@@ -257,7 +257,7 @@ impl FrameOutcome {
             class: self.class as usize,
             happened: self.happened(),
             steps: self.conversation.ends.iter().map(JobEnd::words).collect(),
-            troubles: self.conversation.troubles.clone(),
+            troubles: self.conversation.disturbances.clone(),
         }
     }
 }

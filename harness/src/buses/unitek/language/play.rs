@@ -50,7 +50,9 @@ impl Driver {
         while let Some(event) = self.master.poll_event() {
             match event {
                 Event::Ended { id, outcome } => self.ended.push((id, outcome)),
-                Event::Cyclic { .. } | Event::Status { .. } | Event::Trouble(_) => others = true,
+                Event::Cyclic { .. } | Event::Status { .. } | Event::Disturbance(_) => {
+                    others = true
+                }
             }
         }
         others

@@ -9,7 +9,7 @@ use crate::cli::fuzz::scope;
 use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swarm, Watcher};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};
-use crate::rig::Played;
+use crate::rig::PlayedScenario;
 use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
@@ -35,7 +35,7 @@ impl<'r, 's> Watched<'r, 's> {
 impl QualifiedBench for Watched<'_, '_> {
     type Stop = String;
 
-    fn play(&mut self, entry: &Entry) -> Result<Played, String> {
+    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, String> {
         let plan = entry.plan.as_ref().expect("a plan");
         let played = self.run.play(plan, None);
         let played = played.map_err(|error| format!("{}: {error}", entry.short_name()))?;
@@ -66,7 +66,7 @@ impl QualifiedBench for Watched<'_, '_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &Played) -> Result<(), String> {
+    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), String> {
         Ok(())
     }
 }
