@@ -163,7 +163,7 @@ pub enum Heard {
     /// An octet with its line status.
     Octet(Received),
     /// A frame, or what went wrong with one.
-    Frame(can::Heard),
+    Frame(can::CanEvent),
 }
 
 impl Heard {
@@ -178,7 +178,7 @@ impl Heard {
 
     /// What was heard of frames, if it is that.
     #[must_use]
-    pub const fn frame(self) -> Option<can::Heard> {
+    pub const fn frame(self) -> Option<can::CanEvent> {
         match self {
             Self::Octet(_) => None,
             Self::Frame(frame) => Some(frame),

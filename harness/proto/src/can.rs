@@ -498,16 +498,16 @@ impl fmt::Display for BitRate {
 
 /// What a station hears from the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Heard {
+pub enum CanEvent {
     /// A frame that was acknowledged and ended well.
     Frame(Frame),
     /// Something went wrong on the bus.
-    Error(BusError),
+    Error(CanError),
 }
 
 /// What a controller reports to be wrong with the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum BusError {
+pub enum CanError {
     /// An error frame was on the bus; the frame in front of it is repeated by its sender.
     ErrorFrame,
     /// No other station acknowledged a frame of this one.
@@ -516,7 +516,7 @@ pub enum BusError {
     BusOff,
 }
 
-impl BusError {
+impl CanError {
     /// Every error.
     pub const ALL: [Self; 3] = [Self::ErrorFrame, Self::NoAcknowledge, Self::BusOff];
 
@@ -537,7 +537,7 @@ impl BusError {
     }
 }
 
-impl fmt::Display for BusError {
+impl fmt::Display for CanError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }

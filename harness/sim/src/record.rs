@@ -1,6 +1,6 @@
 //! The record of a run: everything that the channels of a bus carried, and what its stations remarked.
 
-use harness_proto::can::{BusError, Frame};
+use harness_proto::can::{CanError, Frame};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 
@@ -69,7 +69,7 @@ pub enum FrameEnd {
     /// No other station has it, although it was acknowledged.
     Lost,
     /// An error frame ended it.
-    Error(BusError),
+    Error(CanError),
 }
 
 /// Something that a station remarked at a piece that it received.

@@ -8,7 +8,7 @@
 
 use crate::participant::Participant;
 use crate::record::{FrameEnd, LineFrame};
-use harness_proto::can::{BitRate, BusError, ERROR_FRAME_BITS, Frame, Heard};
+use harness_proto::can::{BitRate, CanError, CanEvent, ERROR_FRAME_BITS, Frame};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 use std::fmt;
@@ -30,7 +30,7 @@ pub trait Station {
     /// The frame that it wants to send was sent, and ended at `at`.
     fn sent(&mut self, at: Instant);
     /// Something went wrong on the bus at `at`.
-    fn notice(&mut self, at: Instant, error: BusError) {
+    fn notice(&mut self, at: Instant, error: CanError) {
         let _ = (at, error);
     }
     /// When it does something by itself; `None` while it only waits for frames.
@@ -53,7 +53,7 @@ impl<S: Station + ?Sized> Station for Box<S> {
     fn sent(&mut self, at: Instant) {
         (**self).sent(at);
     }
-    fn notice(&mut self, at: Instant, error: BusError) {
+    fn notice(&mut self, at: Instant, error: CanError) {
         (**self).notice(at, error);
     }
     fn next_action(&self) -> Option<Instant> {
@@ -123,9 +123,9 @@ struct Member {
 }
 
 impl Member {
-    fn failed(&mut self, error: BusError) {
+    fn failed(&mut self, error: CanError) {
         // A passive station alone on a bus does not count on, so that it never goes to bus-off (ISO 11898-1).
-        if error == BusError::NoAcknowledge && self.errors >= PASSIVE {
+        if error == CanError::NoAcknowledge && self.errors >= PASSIVE {
             return;
         }
         self.errors += 8;
@@ -246,7 +246,7 @@ impl<S: Station> Segment<S> {
     /// The controller of a station goes to bus-off: it neither hears nor sends until [`Segment::restart`].
     pub fn switch_off(&mut self, place: usize) {
         self.members[place].off = true;
-        self.stations[place].notice(self.now, BusError::BusOff);
+        self.stations[place].notice(self.now, CanError::BusOff);
     }
 
     /// Restarts the controller of a station after bus-off.
@@ -349,15 +349,15 @@ impl<S: Station> Segment<S> {
         }
         let alone = self.is_alone(&places);
         let (bits, error) = match (differs, fault) {
-            (Some(bits), _) => (bits, Some(BusError::ErrorFrame)),
+            (Some(bits), _) => (bits, Some(CanError::ErrorFrame)),
             (None, Some(FrameFault::Corrupt | FrameFault::BusOff)) => {
-                (frame.bits_to_acknowledge(), Some(BusError::ErrorFrame))
+                (frame.bits_to_acknowledge(), Some(CanError::ErrorFrame))
             }
             (None, fault) if alone || fault == Some(FrameFault::NoAcknowledge) => {
                 // The error flag begins behind the acknowledge slot, in place of its delimiter.
                 (
                     frame.bits_to_acknowledge() - 1,
-                    Some(BusError::NoAcknowledge),
+                    Some(CanError::NoAcknowledge),
                 )
             }
             (None, Some(FrameFault::Doubled)) => {
@@ -388,7 +388,7 @@ impl<S: Station> Segment<S> {
         frame: Frame,
         bits: u32,
         places: &[usize],
-        error: BusError,
+        error: CanError,
         fault: Option<FrameFault>,
     ) {
         let bits = bits + ERROR_FRAME_BITS;
@@ -402,10 +402,10 @@ impl<S: Station> Segment<S> {
             self.suspend(place);
             self.stations[place].notice(end, error);
             if self.members[place].off {
-                self.stations[place].notice(end, BusError::BusOff);
+                self.stations[place].notice(end, CanError::BusOff);
             }
         }
-        if error == BusError::ErrorFrame {
+        if error == CanError::ErrorFrame {
             self.all_but(places, |station| station.notice(end, error));
         }
         self.keep(start, end, frame, places[0], FrameEnd::Error(error));
@@ -513,7 +513,7 @@ fn wanted<S: Station>(station: &S, member: &Member) -> Option<(Instant, Frame)> 
 #[derive(Clone, Debug, Default)]
 pub struct Host {
     queue: VecDeque<(Instant, Frame)>,
-    heard: VecDeque<(Instant, Heard)>,
+    heard: VecDeque<(Instant, CanEvent)>,
     /// Ends of own frames.
     sent: VecDeque<Instant>,
     /// It hears, and does not even acknowledge.
@@ -538,7 +538,7 @@ impl Host {
     }
 
     /// What it has heard, in order of time.
-    pub fn receive(&mut self) -> Option<(Instant, Heard)> {
+    pub fn receive(&mut self) -> Option<(Instant, CanEvent)> {
         self.heard.pop_front()
     }
 
@@ -568,7 +568,7 @@ impl Host {
 
 impl Station for Host {
     fn hear(&mut self, at: Instant, frame: &Frame) {
-        self.heard.push_back((at, Heard::Frame(*frame)));
+        self.heard.push_back((at, CanEvent::Frame(*frame)));
     }
 
     fn wants(&self) -> Option<(Instant, Frame)> {
@@ -580,11 +580,11 @@ impl Station for Host {
         self.sent.push_back(at);
     }
 
-    fn notice(&mut self, at: Instant, error: BusError) {
+    fn notice(&mut self, at: Instant, error: CanError) {
         // One that repeats is kept once.
-        let again = |last: &(Instant, Heard)| last.1 == Heard::Error(error);
+        let again = |last: &(Instant, CanEvent)| last.1 == CanEvent::Error(error);
         if !self.heard.back().is_some_and(again) {
-            self.heard.push_back((at, Heard::Error(error)));
+            self.heard.push_back((at, CanEvent::Error(error)));
         }
     }
 
@@ -625,7 +625,7 @@ impl<D: Station> Station for Participant<Host, D> {
     fn sent(&mut self, at: Instant) {
         self.station_mut().sent(at);
     }
-    fn notice(&mut self, at: Instant, error: BusError) {
+    fn notice(&mut self, at: Instant, error: CanError) {
         self.station_mut().notice(at, error);
     }
     fn next_action(&self) -> Option<Instant> {

@@ -481,7 +481,7 @@ fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit
 
 /// What happens to a drive from outside the bus, by the bus that it is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stimulus {
+pub enum AnyStimulus {
     /// To an ND21.
     Novobus(harness_sim::nd21::Stimulus),
     /// To a UNITEK drive.
@@ -490,7 +490,7 @@ pub enum Stimulus {
     Nordac(nordac::simulate::Happening),
 }
 
-impl fmt::Display for Stimulus {
+impl fmt::Display for AnyStimulus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Novobus(stimulus) => f.write_str(&novobus::language::write::stimulus(stimulus)),
@@ -500,7 +500,7 @@ impl fmt::Display for Stimulus {
     }
 }
 
-impl Stimulus {
+impl AnyStimulus {
     /// Whether it changes what the line carries.
     #[must_use]
     pub const fn is_on_line(self) -> bool {

@@ -6,7 +6,7 @@ use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
 use crate::buses::sender_of;
 use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
-use harness_proto::can::{BitRate, BusError, Frame, Id};
+use harness_proto::can::{BitRate, CanError, Frame, Id};
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
@@ -99,7 +99,7 @@ pub(super) fn packet(
     if id & ERROR != 0 {
         let ended = comment.and_then(|text| {
             let (error, frame) = text.split_once(' ')?;
-            let error = BusError::from_name(error)?;
+            let error = CanError::from_name(error)?;
             Some((frame.parse().ok()?, FrameEnd::Error(error)))
         });
         return Ok(ended);
@@ -348,7 +348,7 @@ impl FrameObject {
         let ended = match self.fault.as_deref() {
             None => Some(FrameEnd::Good),
             Some(LOST) => Some(FrameEnd::Lost),
-            Some(name) => BusError::from_name(name).map(FrameEnd::Error),
+            Some(name) => CanError::from_name(name).map(FrameEnd::Error),
         };
         Ok(FrameRead {
             nanos: self.t_ns,
@@ -430,12 +430,12 @@ mod tests {
             (
                 None,
                 "201#0011223344556677",
-                FrameEnd::Error(BusError::ErrorFrame),
+                FrameEnd::Error(CanError::ErrorFrame),
             ),
             (
                 Some(1),
                 "00000181#AA",
-                FrameEnd::Error(BusError::NoAcknowledge),
+                FrameEnd::Error(CanError::NoAcknowledge),
             ),
         ];
         let read = kinds

@@ -31,7 +31,7 @@ use std::time::Duration;
 pub struct Arguments {
     /// The command; `run` by default.
     #[command(subcommand)]
-    pub command: Option<Command>,
+    pub command: Option<ProgramCommand>,
     /// Whether to use colours.
     #[arg(long, global = true, value_enum, default_value_t = ColourWhen::Auto)]
     pub color: ColourWhen,
@@ -66,7 +66,7 @@ fn after_long_help() -> String {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum ProgramCommand {
     /// Play scenarios and report which passed.
     Run(RunArguments),
     /// List scenarios with the tables of the manual that they test.

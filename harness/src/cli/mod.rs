@@ -47,7 +47,7 @@ pub(crate) mod watch;
 pub use args::Arguments;
 pub use exit::Exit;
 
-use args::{ColourWhen, Command, RunArguments, ShowProgress};
+use args::{ColourWhen, ProgramCommand, RunArguments, ShowProgress};
 use output::Output;
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -77,44 +77,44 @@ pub fn main() -> ExitCode {
     let mut output = Output::new(arguments.color, arguments.progress);
     let command = arguments
         .command
-        .unwrap_or_else(|| Command::Run(RunArguments::default()));
+        .unwrap_or_else(|| ProgramCommand::Run(RunArguments::default()));
     match dispatch(command, &mut output) {
         Ok(exit) => exit.into(),
         Err(error) => output.unwritable(&error).into(),
     }
 }
 
-fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
+fn dispatch(command: ProgramCommand, output: &mut Output) -> std::io::Result<Exit> {
     match command {
-        Command::Run(arguments) => run::run(&arguments, output),
-        Command::List(selection) => list::list(&selection, output),
-        Command::Check(arguments) => check::check(&arguments, output),
-        Command::Trace(arguments) => trace::trace(&arguments, output),
-        Command::Import(arguments) => import::import(&arguments, output),
-        Command::Capture(arguments) => capture::capture(&arguments, output),
-        Command::Extcap(arguments) => extcap::extcap(&arguments, output),
-        Command::Plot(arguments) => plot::plot(&arguments, output),
-        Command::Diff(arguments) => import::diff(&arguments, output),
-        Command::Dissector { bus } => import::dissector(bus, output),
-        Command::Dbc { drives } => import::dbc(drives, output),
-        Command::Gsd => import::gsd(output),
-        Command::Manual(arguments) => manual::manual(&arguments, output),
-        Command::Cells(arguments) => crate::buses::cells(&arguments, output),
-        Command::Qualify(arguments) => qualify::qualify(&arguments, output),
-        Command::Verify(arguments) => verify::verify(&arguments, output),
-        Command::Merge(arguments) => merge::merge(&arguments, output),
-        Command::Report(arguments) => report::report(&arguments, output),
-        Command::Schema { of } => schema::schema(of, output),
-        Command::Shell(arguments) => shell::shell(&arguments, output),
-        Command::Fuzz { command } => fuzz::fuzz(&command, output),
-        Command::Shrink(arguments) => shrink::shrink(&arguments, output),
-        Command::Promote(arguments) => promote::promote(&arguments, output),
-        Command::Rig { command } => rig::rig(&command, output),
-        Command::Campaign(arguments) => campaign::campaign(&arguments, output),
-        Command::Deviations(arguments) => deviations::deviations(&arguments, output),
-        Command::Drive(command) => crate::buses::drive(&command, output),
-        Command::Completions { shell } => complete::completions(shell, output),
-        Command::Complete { words } => complete::complete(&words, output),
-        Command::Man { folder } => man::man(folder.as_deref(), output),
+        ProgramCommand::Run(arguments) => run::run(&arguments, output),
+        ProgramCommand::List(selection) => list::list(&selection, output),
+        ProgramCommand::Check(arguments) => check::check(&arguments, output),
+        ProgramCommand::Trace(arguments) => trace::trace(&arguments, output),
+        ProgramCommand::Import(arguments) => import::import(&arguments, output),
+        ProgramCommand::Capture(arguments) => capture::capture(&arguments, output),
+        ProgramCommand::Extcap(arguments) => extcap::extcap(&arguments, output),
+        ProgramCommand::Plot(arguments) => plot::plot(&arguments, output),
+        ProgramCommand::Diff(arguments) => import::diff(&arguments, output),
+        ProgramCommand::Dissector { bus } => import::dissector(bus, output),
+        ProgramCommand::Dbc { drives } => import::dbc(drives, output),
+        ProgramCommand::Gsd => import::gsd(output),
+        ProgramCommand::Manual(arguments) => manual::manual(&arguments, output),
+        ProgramCommand::Cells(arguments) => crate::buses::cells(&arguments, output),
+        ProgramCommand::Qualify(arguments) => qualify::qualify(&arguments, output),
+        ProgramCommand::Verify(arguments) => verify::verify(&arguments, output),
+        ProgramCommand::Merge(arguments) => merge::merge(&arguments, output),
+        ProgramCommand::Report(arguments) => report::report(&arguments, output),
+        ProgramCommand::Schema { of } => schema::schema(of, output),
+        ProgramCommand::Shell(arguments) => shell::shell(&arguments, output),
+        ProgramCommand::Fuzz { command } => fuzz::fuzz(&command, output),
+        ProgramCommand::Shrink(arguments) => shrink::shrink(&arguments, output),
+        ProgramCommand::Promote(arguments) => promote::promote(&arguments, output),
+        ProgramCommand::Rig { command } => rig::rig(&command, output),
+        ProgramCommand::Campaign(arguments) => campaign::campaign(&arguments, output),
+        ProgramCommand::Deviations(arguments) => deviations::deviations(&arguments, output),
+        ProgramCommand::Drive(command) => crate::buses::drive(&command, output),
+        ProgramCommand::Completions { shell } => complete::completions(shell, output),
+        ProgramCommand::Complete { words } => complete::complete(&words, output),
+        ProgramCommand::Man { folder } => man::man(folder.as_deref(), output),
     }
 }

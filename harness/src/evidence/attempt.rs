@@ -10,7 +10,7 @@ use crate::link::{
     Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
 };
 use crate::rig::judge::known;
-use crate::rig::judge::{Heard, judge};
+use crate::rig::judge::{AttemptFacts, judge};
 use crate::rig::run::{Way, opening, twin};
 use crate::rig::segment::SegmentJudge;
 use crate::rig::{Attempt, Driven, Rig, SessionError, play_one};
@@ -137,7 +137,7 @@ pub(super) fn again(
     let driven = Driven::new(&plan, &recorded.events, way, capabilities, &outcome);
     let driven = driven.filter(|_| header.simulated);
     let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-    let heard = Heard {
+    let heard = AttemptFacts {
         rig,
         plan: &plan,
         way,

@@ -3,7 +3,7 @@
 use super::record::RecordLine;
 use crate::link::{Lead, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble};
 use crate::medium::{Heard, Pieces};
-use harness_proto::can::{self, BusError, Frame};
+use harness_proto::can::{self, CanError, Frame};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
@@ -128,12 +128,12 @@ impl RecordLine {
                 ring: ring + 1,
                 t: units(at),
                 frame: match heard {
-                    can::Heard::Frame(frame) => Some(frame.to_string()),
-                    can::Heard::Error(_) => None,
+                    can::CanEvent::Frame(frame) => Some(frame.to_string()),
+                    can::CanEvent::Error(_) => None,
                 },
                 error: match heard {
-                    can::Heard::Frame(_) => None,
-                    can::Heard::Error(error) => Some(error.to_string()),
+                    can::CanEvent::Frame(_) => None,
+                    can::CanEvent::Error(error) => Some(error.to_string()),
                 },
             },
             LinkEvent::Fault(ring, at, PlacedFault::Link(link, what), moment) => Self::Fault {
@@ -230,8 +230,8 @@ impl RecordLine {
                 error,
             } => {
                 let heard = match (frame, error) {
-                    (Some(frame), None) => can::Heard::Frame(frame.parse().ok()?),
-                    (None, Some(error)) => can::Heard::Error(BusError::from_name(error)?),
+                    (Some(frame), None) => can::CanEvent::Frame(frame.parse().ok()?),
+                    (None, Some(error)) => can::CanEvent::Error(CanError::from_name(error)?),
                     _ => return None,
                 };
                 LinkEvent::Received(index(ring)?, instant(t), Heard::Frame(heard))

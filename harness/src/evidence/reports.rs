@@ -175,7 +175,7 @@ fn frames_differ(recorded: &Recorded, traces: &[Trace], looks: bool) -> Option<S
     for event in played(recorded) {
         match event {
             LinkEvent::Sent(_, _, pieces) => sent.extend(pieces.as_out().frames().iter().copied()),
-            LinkEvent::Received(_, at, Heard::Frame(can::Heard::Frame(frame))) => {
+            LinkEvent::Received(_, at, Heard::Frame(can::CanEvent::Frame(frame))) => {
                 received.push((at.since_start().as_nanos(), *frame));
             }
             _ => {}

@@ -37,8 +37,8 @@ pub use target::{Rehearsal, Target, Tried};
 
 /// The ring's cases and targets, the default of every parameter of this module.
 pub use crate::buses::rings::explore::{
-    Act, ActKind, AttemptRecord, Case, CaseScope, Command, CommandSent, Damage, Difference,
-    Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
+    Act, ActKind, AttemptRecord, Case, CaseScope, CommandSent, Damage, Difference, Generator, Harm,
+    MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted, RawCommand,
     RingScope, RingSetup, Spice, Spoil, Talk, To, against_model, against_reference,
     against_witnesses, beside, features, judged_again, mutate, page, play, shrink, text,
 };

@@ -1,6 +1,6 @@
 //! SLCAN: CAN frames as lines of characters over a serial line, as in the manuals of LAWICEL's CAN232 and CANUSB adapters.
 //!
-//! The host sends [`Command`]s, each ended by CR. The adapter answers each with CR (done) or BEL (refused), most reads with a line of
+//! The host sends [`SlcanCommand`]s, each ended by CR. The adapter answers each with CR (done) or BEL (refused), most reads with a line of
 //! their own, and sends the frames of the bus as [`Report`]s between the answers.
 //!
 //! | command | meaning |
@@ -115,7 +115,7 @@ impl BitTiming {
 
 /// What a host says to an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
+pub enum SlcanCommand {
     /// Nothing: an empty line, with which hosts clear what was begun.
     Nothing,
     /// `t`, `T`, `r`, `R`: send a frame.
@@ -142,7 +142,7 @@ pub enum Command {
     ReportAll,
 }
 
-impl Command {
+impl SlcanCommand {
     /// Reads a line without its end.
     ///
     /// # Errors
@@ -405,7 +405,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn written(command: Command) -> String {
+    fn written(command: SlcanCommand) -> String {
         let mut out = Vec::new();
         command.write(&mut out);
         String::from_utf8(out).expect("characters")
@@ -419,34 +419,37 @@ mod tests {
     #[test]
     fn commands_are_read_and_written() {
         for (line, command) in [
-            ("", Command::Nothing),
-            ("t2013510400", Command::Send(a_frame("201#510400"))),
-            ("t2010", Command::Send(a_frame("201#"))),
-            ("T0000020123D40", Command::Send(a_frame("00000201#3D40"))),
-            ("r2013", Command::Send(a_frame("201#R3"))),
-            ("R1FFFFFFF8", Command::Send(a_frame("1FFFFFFF#R8"))),
-            ("S6", Command::Rate(6)),
+            ("", SlcanCommand::Nothing),
+            ("t2013510400", SlcanCommand::Send(a_frame("201#510400"))),
+            ("t2010", SlcanCommand::Send(a_frame("201#"))),
+            (
+                "T0000020123D40",
+                SlcanCommand::Send(a_frame("00000201#3D40")),
+            ),
+            ("r2013", SlcanCommand::Send(a_frame("201#R3"))),
+            ("R1FFFFFFF8", SlcanCommand::Send(a_frame("1FFFFFFF#R8"))),
+            ("S6", SlcanCommand::Rate(6)),
             (
                 "s001C",
-                Command::Timing(BitTiming {
+                SlcanCommand::Timing(BitTiming {
                     btr0: 0,
                     btr1: 0x1C,
                 }),
             ),
-            ("O", Command::Open),
-            ("L", Command::Listen),
-            ("C", Command::Close),
-            ("V", Command::Version),
-            ("N", Command::SerialNumber),
-            ("F", Command::Flags),
-            ("Z1", Command::TimeStamps(true)),
-            ("X1", Command::ReportAll),
+            ("O", SlcanCommand::Open),
+            ("L", SlcanCommand::Listen),
+            ("C", SlcanCommand::Close),
+            ("V", SlcanCommand::Version),
+            ("N", SlcanCommand::SerialNumber),
+            ("F", SlcanCommand::Flags),
+            ("Z1", SlcanCommand::TimeStamps(true)),
+            ("X1", SlcanCommand::ReportAll),
         ] {
-            assert_eq!(Command::parse(line.as_bytes()), Ok(command), "{line}");
+            assert_eq!(SlcanCommand::parse(line.as_bytes()), Ok(command), "{line}");
             assert_eq!(written(command), format!("{line}\r"));
         }
-        let small = Command::parse(b"t20121aFf");
-        assert_eq!(small, Ok(Command::Send(a_frame("201#1AFF"))));
+        let small = SlcanCommand::parse(b"t20121aFf");
+        assert_eq!(small, Ok(SlcanCommand::Send(a_frame("201#1AFF"))));
     }
 
     #[test]
@@ -465,7 +468,9 @@ mod tests {
             ("s00", "four hexadecimal digits"),
             ("hello", "t, T, r, R"),
         ] {
-            let error = Command::parse(line.as_bytes()).expect_err(line).to_string();
+            let error = SlcanCommand::parse(line.as_bytes())
+                .expect_err(line)
+                .to_string();
             assert!(error.contains(&format!("\"{line}\"")), "{error}");
             assert!(error.contains(words), "{line}: {error}");
         }
@@ -560,8 +565,8 @@ mod tests {
     proptest! {
         #[test]
         fn frames_survive(frame in any_frame(), stamp in prop::option::of(0..STAMP_PERIOD)) {
-            let command = written(Command::Send(frame));
-            prop_assert_eq!(Command::parse(command.trim_end().as_bytes()), Ok(Command::Send(frame)));
+            let command = written(SlcanCommand::Send(frame));
+            prop_assert_eq!(SlcanCommand::parse(command.trim_end().as_bytes()), Ok(SlcanCommand::Send(frame)));
             let mut out = Vec::new();
             let report = Report::Frame(frame, stamp);
             report.write(&mut out);
@@ -571,9 +576,9 @@ mod tests {
 
         #[test]
         fn no_line_panics(line in prop::collection::vec(any::<u8>(), 0..80)) {
-            if let Ok(command) = Command::parse(&line) {
+            if let Ok(command) = SlcanCommand::parse(&line) {
                 let again = written(command);
-                prop_assert_eq!(Command::parse(again.trim_end().as_bytes()), Ok(command));
+                prop_assert_eq!(SlcanCommand::parse(again.trim_end().as_bytes()), Ok(command));
             }
             let _any = Report::parse(&line, CR);
         }

@@ -25,7 +25,7 @@ pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;
 pub use tamper::{needs_line_errors, only_simulated};
 
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::LastWords;
 use harness_proto::line::Received;
@@ -98,7 +98,7 @@ pub enum PlacedFault {
     /// In a drive.
     Drive(u8, DriveFault),
     /// To a drive, from outside the bus; at a time only.
-    Stimulus(u8, Stimulus),
+    Stimulus(u8, AnyStimulus),
 }
 
 impl fmt::Display for PlacedFault {

@@ -519,8 +519,8 @@ fn counted(what: Out<'_>) -> String {
 fn words_of(heard: Heard) -> String {
     match heard {
         Heard::Octet(octet) => format!("{:02X}", octet.byte),
-        Heard::Frame(can::Heard::Frame(frame)) => frame.to_string(),
-        Heard::Frame(can::Heard::Error(error)) => error.to_string(),
+        Heard::Frame(can::CanEvent::Frame(frame)) => frame.to_string(),
+        Heard::Frame(can::CanEvent::Error(error)) => error.to_string(),
     }
 }
 

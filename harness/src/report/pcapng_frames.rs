@@ -14,7 +14,7 @@
 use super::pcapng::{Block, COMMENT, END, PACKET};
 use crate::frames::socketcand::class;
 pub(crate) use crate::frames::socketcand::flag::{ERROR, EXTENDED, REMOTE};
-use harness_proto::can::{BitRate, BusError, MAX_DATA};
+use harness_proto::can::{BitRate, CanError, MAX_DATA};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -30,11 +30,11 @@ pub(crate) const MASTER: &str = "master";
 pub(crate) const DRIVE: &str = "drive ";
 
 /// The class of an error frame.
-const fn class_of(error: BusError) -> u32 {
+const fn class_of(error: CanError) -> u32 {
     match error {
-        BusError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
-        BusError::NoAcknowledge => class::NO_ACKNOWLEDGE,
-        BusError::BusOff => class::BUS_OFF,
+        CanError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
+        CanError::NoAcknowledge => class::NO_ACKNOWLEDGE,
+        CanError::BusOff => class::BUS_OFF,
     }
 }
 

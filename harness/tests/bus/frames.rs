@@ -4,7 +4,7 @@ use harness::evidence::RecordLine as Written;
 use harness::guard::{Guarded, Limits};
 use harness::link::{Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay};
 use harness::medium::{Heard, Medium, Out};
-use harness_proto::can::{self, BitRate, BusError, Frame};
+use harness_proto::can::{self, BitRate, CanError, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ const ANSWER: Span = Span::from_millis(1);
 struct Memory {
     now: Instant,
     free: Instant,
-    answers: VecDeque<(Instant, can::Heard)>,
+    answers: VecDeque<(Instant, can::CanEvent)>,
     carried: Vec<LineFrame>,
 }
 
@@ -37,10 +37,10 @@ impl Line for Memory {
             self.free =
                 self.free.max(self.now) + MEDIUM.time_of(Out::Frames(std::slice::from_ref(frame)));
             let answer = match frame.id().number() {
-                0x201 => can::Heard::Frame(
+                0x201 => can::CanEvent::Frame(
                     Frame::base(0x181, frame.data()).expect("as long as the question"),
                 ),
-                _ => can::Heard::Error(BusError::NoAcknowledge),
+                _ => can::CanEvent::Error(CanError::NoAcknowledge),
             };
             self.answers.push_back((self.free + ANSWER, answer));
             self.carried.push(LineFrame {
@@ -49,8 +49,8 @@ impl Line for Memory {
                 at: self.free,
                 frame: *frame,
                 ended: match answer {
-                    can::Heard::Frame(_) => FrameEnd::Good,
-                    can::Heard::Error(error) => FrameEnd::Error(error),
+                    can::CanEvent::Frame(_) => FrameEnd::Good,
+                    can::CanEvent::Error(error) => FrameEnd::Error(error),
                 },
             });
         }
@@ -138,7 +138,7 @@ fn frames_are_carried_recorded_and_played_back() {
     let [question, other, _] = frames();
     let first = Instant::START + BitRate::K500.time_of(77);
     assert_eq!(question.wire_bits(), 77);
-    let answer = |data: &[u8]| can::Heard::Frame(Frame::base(0x181, data).expect("short"));
+    let answer = |data: &[u8]| can::CanEvent::Frame(Frame::base(0x181, data).expect("short"));
     let second = first + BitRate::K500.time_of(other.wire_bits());
     assert_eq!(
         came[..2],
@@ -147,7 +147,7 @@ fn frames_are_carried_recorded_and_played_back() {
             (second + ANSWER, Heard::Frame(answer(other.data()))),
         ]
     );
-    let no_one = can::Heard::Error(BusError::NoAcknowledge);
+    let no_one = can::CanEvent::Error(CanError::NoAcknowledge);
     assert_eq!(
         came[2..]
             .iter()

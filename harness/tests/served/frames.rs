@@ -7,7 +7,7 @@ use harness::link::frames::{AdapterPlace, AdapterSettings, FrameLink};
 use harness::link::{Line, Link};
 use harness::medium::Out;
 use harness_proto::can::BitRate;
-use harness_proto::can::{Frame, Heard, Id};
+use harness_proto::can::{CanEvent, Frame, Id};
 use harness_proto::time::{Instant, Span};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -221,7 +221,7 @@ fn the_bench_s_own_link_talks_to_a_drive() {
         };
         let (at, heard) = reply;
         let expected: Frame = "181#1BD80100".parse().expect("a frame");
-        assert_eq!(heard.frame(), Some(Heard::Frame(expected)));
+        assert_eq!(heard.frame(), Some(CanEvent::Frame(expected)));
         assert!(at <= link.now());
         let trace = link.trace(0);
         let from = |own: &harness_sim::record::LineFrame| (own.from, own.frame);

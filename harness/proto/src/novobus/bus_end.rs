@@ -15,7 +15,7 @@ use super::error_mode::{ErrorMode, Marks, Rules};
 use super::memory::Memory;
 use super::parameter_channel::ParameterChannel;
 use super::properties::{EmptyShortTelegram, Properties, ShortAddress, TimeOutAnswer};
-use super::sync::{Addressing, Header, SyncByte};
+use super::sync::{Addressing, SyncByte, TelegramHeader};
 use crate::line::Received;
 use crate::nd21;
 use crate::time::Instant;
@@ -77,7 +77,7 @@ enum State {
     /// A sync byte.
     Sync,
     /// The address byte of a telegram.
-    Address(Header),
+    Address(TelegramHeader),
     /// A net byte of a telegram for another drive; `left` bytes are still to come.
     Passing { left: u8 },
     /// A net byte of a telegram for this drive.
@@ -396,7 +396,7 @@ impl BusEnd {
         Ok(Reaction::plain(byte))
     }
 
-    fn begin_net_bytes(&mut self, header: Header, addressed: bool) {
+    fn begin_net_bytes(&mut self, header: TelegramHeader, addressed: bool) {
         let left = header.net_length();
         self.state = match (left, addressed) {
             (0, _) => State::Sync,

@@ -29,13 +29,13 @@ pub enum Addressing {
 
 /// What the sync byte of a telegram says about the bytes that follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Header {
+pub struct TelegramHeader {
     addressing: Addressing,
     process_data: bool,
     net_length: u8,
 }
 
-impl Header {
+impl TelegramHeader {
     /// A header, if the manual allows it: at most 7 net bytes, process data take two of them, and a
     /// telegram with an address byte has at least one.
     ///
@@ -96,7 +96,7 @@ pub enum SyncByte {
     /// `81`: no telegram, swallowed.
     Pause,
     /// The first byte of a telegram.
-    Telegram(Header),
+    Telegram(TelegramHeader),
 }
 
 impl SyncByte {
@@ -122,7 +122,8 @@ impl SyncByte {
             (true, true) => Addressing::NextDrive,
             (false, true) => return Err(SyncError::NextWithoutShort),
         };
-        Header::new(addressing, byte & D != 0, (byte >> 1) & MAX_NET_LENGTH).map(Self::Telegram)
+        TelegramHeader::new(addressing, byte & D != 0, (byte >> 1) & MAX_NET_LENGTH)
+            .map(Self::Telegram)
     }
 
     /// The byte on the line.

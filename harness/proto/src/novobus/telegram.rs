@@ -6,7 +6,7 @@
 //! break.
 
 use super::decode::Decoded;
-use super::sync::{Addressing, Header, MAX_NET_LENGTH, SyncByte, SyncError};
+use super::sync::{Addressing, MAX_NET_LENGTH, SyncByte, SyncError, TelegramHeader};
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -76,10 +76,10 @@ impl Telegram {
         &self.parameters
     }
 
-    fn header(&self) -> Result<Header, SyncError> {
+    fn header(&self) -> Result<TelegramHeader, SyncError> {
         let data = if self.process_data.is_some() { 2 } else { 0 };
         let length = u8::try_from(data + self.parameters.len()).unwrap_or(u8::MAX);
-        Header::new(
+        TelegramHeader::new(
             self.address.addressing(),
             self.process_data.is_some(),
             length,

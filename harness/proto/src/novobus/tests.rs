@@ -8,7 +8,7 @@ use super::decode::Decoded;
 use super::error::BusError;
 use super::output::OutputChange;
 use super::properties::{PROPERTIES, Properties, ReadLongAnswer, Setting};
-use super::sync::{Addressing, Header, SyncByte, SyncError};
+use super::sync::{Addressing, SyncByte, SyncError, TelegramHeader};
 use super::telegram::{Address, Telegram, TelegramError};
 use super::timing::{exchange_bytes, position_bytes};
 use crate::line::Rate;
@@ -187,7 +187,7 @@ fn every_byte_is_a_sync_byte_or_breaks_a_rule() {
                 (true, false) => Addressing::SameDrive,
                 (true, true) => Addressing::NextDrive,
             };
-            let header = Header::new(addressing, d, t).unwrap();
+            let header = TelegramHeader::new(addressing, d, t).unwrap();
             assert_eq!(decoded, Ok(SyncByte::Telegram(header)));
             if s { 5 } else { 4 }
         };

@@ -288,10 +288,10 @@ impl Bench {
                     }
                 }
             }
-            PlacedFault::Stimulus(_, buses::Stimulus::Nordac(Happening::Line(placed))) => {
+            PlacedFault::Stimulus(_, buses::AnyStimulus::Nordac(Happening::Line(placed))) => {
                 self.line.inject(placed);
             }
-            PlacedFault::Stimulus(slave, buses::Stimulus::Nordac(Happening::Outside(own))) => {
+            PlacedFault::Stimulus(slave, buses::AnyStimulus::Nordac(Happening::Outside(own))) => {
                 if let Some(drive) = self.drive_mut(slave) {
                     match own {
                         Stimulus::Link(found) => drive.set_link(now, !found),

@@ -280,7 +280,7 @@ impl SimulatedLink {
         match fault {
             PlacedFault::Link(link, fault) => ring.suffer_link(link, fault),
             PlacedFault::Drive(drive, fault) => ring.suffer_drive(drive, fault),
-            PlacedFault::Stimulus(drive, buses::Stimulus::Novobus(stimulus)) => {
+            PlacedFault::Stimulus(drive, buses::AnyStimulus::Novobus(stimulus)) => {
                 if let Some(drive) = ring.drive_mut(drive) {
                     // Planning has refused drives without an outside.
                     let _happened = drive.stimulate(stimulus);
@@ -418,7 +418,7 @@ impl Link for SimulatedLink {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Frame(fault) => format!("{place} at {at}: {fault}"),
-                PlacedFault::Stimulus(_, buses::Stimulus::Novobus(Stimulus::Error(error))) => {
+                PlacedFault::Stimulus(_, buses::AnyStimulus::Novobus(Stimulus::Error(error))) => {
                     format!("{place} at {at}: error {error}")
                 }
                 PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus}"),

@@ -17,7 +17,7 @@ use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use crate::traffic::SegmentReport;
-use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 
 /// The bus.
@@ -282,7 +282,7 @@ impl Language for Valves {
     fn fetch(_: &mut (), link: &mut dyn Link, port: usize) -> Option<(Instant, Frame)> {
         loop {
             let (at, heard) = link.receive(port)?;
-            if let Heard::Frame(frame) = heard.frame()? {
+            if let CanEvent::Frame(frame) = heard.frame()? {
                 return Some((at, frame));
             }
         }

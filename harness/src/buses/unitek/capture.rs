@@ -8,7 +8,7 @@ use crate::buses::JudgedFrames;
 use crate::report::pcapng_frames::rate_of;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
-use harness_proto::can::{BitRate, BusError, Frame};
+use harness_proto::can::{BitRate, CanError, Frame};
 use harness_proto::time::Instant;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
@@ -59,9 +59,9 @@ pub(crate) fn scenario(
         let fault = match own.ended {
             FrameEnd::Good => None,
             FrameEnd::Lost => Some("lost"),
-            FrameEnd::Error(BusError::ErrorFrame) => Some("corrupt"),
-            FrameEnd::Error(BusError::NoAcknowledge) => Some("no-acknowledge"),
-            FrameEnd::Error(BusError::BusOff) => continue,
+            FrameEnd::Error(CanError::ErrorFrame) => Some("corrupt"),
+            FrameEnd::Error(CanError::NoAcknowledge) => Some("no-acknowledge"),
+            FrameEnd::Error(CanError::BusOff) => continue,
         };
         if let Some(fault) = fault {
             let line = format!("! frame {}: {fault}\n", number + 1);
@@ -212,7 +212,7 @@ mod tests {
             frame: text.parse().expect("a frame"),
             ended,
         };
-        let corrupt = FrameEnd::Error(BusError::ErrorFrame);
+        let corrupt = FrameEnd::Error(CanError::ErrorFrame);
         let frames = vec![
             frame(None, 1_000, "201#3D4000", corrupt),
             frame(None, 1_200, "201#3D4000", FrameEnd::Good),

@@ -134,9 +134,9 @@ impl Gate for SegmentGate {
 
     fn hear(&mut self, heard: &Heard) {
         match heard {
-            Heard::Frame(can::Heard::Frame(frame)) => self.gate.overhear(frame),
+            Heard::Frame(can::CanEvent::Frame(frame)) => self.gate.overhear(frame),
             // The bench's own last frame may be lost.
-            Heard::Frame(can::Heard::Error(_)) => self.gate.doubt(),
+            Heard::Frame(can::CanEvent::Error(_)) => self.gate.doubt(),
             Heard::Octet(_) => {}
         }
     }

@@ -181,7 +181,7 @@ impl Bench {
         match fault {
             PlacedFault::Frame(_) => self.arm(next, fault),
             PlacedFault::Drive(node, fault) => self.power(node, fault),
-            PlacedFault::Stimulus(node, buses::Stimulus::Unitek(stimulus)) => {
+            PlacedFault::Stimulus(node, buses::AnyStimulus::Unitek(stimulus)) => {
                 self.stimulate(node, stimulus);
             }
             // Of another bus.
@@ -427,7 +427,7 @@ mod tests {
             bench.wait(until);
             came.extend(std::iter::from_fn(|| bench.receive(0)).map(|(at, heard)| {
                 let text = match heard.frame() {
-                    Some(can::Heard::Frame(frame)) => frame.to_string(),
+                    Some(can::CanEvent::Frame(frame)) => frame.to_string(),
                     other => format!("{other:?}"),
                 };
                 (at, text)
@@ -476,7 +476,7 @@ mod tests {
         ask(&mut bench, "201#520C00");
         ask(&mut bench, "201#511000");
         let limit = Stimulus::Input("limit1", true);
-        let fault = PlacedFault::Stimulus(1, buses::Stimulus::Unitek(limit));
+        let fault = PlacedFault::Stimulus(1, buses::AnyStimulus::Unitek(limit));
         bench.inject(0, fault, Moment::At(at(30_500)));
         assert_eq!(bench.unused_faults().len(), 1);
         let came = wait(&mut bench, 20);
@@ -492,7 +492,7 @@ mod tests {
             frames(&ask(&mut bench, "201#3D1B00"))[0],
             format!(
                 "{:?}",
-                Some(can::Heard::Error(can::BusError::NoAcknowledge))
+                Some(can::CanEvent::Error(can::CanError::NoAcknowledge))
             )
         );
         // Repeated again and again: nothing more will come of it.

@@ -8,7 +8,7 @@ use super::{Imported, ReadSettings};
 use crate::buses;
 use crate::report::pcapng_frames::{LOST, MASTER};
 use crate::report::pcapng_telegrams::PacketOctet;
-use harness_proto::can::{BusError, Frame};
+use harness_proto::can::{CanError, Frame};
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::FrameEnd;
 
@@ -138,7 +138,7 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Capture, CaptureError> {
         let ended = match table.text(ended).as_ref() {
             "" => FrameEnd::Good,
             LOST => FrameEnd::Lost,
-            name => FrameEnd::Error(BusError::from_name(name).ok_or_else(|| {
+            name => FrameEnd::Error(CanError::from_name(name).ok_or_else(|| {
                 table.wrong_field(ended, "`lost` or the name of an error is expected")
             })?),
         };

@@ -10,7 +10,7 @@ use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink
 use crate::medium;
 use crate::port::{OpenError, PortCounts, SilentTap, TapState};
 use crate::trouble::Trouble;
-use harness_proto::can::{BusError, Frame, Heard};
+use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::line::{Format, Received};
 use harness_proto::time::{Instant as LineInstant, Span};
 use harness_sim::record::{FrameEnd, LineByte, LineFrame};
@@ -234,12 +234,12 @@ impl Tap {
         while let Some((at, heard)) = link.receive(0) {
             let nanos = now.saturating_sub(present.since(at).as_nanos());
             match heard {
-                medium::Heard::Frame(Heard::Frame(frame)) => {
+                medium::Heard::Frame(CanEvent::Frame(frame)) => {
                     self.pieces += 1;
                     let lasted = rate.time_of(frame.wire_bits());
                     pieces.push(Piece::Frame(line_frame(nanos, lasted, frame)));
                 }
-                medium::Heard::Frame(Heard::Error(error)) => {
+                medium::Heard::Frame(CanEvent::Error(error)) => {
                     self.damaged += 1;
                     pieces.push(Piece::Event(nanos, error_words(error).to_owned()));
                 }
@@ -343,10 +343,10 @@ fn line_frame(nanos: u64, lasted: Span, frame: Frame) -> LineFrame {
     }
 }
 
-const fn error_words(error: BusError) -> &'static str {
+const fn error_words(error: CanError) -> &'static str {
     match error {
-        BusError::ErrorFrame => "an error on the bus",
-        BusError::NoAcknowledge => "a frame without an acknowledge",
-        BusError::BusOff => "the adapter is bus-off",
+        CanError::ErrorFrame => "an error on the bus",
+        CanError::NoAcknowledge => "a frame without an acknowledge",
+        CanError::BusOff => "the adapter is bus-off",
     }
 }

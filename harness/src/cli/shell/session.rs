@@ -7,7 +7,7 @@ use super::people::{self, Turn};
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
 use super::{HeldBench, people_output};
 use crate::buses::Bus;
-use crate::cli::args::{Arguments, Command};
+use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::exit::Exit;
 use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::help::command;
@@ -524,7 +524,7 @@ impl HeldSession {
             .map_err(wrong)?
             .command
         {
-            Some(Command::Drive(command)) => self.bench.perform(*command, output),
+            Some(ProgramCommand::Drive(command)) => self.bench.perform(*command, output),
             _ => Err(Failure::refused("no command on drives")),
         }
     }

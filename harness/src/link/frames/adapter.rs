@@ -1,9 +1,9 @@
 //! A client's end of SLCAN and socketcand: frames out, what is heard in, without I/O.
 
 use super::clock::AdapterClock;
-use crate::frames::slcan::{self, Command, Report, STAMP_PERIOD, flags};
+use crate::frames::slcan::{self, Report, STAMP_PERIOD, SlcanCommand, flags};
 use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, class};
-use harness_proto::can::{BusError, Frame, Heard};
+use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 
@@ -20,7 +20,7 @@ const MOST_UNANSWERED: usize = 4;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Event {
     /// Something on the bus, and when.
-    Heard(Instant, Heard),
+    Heard(Instant, CanEvent),
     /// The adapter has lost frames.
     Overrun,
     /// Nothing more is carried, and why.
@@ -38,7 +38,7 @@ impl Adapter {
     /// Writes a frame; false if the language has no such frame.
     pub(super) fn send(&mut self, now: Instant, frame: &Frame, out: &mut Vec<u8>) -> bool {
         match self {
-            Self::Slcan(own) => own.command(now, Command::Send(*frame), out),
+            Self::Slcan(own) => own.command(now, SlcanCommand::Send(*frame), out),
             Self::Socketcand(_) if frame.is_remote() => return false,
             Self::Socketcand(_) => Request::Send(*frame).write(out),
         }
@@ -53,7 +53,7 @@ impl Adapter {
     /// How a frame is written, beside the conversation.
     pub(super) fn encode(&self, frame: &Frame, out: &mut Vec<u8>) {
         match self {
-            Self::Slcan(_) => Command::Send(*frame).write(out),
+            Self::Slcan(_) => SlcanCommand::Send(*frame).write(out),
             Self::Socketcand(_) => Request::Send(*frame).write(out),
         }
     }
@@ -96,7 +96,7 @@ pub(super) struct Slcan {
     lines: slcan::Lines,
     clock: AdapterClock,
     /// Commands that wait for an answer, and since when.
-    unanswered: VecDeque<(Command, Instant)>,
+    unanswered: VecDeque<(SlcanCommand, Instant)>,
     /// When the status is asked for again; `None` with an adapter that has none.
     status: Option<Instant>,
     listen_only: bool,
@@ -114,7 +114,7 @@ impl Slcan {
         }
     }
 
-    fn command(&mut self, now: Instant, command: Command, out: &mut Vec<u8>) {
+    fn command(&mut self, now: Instant, command: SlcanCommand, out: &mut Vec<u8>) {
         command.write(out);
         self.unanswered.push_back((command, now));
     }
@@ -127,7 +127,7 @@ impl Slcan {
         }
         if self.status.is_some_and(|at| at <= now) && self.unanswered.is_empty() {
             self.status = Some(now + STATUS_EVERY);
-            self.command(now, Command::Flags, out);
+            self.command(now, SlcanCommand::Flags, out);
         }
     }
 
@@ -147,15 +147,15 @@ impl Slcan {
                 let at = stamp.map_or(read, |stamp| {
                     self.clock.at(Span::from_millis(stamp.into()), read)
                 });
-                vec![Event::Heard(at, Heard::Frame(frame))]
+                vec![Event::Heard(at, CanEvent::Frame(frame))]
             }
             Ok(Report::Refused) => self.refused(read),
             Ok(Report::Flags(bits)) => {
-                self.answered(|command| command == Command::Flags);
+                self.answered(|command| command == SlcanCommand::Flags);
                 status(bits, read)
             }
             Ok(Report::Done | Report::Taken { .. }) => {
-                self.answered(|command| command != Command::Flags);
+                self.answered(|command| command != SlcanCommand::Flags);
                 Vec::new()
             }
             // Answers to commands of the opening, and lines that only some adapters have.
@@ -165,24 +165,24 @@ impl Slcan {
     }
 
     /// The oldest command of a kind was answered.
-    fn answered(&mut self, of: impl Fn(Command) -> bool) {
+    fn answered(&mut self, of: impl Fn(SlcanCommand) -> bool) {
         let place = self.unanswered.iter().position(|(command, _)| of(*command));
         place.and_then(|place| self.unanswered.remove(place));
     }
 
     fn refused(&mut self, read: Instant) -> Vec<Event> {
         match self.unanswered.pop_front() {
-            Some((Command::Send(frame), _)) => vec![Event::Ended(format!(
+            Some((SlcanCommand::Send(frame), _)) => vec![Event::Ended(format!(
                 "the adapter has refused to send {frame}: its queue is full or it is bus-off; check rate, cable, termination and that \
                  a drive is on"
             ))],
-            Some((Command::Flags, _)) => {
+            Some((SlcanCommand::Flags, _)) => {
                 self.status = None;
                 Vec::new()
             }
             // Not an answer of the conversation: some adapters report an error so.
             Some(_) | None if self.listen_only => Vec::new(),
-            Some(_) | None => vec![Event::Heard(read, Heard::Error(BusError::ErrorFrame))],
+            Some(_) | None => vec![Event::Heard(read, CanEvent::Error(CanError::ErrorFrame))],
         }
     }
 }
@@ -191,7 +191,7 @@ impl Slcan {
 fn status(bits: u8, read: Instant) -> Vec<Event> {
     let lost = bits & (flags::OVERRUN | flags::RECEIVE_FULL) != 0;
     let wrong = bits & (flags::BUS_ERROR | flags::PASSIVE) != 0;
-    let error = Event::Heard(read, Heard::Error(BusError::ErrorFrame));
+    let error = Event::Heard(read, CanEvent::Error(CanError::ErrorFrame));
     let all = [(lost, Event::Overrun), (wrong, error)];
     all.into_iter()
         .filter(|(set, _)| *set)
@@ -224,19 +224,19 @@ impl Socketcand {
                 );
                 return Some(Event::Heard(
                     self.clock.at(since, read),
-                    Heard::Frame(frame),
+                    CanEvent::Frame(frame),
                 ));
             }
             Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::BUS_OFF != 0 => {
-                BusError::BusOff
+                CanError::BusOff
             }
             Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::NO_ACKNOWLEDGE != 0 => {
-                BusError::NoAcknowledge
+                CanError::NoAcknowledge
             }
             Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::RESTARTED != 0 => {
                 return None;
             }
-            Ok(SocketcandAnswer::ErrorFrame(..)) => BusError::ErrorFrame,
+            Ok(SocketcandAnswer::ErrorFrame(..)) => CanError::ErrorFrame,
             Ok(SocketcandAnswer::Hi | SocketcandAnswer::Ok | SocketcandAnswer::Echo) => {
                 return None;
             }
@@ -247,7 +247,7 @@ impl Socketcand {
             }
             Err(error) => return Some(Event::Ended(error.to_string())),
         };
-        Some(Event::Heard(read, Heard::Error(heard)))
+        Some(Event::Heard(read, CanEvent::Error(heard)))
     }
 }
 
@@ -291,7 +291,7 @@ mod tests {
         let heard = events(&mut own, "z\rt181440810100\r", at(4));
         assert_eq!(
             heard,
-            [Event::Heard(at(4), Heard::Frame(frame("181#40810100")))]
+            [Event::Heard(at(4), CanEvent::Frame(frame("181#40810100")))]
         );
         assert_eq!(own.due(), Some(at(251)));
         let flags = events(&mut own, "F89\r", at(5));
@@ -339,19 +339,22 @@ mod tests {
         );
         assert!(!own.send(at(0), &frame("201#R3"), &mut Vec::new()));
         let heard = events(&mut own, "< ok >< frame 181 1700000000.000100 AA >", at(9));
-        assert_eq!(heard, [Event::Heard(at(9), Heard::Frame(frame("181#AA")))]);
+        assert_eq!(
+            heard,
+            [Event::Heard(at(9), CanEvent::Frame(frame("181#AA")))]
+        );
         let errors = events(
             &mut own,
             "< error 040 1.0 >< error 020 1.0 >< error 088 1.0 >< error 100 1.0 >",
             at(9),
         );
-        let error = |error| Event::Heard(at(9), Heard::Error(error));
+        let error = |error| Event::Heard(at(9), CanEvent::Error(error));
         assert_eq!(
             errors,
             [
-                error(BusError::BusOff),
-                error(BusError::NoAcknowledge),
-                error(BusError::ErrorFrame)
+                error(CanError::BusOff),
+                error(CanError::NoAcknowledge),
+                error(CanError::ErrorFrame)
             ]
         );
         for text in ["< error no bus >", "hello >"] {

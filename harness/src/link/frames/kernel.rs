@@ -10,7 +10,7 @@ use crate::frames::socketcand::class;
 use crate::frames::socketcand::flag::{ERROR, EXTENDED, REMOTE};
 use crate::port::{LastWords, OpenError};
 use crate::trouble::Trouble;
-use harness_proto::can::{BusError, Frame, Heard, Id, MAX_DATA};
+use harness_proto::can::{CanError, CanEvent, Frame, Id, MAX_DATA};
 use harness_proto::time::Instant;
 use rustix::event::{PollFd, PollFlags};
 use rustix::fd::{AsFd, BorrowedFd};
@@ -183,17 +183,17 @@ fn encode(frame: &Frame) -> [u8; LENGTH] {
 }
 
 /// What a frame of the kernel reports; `None` for what says nothing of the bus.
-fn decode(bytes: &[u8; LENGTH]) -> Option<Heard> {
+fn decode(bytes: &[u8; LENGTH]) -> Option<CanEvent> {
     let id = u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     let number = id & Id::MAX_EXTENDED;
     if id & ERROR != 0 {
         return match number {
-            bits if bits & class::BUS_OFF != 0 => Some(Heard::Error(BusError::BusOff)),
+            bits if bits & class::BUS_OFF != 0 => Some(CanEvent::Error(CanError::BusOff)),
             bits if bits & class::NO_ACKNOWLEDGE != 0 => {
-                Some(Heard::Error(BusError::NoAcknowledge))
+                Some(CanEvent::Error(CanError::NoAcknowledge))
             }
             bits if bits & class::RESTARTED != 0 => None,
-            _ => Some(Heard::Error(BusError::ErrorFrame)),
+            _ => Some(CanEvent::Error(CanError::ErrorFrame)),
         };
     }
     let id_of = match id & EXTENDED != 0 {
@@ -205,7 +205,7 @@ fn decode(bytes: &[u8; LENGTH]) -> Option<Heard> {
         true => Frame::remote(id_of?, len),
         false => Frame::new(id_of?, &bytes[DATA..DATA + len]),
     };
-    frame.ok().map(Heard::Frame)
+    frame.ok().map(CanEvent::Frame)
 }
 
 #[cfg(test)]
@@ -221,17 +221,20 @@ mod tests {
             "00000181#0011223344556677",
         ] {
             let frame: Frame = text.parse().expect("a frame");
-            assert_eq!(decode(&encode(&frame)), Some(Heard::Frame(frame)));
+            assert_eq!(decode(&encode(&frame)), Some(CanEvent::Frame(frame)));
         }
         let error = |class: u32| {
             let mut bytes = [0; LENGTH];
             bytes[..4].copy_from_slice(&(ERROR | class).to_ne_bytes());
             decode(&bytes)
         };
-        assert_eq!(error(class::BUS_OFF), Some(Heard::Error(BusError::BusOff)));
+        assert_eq!(
+            error(class::BUS_OFF),
+            Some(CanEvent::Error(CanError::BusOff))
+        );
         assert_eq!(
             error(class::CONTROLLER),
-            Some(Heard::Error(BusError::ErrorFrame))
+            Some(CanEvent::Error(CanError::ErrorFrame))
         );
         assert_eq!(error(class::RESTARTED), None);
     }

@@ -21,7 +21,7 @@ use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLi
 use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::{LastWords, wake_on_time};
 use adapter::Event;
-use harness_proto::can::{self, BitRate, BusError, Frame};
+use harness_proto::can::{self, BitRate, CanError, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use rustix::event::{Timespec, poll};
@@ -63,7 +63,7 @@ pub struct FrameLink {
     free: Instant,
     /// Pieces of the last `send` that were not taken.
     refused: usize,
-    received: VecDeque<(Instant, can::Heard)>,
+    received: VecDeque<(Instant, can::CanEvent)>,
     /// Input was reported and is still unread.
     lying: bool,
     log: Vec<LineFrame>,
@@ -209,28 +209,28 @@ impl FrameLink {
         result
     }
 
-    fn hear(&mut self, at: Instant, heard: can::Heard) {
+    fn hear(&mut self, at: Instant, heard: can::CanEvent) {
         let last = self.received.back();
         let repeats =
-            matches!(heard, can::Heard::Error(_)) && last.is_some_and(|own| own.1 == heard);
+            matches!(heard, can::CanEvent::Error(_)) && last.is_some_and(|own| own.1 == heard);
         if !repeats {
             self.received.push_back((at, heard));
         }
         match heard {
-            can::Heard::Frame(frame) => {
+            can::CanEvent::Frame(frame) => {
                 let from = self.senders.iter().find(|(id, _)| *id == frame.id());
                 let from = from.map_or(0, |(_, drive)| *drive);
                 let start = at - self.rate.time_of(frame.wire_bits());
                 self.keep(Some(from), start, at, frame);
             }
-            can::Heard::Error(BusError::BusOff) => {
+            can::CanEvent::Error(CanError::BusOff) => {
                 let why = format!(
                     "{}: the adapter is bus-off: check rate, cable and termination, and start it again",
                     self.transport.name()
                 );
                 self.end(Trouble::Lost(why));
             }
-            can::Heard::Error(_) => {}
+            can::CanEvent::Error(_) => {}
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::adapter::{Adapter, Slcan, Socketcand};
 use super::transport::{Stream, Transport};
-use crate::frames::slcan::{self, BitTiming, Command, Report, rate_of};
+use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, rate_of};
 use crate::frames::socketcand::{Messages, Request, SocketcandAnswer};
 use crate::port::{OpenError, Outgoing, PortAddress, Wire, open_adapter};
 use crate::trouble::Trouble;
@@ -218,10 +218,10 @@ fn kernel(interface: &str, _listen_only: bool) -> Result<Box<dyn Transport>, Ada
 }
 
 /// The command that chooses a rate: a code, or bit timing registers.
-fn rate_commands(rate: BitRate) -> Result<Command, AdapterError> {
+fn rate_commands(rate: BitRate) -> Result<SlcanCommand, AdapterError> {
     let code = (0..=8).find(|code| rate_of(*code) == Some(rate));
-    let timing = || BitTiming::of(rate).map(Command::Timing);
-    let command = code.map(Command::Rate).or_else(timing);
+    let timing = || BitTiming::of(rate).map(SlcanCommand::Timing);
+    let command = code.map(SlcanCommand::Rate).or_else(timing);
     command.ok_or(AdapterError::Rate(rate))
 }
 
@@ -256,15 +256,15 @@ impl<'a> Talk<'a> {
 
     fn open_slcan(
         &mut self,
-        rate: Command,
+        rate: SlcanCommand,
         settings: &AdapterSettings,
     ) -> Result<(), AdapterError> {
         // Ends what another program has begun, and its channel.
         [
-            Command::Nothing,
-            Command::Nothing,
-            Command::Close,
-            Command::Version,
+            SlcanCommand::Nothing,
+            SlcanCommand::Nothing,
+            SlcanCommand::Close,
+            SlcanCommand::Version,
         ]
         .into_iter()
         .try_for_each(|command| self.say(command))?;
@@ -288,17 +288,17 @@ impl<'a> Talk<'a> {
             RATE,
         )?;
         // Without time stamps the time of reading counts.
-        let _stamps = self.ask(Command::TimeStamps(true))?;
+        let _stamps = self.ask(SlcanCommand::TimeStamps(true))?;
         match settings.listen_only {
-            true => self.done(Command::Listen, "to listen only (L)", LISTEN),
-            false => self.done(Command::Open, "to open its channel (O)", OPEN),
+            true => self.done(SlcanCommand::Listen, "to listen only (L)", LISTEN),
+            false => self.done(SlcanCommand::Open, "to open its channel (O)", OPEN),
         }
     }
 
     /// A command that has to be done.
     fn done(
         &mut self,
-        command: Command,
+        command: SlcanCommand,
         what: &str,
         remedy: &'static str,
     ) -> Result<(), AdapterError> {
@@ -314,7 +314,7 @@ impl<'a> Talk<'a> {
     }
 
     /// Whether a command was done; `None` where no answer comes.
-    fn ask(&mut self, command: Command) -> Result<Option<bool>, AdapterError> {
+    fn ask(&mut self, command: SlcanCommand) -> Result<Option<bool>, AdapterError> {
         self.say(command)?;
         let end = Instant::now() + PATIENCE;
         loop {
@@ -328,7 +328,7 @@ impl<'a> Talk<'a> {
         }
     }
 
-    fn say(&mut self, command: Command) -> Result<(), AdapterError> {
+    fn say(&mut self, command: SlcanCommand) -> Result<(), AdapterError> {
         let mut bytes = Vec::new();
         command.write(&mut bytes);
         self.send(&bytes)
@@ -435,7 +435,7 @@ impl<'a> Talk<'a> {
     }
 
     fn close(&mut self) {
-        let _gone = self.say(Command::Close);
+        let _gone = self.say(SlcanCommand::Close);
     }
 
     fn silent(&self, command: &'static str, expected: &'static str) -> AdapterError {

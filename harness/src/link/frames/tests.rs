@@ -82,7 +82,7 @@ fn frame(text: &str) -> Frame {
 }
 
 /// Waits for something to come, or for trouble.
-fn next(link: &mut FrameLink) -> Option<can::Heard> {
+fn next(link: &mut FrameLink) -> Option<can::CanEvent> {
     let end = link.now() + LONG;
     while link.now() < end {
         if let Some((_, heard)) = link.receive(0) {
@@ -120,7 +120,7 @@ fn an_adapter_is_opened_asked_and_closed() {
     link.send(0, Out::Frames(&[asked]));
     assert_eq!(
         next(&mut link),
-        Some(can::Heard::Frame(frame("181#40810100")))
+        Some(can::CanEvent::Frame(frame("181#40810100")))
     );
     let trace = link.trace(0);
     let carried: Vec<_> = trace.channels[0]
@@ -166,7 +166,7 @@ fn a_listener_sends_nothing() {
     link.send(0, Out::Frames(&out));
     assert_eq!(link.refused(), 1);
     // It is on the bus as soon as the channel is open.
-    assert_eq!(next(&mut link), Some(can::Heard::Frame(frame("181#AA"))));
+    assert_eq!(next(&mut link), Some(can::CanEvent::Frame(frame("181#AA"))));
     drop(link);
     let said = said.lock().expect("a list").join("");
     assert!(
@@ -187,7 +187,7 @@ fn a_poor_adapter_will_do() {
     link.send(0, Out::Frames(&[frame("201#3D4000")]));
     assert_eq!(
         next(&mut link),
-        Some(can::Heard::Frame(frame("181#40810100")))
+        Some(can::CanEvent::Frame(frame("181#40810100")))
     );
     assert_eq!(link.trouble(), None);
 }
@@ -252,7 +252,7 @@ fn trouble_of_an_adapter_is_the_bench_s() {
         command => good(command),
     });
     let mut link = opened(&settings(&overrun, false));
-    assert_eq!(next(&mut link), Some(can::Heard::Frame(frame("181#"))));
+    assert_eq!(next(&mut link), Some(can::CanEvent::Frame(frame("181#"))));
     assert_eq!(link.take_unplaced(), 1);
     let (garbage, _) = slcan(|command| match command {
         "F" => "t181zz\r",
@@ -289,10 +289,13 @@ fn a_server_of_socketcand_is_opened_and_asked() {
     link.send(0, Out::Frames(&[frame("201#3D4000")]));
     assert_eq!(
         next(&mut link),
-        Some(can::Heard::Frame(frame("181#40810100")))
+        Some(can::CanEvent::Frame(frame("181#40810100")))
     );
     link.send(0, Out::Frames(&[frame("100#")]));
-    assert_eq!(next(&mut link), Some(can::Heard::Error(BusError::BusOff)));
+    assert_eq!(
+        next(&mut link),
+        Some(can::CanEvent::Error(CanError::BusOff))
+    );
     assert!(lost(&link).contains("bus-off"));
 }
 
@@ -350,7 +353,7 @@ fn an_interruption_ends_sending_and_can_be_taken_back() {
     link.send(0, Out::Frames(&[frame("201#3D4000")]));
     assert_eq!(
         next(&mut link),
-        Some(can::Heard::Frame(frame("181#40810100")))
+        Some(can::CanEvent::Frame(frame("181#40810100")))
     );
     let stopped = FrameLink::open(&settings(&address, false), Vec::new(), interrupt);
     assert!(matches!(stopped, Err(AdapterError::Interrupted)));

@@ -1,7 +1,7 @@
 //! What carries frames to an adapter and back: a stream in a language of its own, or an interface of the kernel.
 
 use super::adapter::{Adapter, Event};
-use crate::frames::slcan::Command;
+use crate::frames::slcan::SlcanCommand;
 use crate::port::{LastWords, Outgoing, Wire};
 use crate::trouble::Trouble;
 use harness_proto::can::Frame;
@@ -60,7 +60,7 @@ impl Drop for Stream {
     fn drop(&mut self) {
         if matches!(self.adapter, Adapter::Slcan(_)) {
             let mut close = Vec::new();
-            Command::Close.write(&mut close);
+            SlcanCommand::Close.write(&mut close);
             // A port that is gone has no channel any more.
             let _gone = self.put(&close);
         }

@@ -2,7 +2,7 @@
 
 use super::SharedBus;
 use super::session::{Act, Protocol, Session};
-use harness_proto::can::Heard;
+use harness_proto::can::CanEvent;
 use harness_proto::time::{Instant, Span};
 use harness_sim::segment::Host;
 use std::collections::VecDeque;
@@ -53,11 +53,11 @@ struct Seat {
 struct Client {
     session: Session,
     /// What its station has heard of which the end is to come.
-    heard: VecDeque<(Instant, Heard)>,
+    heard: VecDeque<(Instant, CanEvent)>,
     /// For the client.
     outbox: VecDeque<u8>,
     /// What was heard last: an error that repeats is reported once.
-    last: Option<Heard>,
+    last: Option<CanEvent>,
     lost: u64,
 }
 
@@ -249,7 +249,7 @@ impl Client {
             && at <= now
         {
             self.heard.pop_front();
-            let repeats = matches!(heard, Heard::Error(_)) && self.last == Some(heard);
+            let repeats = matches!(heard, CanEvent::Error(_)) && self.last == Some(heard);
             self.last = Some(heard);
             if repeats {
                 continue;

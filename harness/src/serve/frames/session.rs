@@ -1,8 +1,8 @@
 //! A conversation with a client, without I/O: requests in; answers, and what the client's station hears, out.
 
-use crate::frames::slcan::{self, BitTiming, Command, Report, flags, rate_of};
+use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, flags, rate_of};
 use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, Stamp, class};
-use harness_proto::can::{BitRate, BusError, Frame, Heard};
+use harness_proto::can::{BitRate, CanError, CanEvent, Frame};
 use harness_proto::time::Instant;
 use std::time::Duration;
 
@@ -84,7 +84,7 @@ impl Session {
     }
 
     /// The client's station has heard something that ended at `at`.
-    pub(super) fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+    pub(super) fn hear(&mut self, at: Instant, heard: CanEvent, out: &mut Vec<u8>) {
         match self {
             Self::Slcan(adapter) => adapter.hear(at, heard, out),
             Self::Socketcand(daemon) => daemon.hear(at, heard, out),
@@ -131,9 +131,9 @@ impl Adapter {
             return;
         };
         let command = line.and_then(|(line, end)| match end {
-            slcan::CR => Command::parse(&line),
+            slcan::CR => SlcanCommand::parse(&line),
             // No host ends a command with BEL.
-            _ => Command::parse(&[&line[..], &[end]].concat()),
+            _ => SlcanCommand::parse(&[&line[..], &[end]].concat()),
         });
         let report = match command {
             Ok(command) => self.obey(command, acts),
@@ -145,36 +145,36 @@ impl Adapter {
         report.write(out);
     }
 
-    fn obey(&mut self, command: Command, acts: &mut Vec<Act>) -> Report {
+    fn obey(&mut self, command: SlcanCommand, acts: &mut Vec<Act>) -> Report {
         let closed = self.channel == Channel::Closed;
         match command {
-            Command::Nothing | Command::ReportAll => Report::Done,
-            Command::Version => Report::Version(VERSION.to_owned()),
-            Command::SerialNumber => Report::SerialNumber(SERIAL_NUMBER.to_owned()),
-            Command::Flags if !closed => Report::Flags(std::mem::take(&mut self.flags)),
-            Command::Send(frame) => self.send(frame, acts),
-            Command::Rate(code) if closed => self.choose(rate_of(code), acts),
-            Command::Timing(timing) if closed => self.choose(BitTiming::rate(timing), acts),
-            Command::TimeStamps(on) if closed => {
+            SlcanCommand::Nothing | SlcanCommand::ReportAll => Report::Done,
+            SlcanCommand::Version => Report::Version(VERSION.to_owned()),
+            SlcanCommand::SerialNumber => Report::SerialNumber(SERIAL_NUMBER.to_owned()),
+            SlcanCommand::Flags if !closed => Report::Flags(std::mem::take(&mut self.flags)),
+            SlcanCommand::Send(frame) => self.send(frame, acts),
+            SlcanCommand::Rate(code) if closed => self.choose(rate_of(code), acts),
+            SlcanCommand::Timing(timing) if closed => self.choose(BitTiming::rate(timing), acts),
+            SlcanCommand::TimeStamps(on) if closed => {
                 self.stamps = on;
                 Report::Done
             }
-            Command::Open if closed => self.open(false, acts),
-            Command::Listen if closed => self.open(true, acts),
-            Command::Close if !closed => {
+            SlcanCommand::Open if closed => self.open(false, acts),
+            SlcanCommand::Listen if closed => self.open(true, acts),
+            SlcanCommand::Close if !closed => {
                 self.channel = Channel::Closed;
                 self.flags = 0;
                 acts.push(Act::Leave);
                 Report::Done
             }
             // As adapters do: the rate and the stamps of an open channel stay, and what is open or closed cannot be that again.
-            Command::Rate(_)
-            | Command::Timing(_)
-            | Command::TimeStamps(_)
-            | Command::Open
-            | Command::Listen
-            | Command::Close
-            | Command::Flags => Report::Refused,
+            SlcanCommand::Rate(_)
+            | SlcanCommand::Timing(_)
+            | SlcanCommand::TimeStamps(_)
+            | SlcanCommand::Open
+            | SlcanCommand::Listen
+            | SlcanCommand::Close
+            | SlcanCommand::Flags => Report::Refused,
         }
     }
 
@@ -227,18 +227,18 @@ impl Adapter {
         Report::Taken { extended }
     }
 
-    fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+    fn hear(&mut self, at: Instant, heard: CanEvent, out: &mut Vec<u8>) {
         if !matches!(self.channel, Channel::Open | Channel::Listening) {
             return;
         }
         match heard {
-            Heard::Frame(frame) => {
+            CanEvent::Frame(frame) => {
                 let millis = at.since_start().as_nanos() / 1_000_000;
                 let stamp = (millis % u64::from(slcan::STAMP_PERIOD)) as u16;
                 Report::Frame(frame, self.stamps.then_some(stamp)).write(out);
             }
-            Heard::Error(BusError::ErrorFrame) => self.flags |= flags::BUS_ERROR,
-            Heard::Error(BusError::NoAcknowledge | BusError::BusOff) => {
+            CanEvent::Error(CanError::ErrorFrame) => self.flags |= flags::BUS_ERROR,
+            CanEvent::Error(CanError::NoAcknowledge | CanError::BusOff) => {
                 self.flags |= flags::BUS_ERROR | flags::PASSIVE;
             }
         }
@@ -308,7 +308,7 @@ impl Daemon {
         acts.push(Act::Say(refusal.to_owned()));
     }
 
-    fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+    fn hear(&mut self, at: Instant, heard: CanEvent, out: &mut Vec<u8>) {
         if self.mode != Mode::Raw {
             return;
         }
@@ -318,12 +318,12 @@ impl Daemon {
             micros: time.subsec_micros(),
         };
         let answer = match heard {
-            Heard::Frame(frame) => SocketcandAnswer::Frame(frame, stamp),
-            Heard::Error(error) => {
+            CanEvent::Frame(frame) => SocketcandAnswer::Frame(frame, stamp),
+            CanEvent::Error(error) => {
                 let class = match error {
-                    BusError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
-                    BusError::NoAcknowledge => class::NO_ACKNOWLEDGE,
-                    BusError::BusOff => class::BUS_OFF,
+                    CanError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
+                    CanError::NoAcknowledge => class::NO_ACKNOWLEDGE,
+                    CanError::BusOff => class::BUS_OFF,
                 };
                 SocketcandAnswer::ErrorFrame(class, stamp)
             }

@@ -7,7 +7,7 @@ use crate::novobus::address::passed_on;
 use crate::novobus::error_mode::{Climb, ErrorMode};
 use crate::novobus::memory::Memory;
 use crate::novobus::properties::{BrokenSequence, EmptyShortTelegram, ShortAddress};
-use crate::novobus::sync::{Addressing, Header, SyncByte};
+use crate::novobus::sync::{Addressing, SyncByte, TelegramHeader};
 use crate::time::Instant;
 
 /// What a drive keeps of the bytes that it passes on.
@@ -77,7 +77,7 @@ pub struct Passing {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Awaits {
     Sync,
-    Address(Header),
+    Address(TelegramHeader),
     Net(u8),
 }
 

@@ -9,7 +9,7 @@ use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
 use crate::novobus::checksum::Checksum;
 use crate::novobus::error_mode::UPSTREAM_ZEROS;
-use crate::novobus::sync::{Addressing, Header, PAUSE, SYNCO, SyncByte};
+use crate::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte, TelegramHeader};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
 
@@ -49,7 +49,7 @@ enum State {
     /// A sync byte.
     Sync,
     /// An address byte.
-    Address(Header),
+    Address(TelegramHeader),
     /// A net byte.
     Net {
         key: u8,
@@ -448,7 +448,7 @@ impl Guard {
     }
 
     /// Whether the addressed drive may be given process data: judged before the first of them, with the nominal speed 0.
-    fn may_have_process_data(&self, header: Header, key: u8) -> Result<(), Cause> {
+    fn may_have_process_data(&self, header: TelegramHeader, key: u8) -> Result<(), Cause> {
         if header.process_data() && key >= FIRST_ADDRESS {
             DriveAct::ProcessData(0).judge(&self.limits, self.known(key))?;
         }
@@ -521,7 +521,7 @@ fn in_doubt(byte: u8, behind_reset: bool) -> State {
 }
 
 /// The net bytes of a telegram.
-fn net(header: Header, key: u8) -> State {
+fn net(header: TelegramHeader, key: u8) -> State {
     match header.net_length() {
         0 => State::Sync,
         left => State::Net {

@@ -3,7 +3,7 @@
 
 use super::super::address::RingSize;
 use super::super::command::Kind;
-use super::super::sync::{Addressing, Header, MAX_NET_LENGTH, SYNCO, SyncByte};
+use super::super::sync::{Addressing, MAX_NET_LENGTH, SYNCO, SyncByte, TelegramHeader};
 use super::Master;
 use super::in_flight::{BytePlace, Composed, Owner, Slot};
 use crate::time::Instant;
@@ -105,7 +105,7 @@ impl Master {
     /// The telegram that counts the drives: with the address byte 00 no drive is meant, and the sum comes
     /// back as their number (ND21 9.3). It leaves no drive to which a short address could go.
     pub(super) fn compose_count(&mut self) {
-        let Ok(header) = Header::new(Addressing::AddressFollows, false, 1) else {
+        let Ok(header) = TelegramHeader::new(Addressing::AddressFollows, false, 1) else {
             return;
         };
         let sync = SyncByte::Telegram(header).encode();
@@ -157,7 +157,7 @@ impl Master {
         let addressing = self.addressing(drive);
         let length = u8::try_from(net_length).unwrap_or(MAX_NET_LENGTH);
         self.outgoing.clear();
-        let Ok(header) = Header::new(addressing, process_data, length) else {
+        let Ok(header) = TelegramHeader::new(addressing, process_data, length) else {
             return;
         };
         let sync = SyncByte::Telegram(header).encode();

@@ -6,7 +6,7 @@ use crate::record::{FrameEnd, LineFrame};
 use crate::segment::{FrameFault, Host, Placed, Segment};
 use crate::unitek::{Drive, Inputs, Member};
 use arbitrary::{Arbitrary, Unstructured};
-use harness_proto::can::{BitRate, BusError, ERROR_FRAME_BITS, Frame, Heard, Id};
+use harness_proto::can::{BitRate, CanError, CanEvent, ERROR_FRAME_BITS, Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{CYCLES, DEFAULT_RX, DEFAULT_TX};
 use harness_proto::unitek::properties::Properties;
@@ -286,8 +286,8 @@ impl Case {
         );
         let heard: Vec<_> = std::iter::from_fn(|| host.receive())
             .filter_map(|(at, heard)| match heard {
-                Heard::Frame(frame) => Some((at, frame)),
-                Heard::Error(_) => None,
+                CanEvent::Frame(frame) => Some((at, frame)),
+                CanEvent::Error(_) => None,
             })
             .collect();
         let waiting = host.waiting();
@@ -340,9 +340,9 @@ impl Case {
                 let what = match line.ended {
                     FrameEnd::Good => "good",
                     FrameEnd::Lost => "lost",
-                    FrameEnd::Error(BusError::ErrorFrame) => "error frame",
-                    FrameEnd::Error(BusError::NoAcknowledge) => "no acknowledge",
-                    FrameEnd::Error(BusError::BusOff) => "bus-off",
+                    FrameEnd::Error(CanError::ErrorFrame) => "error frame",
+                    FrameEnd::Error(CanError::NoAcknowledge) => "no acknowledge",
+                    FrameEnd::Error(CanError::BusOff) => "bus-off",
                 };
                 Feature::new(
                     "4.1",

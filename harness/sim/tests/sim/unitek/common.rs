@@ -1,6 +1,6 @@
 //! A desk: a host and a drive on one segment at 500 kbit/s.
 
-use harness_proto::can::{BitRate, Heard};
+use harness_proto::can::{BitRate, CanEvent};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
 use harness_sim::record::LineFrame;
@@ -69,8 +69,8 @@ impl Desk {
         let mut heard = Vec::new();
         while let Some((_, what)) = self.host().receive() {
             match what {
-                Heard::Frame(frame) => heard.push(frame.to_string()),
-                Heard::Error(error) => heard.push(error.to_string()),
+                CanEvent::Frame(frame) => heard.push(frame.to_string()),
+                CanEvent::Error(error) => heard.push(error.to_string()),
             }
         }
         heard

@@ -174,7 +174,7 @@ fn jobs(deviation: Option<&'static MasterDeviation>) -> Left {
             panic!("the host")
         };
         while let Some((at, heard)) = host.receive() {
-            if let harness_proto::can::Heard::Frame(frame) = heard {
+            if let harness_proto::can::CanEvent::Frame(frame) = heard {
                 master.handle_frame(at, &frame);
             }
         }

@@ -1,7 +1,7 @@
 //! The master against the simulated drive on a segment, with and without faults.
 
 use super::common::Desk;
-use harness_proto::can::{Frame, Heard};
+use harness_proto::can::{CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Options, Outcome, Refused};
 use harness_proto::unitek::properties::{Description, Properties, Setting};
@@ -38,7 +38,7 @@ impl Bench {
             self.now += Span::from_micros(50);
             self.desk.segment.run_until(self.now);
             while let Some((at, heard)) = self.desk.host().receive() {
-                if let Heard::Frame(frame) = heard {
+                if let CanEvent::Frame(frame) = heard {
                     self.master.handle_frame(at, &frame);
                 }
             }

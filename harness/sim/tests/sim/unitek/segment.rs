@@ -1,7 +1,7 @@
 //! The segment: arbitration, exact times, faults, error counters (ISO 11898-1).
 
 use super::common::Desk;
-use harness_proto::can::{BitRate, BusError, Frame, Heard};
+use harness_proto::can::{BitRate, CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
 use harness_sim::record::FrameEnd;
@@ -23,8 +23,8 @@ fn hosts(count: usize) -> Segment<Host> {
 fn heard(host: &mut Host) -> Vec<String> {
     std::iter::from_fn(|| host.receive())
         .map(|(_, what)| match what {
-            Heard::Frame(frame) => frame.to_string(),
-            Heard::Error(error) => error.to_string(),
+            CanEvent::Frame(frame) => frame.to_string(),
+            CanEvent::Error(error) => error.to_string(),
         })
         .collect()
 }
@@ -80,7 +80,7 @@ fn without_acknowledge() {
     assert!(ends.len() > 200, "{}", ends.len());
     assert!(
         ends.iter()
-            .all(|end| *end == FrameEnd::Error(BusError::NoAcknowledge))
+            .all(|end| *end == FrameEnd::Error(CanError::NoAcknowledge))
     );
     assert!(!segment.is_off(0));
     // 66 bits to the acknowledge slot, 17 of the error frame; passive, 8 more.
@@ -283,7 +283,7 @@ fn faults_are_counted_over_the_segment() {
         [
             (Some(2), FrameEnd::Good),
             (Some(1), FrameEnd::Lost),
-            (Some(0), FrameEnd::Error(BusError::ErrorFrame)),
+            (Some(0), FrameEnd::Error(CanError::ErrorFrame)),
             (Some(0), FrameEnd::Good),
         ]
     );

@@ -185,7 +185,7 @@ fn a_fault_is_named_and_acknowledged() {
     let mut bench = bench(BusRate::K500, &[slave(8, PpoType::One, &[])]);
     let cause = |on| {
         let own = Happening::Outside(Stimulus::Fault(3, on));
-        PlacedFault::Stimulus(8, buses::Stimulus::Nordac(own))
+        PlacedFault::Stimulus(8, buses::AnyStimulus::Nordac(own))
     };
     bench.inject(
         0,

@@ -75,8 +75,9 @@ fn send(bench: &mut Bench, setup: &Setup, sent: OutgoingTelegram) {
 
 /// What an act does to a slave from outside its bus.
 fn suffer(bench: &mut Bench, what: &TelegramActKind) {
-    let outside =
-        |slave, own| PlacedFault::Stimulus(slave, buses::Stimulus::Nordac(Happening::Outside(own)));
+    let outside = |slave, own| {
+        PlacedFault::Stimulus(slave, buses::AnyStimulus::Nordac(Happening::Outside(own)))
+    };
     let faults = match *what {
         TelegramActKind::Link { slave, found } => vec![outside(slave, Stimulus::Link(found))],
         TelegramActKind::Fault { slave, number, on } => {

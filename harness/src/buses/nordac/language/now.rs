@@ -30,7 +30,7 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), N
     let PlannedAction::Own(act) = &step.action else {
         return Err(NotNow::Refused(ONLY));
     };
-    let happen = |what| PlacedFault::Stimulus(0, buses::Stimulus::Nordac(what));
+    let happen = |what| PlacedFault::Stimulus(0, buses::AnyStimulus::Nordac(what));
     match act {
         PlannedAct::Fault(placed) => {
             let placed = bench.not_passed(*placed);
@@ -46,7 +46,7 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), N
             }
         }
         PlannedAct::Outside(slave, stimulus) => {
-            let what = buses::Stimulus::Nordac(Happening::Outside(*stimulus));
+            let what = buses::AnyStimulus::Nordac(Happening::Outside(*stimulus));
             bench.inject(0, PlacedFault::Stimulus(*slave, what), Moment::Now);
         }
         PlannedAct::Parameter(slave, parameter, raw) => {

@@ -3,7 +3,7 @@
 use super::Nordac;
 use super::jobs;
 use super::plan::{PlannedAct, PlannedParameter, SentTelegram, WantedOctet};
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::buses::nordac::simulate::{self, Bench};
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::medium::Out;
@@ -28,7 +28,7 @@ pub(super) fn begin(runner: &mut Runner<'_, Nordac>) {
 }
 
 fn inject(link: &mut dyn Link, placed: LineFaultAt) {
-    let what = Stimulus::Nordac(simulate::Happening::Line(placed));
+    let what = AnyStimulus::Nordac(simulate::Happening::Line(placed));
     link.inject(0, PlacedFault::Stimulus(0, what), Moment::Now);
 }
 
@@ -57,7 +57,7 @@ pub(super) fn act(
             happen(runner, now, &faults);
         }
         PlannedAct::Outside(slave, stimulus) => {
-            let what = Stimulus::Nordac(simulate::Happening::Outside(*stimulus));
+            let what = AnyStimulus::Nordac(simulate::Happening::Outside(*stimulus));
             happen(runner, now, &[PlacedFault::Stimulus(*slave, what)]);
         }
         PlannedAct::Quiet => {

@@ -3,7 +3,7 @@
 //! A case consists of acts in the manual's terms, so that it stays a valid conversation when it is mutated or shrunk. Checking bytes
 //! are computed when the bytes are made. A fault belongs to a byte of its act, wherever the act stands.
 
-use super::order::{Command, CommandSent};
+use super::order::{CommandSent, RawCommand};
 use crate::link::LinkFault;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
@@ -174,7 +174,7 @@ pub enum Harm {
 impl Talk {
     /// One command to a drive.
     #[must_use]
-    pub fn one(to: To, command: Command) -> Self {
+    pub fn one(to: To, command: RawCommand) -> Self {
         Self {
             to,
             process_data: None,
@@ -433,7 +433,7 @@ mod tests {
     /// ND21 9.7: `88 FE C0 13 FE D1` reads byte FE13 of drive 1 in a ring of three.
     #[test]
     fn a_talk_is_the_telegram_of_the_print() {
-        let talk = Talk::one(To::Drive(1), Command::ReadByte { cell: 0xFE13 });
+        let talk = Talk::one(To::Drive(1), RawCommand::ReadByte { cell: 0xFE13 });
         assert_eq!(
             talk.telegrams(3),
             [vec![0x88, 0xFE, 0xC0, 0x13, 0xFE, 0xD1]]
@@ -448,7 +448,7 @@ mod tests {
             room: 4,
             ..Talk::one(
                 To::Next,
-                Command::WriteWord {
+                RawCommand::WriteWord {
                     cell: 0xFF08,
                     data: 0xABCD,
                 },
@@ -470,7 +470,10 @@ mod tests {
             at: 2,
             harm: Harm::Drop,
         };
-        let read = ActKind::Talk(Talk::one(To::Drive(0), Command::ReadByte { cell: 0xFE13 }));
+        let read = ActKind::Talk(Talk::one(
+            To::Drive(0),
+            RawCommand::ReadByte { cell: 0xFE13 },
+        ));
         let mut case = Case {
             drives: 2,
             beside: None,

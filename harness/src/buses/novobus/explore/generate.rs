@@ -2,7 +2,7 @@
 
 use super::case::{Act, ActKind, Case, Damage, Harm, MOST_NET, OtherRing, Talk, To};
 use super::idiom::Idiom;
-use super::order::{Command, CommandSent, Spoil};
+use super::order::{CommandSent, RawCommand, Spoil};
 use crate::explore::Dice;
 use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
@@ -178,7 +178,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Whether the rig allows a command.
-    pub(crate) fn allows(&self, command: Command) -> bool {
+    pub(crate) fn allows(&self, command: RawCommand) -> bool {
         let act = command.act();
         let need = act.need();
         let eeprom = need.contains(Need::EEPROM) && !need.contains(Need::EVERYTHING);
@@ -186,7 +186,7 @@ impl<'s> Generator<'s> {
     }
 
     /// A command that changes something, where the rig allows one.
-    pub(crate) fn change(&self, dice: &mut Dice) -> Command {
+    pub(crate) fn change(&self, dice: &mut Dice) -> RawCommand {
         const CHANGES: [Spice; 5] = [
             Spice::WriteByte,
             Spice::WriteWord,
@@ -204,7 +204,7 @@ impl<'s> Generator<'s> {
             }
         }
         // Stop and block (ND21 14.10) are always allowed.
-        Command::WriteByte {
+        RawCommand::WriteByte {
             cell: ram::STATUS,
             data: status::BLOCK | status::STOP,
         }
@@ -224,7 +224,7 @@ impl<'s> Generator<'s> {
             31..34 if has(Spice::Silence) => ActKind::Talk(Talk::one(
                 self.to(dice),
                 // Time-outs are monitored from now on (14.4.3).
-                Command::Or {
+                RawCommand::Or {
                     low: ram::FLAGS2 as u8,
                     data: 0x04,
                 },
@@ -314,7 +314,7 @@ impl<'s> Generator<'s> {
         }
     }
 
-    fn command(&self, dice: &mut Dice) -> Command {
+    fn command(&self, dice: &mut Dice) -> RawCommand {
         let own = self.swarm.of(&Spice::COMMANDS);
         for _ in 0..8 {
             let command = match dice.pick(&own) {
@@ -326,12 +326,12 @@ impl<'s> Generator<'s> {
             }
         }
         // Reading is always allowed.
-        Command::ReadByte {
+        RawCommand::ReadByte {
             cell: self.cell(dice),
         }
     }
 
-    fn of_kind(&self, spice: Spice, dice: &mut Dice) -> Command {
+    fn of_kind(&self, spice: Spice, dice: &mut Dice) -> RawCommand {
         let cell = self.cell(dice);
         let low = match dice.percent(15) && self.swarm.has(Spice::Forbidden) {
             true => cell as u8 | 0x80,
@@ -342,23 +342,23 @@ impl<'s> Generator<'s> {
             false => dice.byte(),
         };
         match spice {
-            Spice::ReadWord => Command::ReadWord { cell },
-            Spice::ReadLong => Command::ReadLong { cell },
-            Spice::WriteByte => Command::WriteByte { cell, data },
-            Spice::WriteWord => Command::WriteWord {
+            Spice::ReadWord => RawCommand::ReadWord { cell },
+            Spice::ReadLong => RawCommand::ReadLong { cell },
+            Spice::WriteByte => RawCommand::WriteByte { cell, data },
+            Spice::WriteWord => RawCommand::WriteWord {
                 cell,
                 data: u16::from_be_bytes([dice.byte(), data]),
             },
-            Spice::And => Command::And { low, data },
-            Spice::Or => Command::Or { low, data },
-            Spice::WriteIo => Command::WriteIo {
+            Spice::And => RawCommand::And { low, data },
+            Spice::Or => RawCommand::Or { low, data },
+            Spice::WriteIo => RawCommand::WriteIo {
                 code: match dice.percent(15) && self.swarm.has(Spice::Forbidden) {
                     true => data,
                     false => data & 3,
                 },
             },
-            Spice::Reset if dice.percent(25) => Command::Reset,
-            _ => Command::ReadByte { cell },
+            Spice::Reset if dice.percent(25) => RawCommand::Reset,
+            _ => RawCommand::ReadByte { cell },
         }
     }
 
@@ -437,7 +437,7 @@ impl<'s> Generator<'s> {
             cells.truncate(2);
             for cell in cells {
                 let drive = dice.below(usize::from(self.ring.drives)) as u8;
-                let read = Command::ReadByte { cell };
+                let read = RawCommand::ReadByte { cell };
                 acts.push(Act::sound(ActKind::Talk(Talk::one(To::Drive(drive), read))));
             }
         }
@@ -470,7 +470,7 @@ fn leaves_doubt(act: &Act) -> bool {
     let spoiled = |talk: &Talk| {
         talk.orders
             .iter()
-            .any(|order| order.spoil.is_some() || order.command == Command::Reset)
+            .any(|order| order.spoil.is_some() || order.command == RawCommand::Reset)
     };
     let own = match &act.what {
         ActKind::Talk(talk) => spoiled(talk),

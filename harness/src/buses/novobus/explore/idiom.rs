@@ -2,7 +2,7 @@
 
 use super::case::{Act, ActKind, Damage, Harm, MOST_NET, Talk, To};
 use super::generate::Generator;
-use super::order::{Command, CommandSent, Spoil};
+use super::order::{CommandSent, RawCommand, Spoil};
 use crate::explore::Dice;
 use crate::explore::Spice;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
@@ -69,27 +69,27 @@ impl Idiom {
     }
 }
 
-fn talk(drive: u8, command: Command) -> Act {
+fn talk(drive: u8, command: RawCommand) -> Act {
     Act::sound(ActKind::Talk(Talk::one(To::Drive(drive), command)))
 }
 
 fn reset(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
     let cell = maker.cell(dice);
     let data = dice.byte() | 1;
-    acts.push(talk(drive, Command::WriteByte { cell, data }));
-    acts.push(talk(drive, Command::Reset));
+    acts.push(talk(drive, RawCommand::WriteByte { cell, data }));
+    acts.push(talk(drive, RawCommand::Reset));
     // The drive tests itself (11.8).
     acts.push(Act::sound(ActKind::Wait(120)));
-    acts.push(talk(drive, Command::ReadByte { cell }));
+    acts.push(talk(drive, RawCommand::ReadByte { cell }));
 }
 
 fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let address = u16::from(dice.byte()) << 8;
-    let buffer = |data| Command::WriteWord {
+    let buffer = |data| RawCommand::WriteWord {
         cell: ram::EEPROM_BUFFER,
         data,
     };
-    let control = |data| Command::WriteByte {
+    let control = |data| RawCommand::WriteByte {
         cell: ram::EEPROM_CONTROL,
         data,
     };
@@ -99,7 +99,7 @@ fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     acts.push(Act::sound(ActKind::Wait(15)));
     acts.push(talk(
         drive,
-        Command::ReadByte {
+        RawCommand::ReadByte {
             cell: ram::EEPROM_CONTROL,
         },
     ));
@@ -108,7 +108,7 @@ fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     acts.push(Act::sound(ActKind::Wait(5)));
     acts.push(talk(
         drive,
-        Command::ReadWord {
+        RawCommand::ReadWord {
             cell: ram::EEPROM_BUFFER,
         },
     ));
@@ -118,12 +118,12 @@ fn write_and_read(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &
     const PORT: u16 = 0xFFB7;
     let change = maker.change(dice);
     let cell = match change {
-        Command::And { low, .. } | Command::Or { low, .. } => 0xFF00 | u16::from(low),
+        RawCommand::And { low, .. } | RawCommand::Or { low, .. } => 0xFF00 | u16::from(low),
         other => other.cell().unwrap_or(PORT),
     };
     // Something is there before it, that the change can be told from.
-    if dice.percent(40) && !matches!(change, Command::WriteIo { .. }) {
-        let first = Command::WriteByte {
+    if dice.percent(40) && !matches!(change, RawCommand::WriteIo { .. }) {
+        let first = RawCommand::WriteByte {
             cell,
             data: dice.byte(),
         };
@@ -133,15 +133,15 @@ fn write_and_read(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &
     }
     acts.push(talk(drive, change));
     let read = match dice.below(3) {
-        0 => Command::ReadWord { cell },
-        1 => Command::ReadLong { cell },
-        _ => Command::ReadByte { cell },
+        0 => RawCommand::ReadWord { cell },
+        1 => RawCommand::ReadLong { cell },
+        _ => RawCommand::ReadByte { cell },
     };
     // What cannot be read as a word is an error (10.1), and that is worth a look too.
     acts.push(talk(
         drive,
         if cell == PORT {
-            Command::ReadByte { cell }
+            RawCommand::ReadByte { cell }
         } else {
             read
         },
@@ -153,21 +153,21 @@ fn exchange(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     if dice.percent(40) {
         acts.push(talk(
             drive,
-            Command::WriteByte {
+            RawCommand::WriteByte {
                 cell: ram::DATA_IN,
                 data: low,
             },
         ));
         acts.push(talk(
             drive,
-            Command::WriteByte {
+            RawCommand::WriteByte {
                 cell: ram::DATA_OUT,
                 data: low,
             },
         ));
     }
     for _ in 0..1 + dice.below(2) {
-        let mut one = Talk::one(To::Drive(drive), Command::ReadByte { cell: 0xFF08 });
+        let mut one = Talk::one(To::Drive(drive), RawCommand::ReadByte { cell: 0xFF08 });
         one.orders.clear();
         one.process_data = Some(dice.word());
         acts.push(Act::sound(ActKind::Talk(one)));
@@ -184,10 +184,10 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
         order.spoil = dice.percent(60).then_some(Spoil { at: 9, byte: 0 });
     } else {
         order.command = match dice.below(3) {
-            0 => Command::ReadByte {
+            0 => RawCommand::ReadByte {
                 cell: maker.cell(dice),
             },
-            1 => Command::ReadWord {
+            1 => RawCommand::ReadWord {
                 cell: maker.cell(dice),
             },
             _ => order.command,
@@ -218,12 +218,12 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
         Some(cell) => {
             // Whether it was done all the same (9.6).
             acts.push(Act::sound(ActKind::Recover));
-            acts.push(talk(drive, Command::ReadByte { cell }));
+            acts.push(talk(drive, RawCommand::ReadByte { cell }));
         }
     }
 }
 
-fn sum(command: Command) -> Checksum {
+fn sum(command: RawCommand) -> Checksum {
     Checksum::over(&command.head())
 }
 
@@ -241,7 +241,7 @@ fn error_mode(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut 
     }
     acts.push(talk(
         drive,
-        Command::ReadByte {
+        RawCommand::ReadByte {
             cell: maker.cell(dice),
         },
     ));
@@ -253,13 +253,13 @@ fn wrong(drive: u8, maker: &Generator<'_>, dice: &mut Dice) -> Act {
         0 => Act::sound(ActKind::Bytes(vec![dice.byte() & 0x7F])),
         1 => talk(
             drive,
-            Command::WriteByte {
+            RawCommand::WriteByte {
                 cell: 0x1234,
                 data: 0,
             },
         ),
         2 => {
-            let mut order = CommandSent::sound(Command::ReadByte { cell: 0xFE13 });
+            let mut order = CommandSent::sound(RawCommand::ReadByte { cell: 0xFE13 });
             order.spoil = Some(Spoil {
                 at: 9,
                 byte: dice.byte(),
@@ -294,13 +294,13 @@ fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &m
     acts.push(Act::sound(ActKind::Wait(1 + dice.below(3) as u16)));
     acts.push(talk(
         drive,
-        Command::ReadWord {
+        RawCommand::ReadWord {
             cell: ram::ERRORCODE,
         },
     ));
-    acts.push(talk(drive, Command::ReadByte { cell: ram::STATUS }));
+    acts.push(talk(drive, RawCommand::ReadByte { cell: ram::STATUS }));
     if dice.percent(50) {
-        let confirm = Command::WriteByte {
+        let confirm = RawCommand::WriteByte {
             cell: ram::ERRORCODE,
             data: CONFIRM_ERROR,
         };
@@ -309,17 +309,17 @@ fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &m
             acts.push(Act::sound(ActKind::Wait(2)));
             acts.push(talk(
                 drive,
-                Command::ReadWord {
+                RawCommand::ReadWord {
                     cell: ram::ERRORCODE,
                 },
             ));
-            acts.push(talk(drive, Command::ReadByte { cell: ram::STATUS }));
+            acts.push(talk(drive, RawCommand::ReadByte { cell: ram::STATUS }));
         }
     }
 }
 
 fn time_out(acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
-    let monitor = Command::Or {
+    let monitor = RawCommand::Or {
         low: ram::FLAGS2 as u8,
         data: flags2::MONITORING,
     };
@@ -339,15 +339,15 @@ fn time_out(acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
     acts.push(Act::sound(ActKind::Recover));
     acts.push(talk(
         drive,
-        Command::ReadWord {
+        RawCommand::ReadWord {
             cell: ram::ERRORCODE,
         },
     ));
-    acts.push(talk(drive, Command::ReadByte { cell: ram::FLAGS2 }));
+    acts.push(talk(drive, RawCommand::ReadByte { cell: ram::FLAGS2 }));
     let flags = ram::FLAGS2 as u8;
     acts.push(talk(
         drive,
-        Command::And {
+        RawCommand::And {
             low: flags,
             data: !flags2::MONITORING,
         },
@@ -360,7 +360,7 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
         let data = 1 << (9 + dice.below(5));
         acts.push(talk(
             drive,
-            Command::WriteWord {
+            RawCommand::WriteWord {
                 cell: ram::N_MAX,
                 data,
             },
@@ -369,7 +369,7 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let low = ram::STATUS as u8;
     acts.push(talk(
         drive,
-        Command::And {
+        RawCommand::And {
             low,
             data: !(status::BLOCK | status::STOP),
         },
@@ -377,7 +377,7 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let data = (1 << (8 + dice.below(6))) ^ if dice.percent(50) { 0xFFFF } else { 0 };
     acts.push(talk(
         drive,
-        Command::WriteWord {
+        RawCommand::WriteWord {
             cell: ram::NSOLL,
             data,
         },
@@ -395,14 +395,14 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
         ];
         for _ in 0..2 {
             let cell = seen[dice.below(seen.len())];
-            acts.push(talk(drive, Command::ReadWord { cell }));
+            acts.push(talk(drive, RawCommand::ReadWord { cell }));
         }
     }
     if dice.percent(50) {
         let data = [status::STOP, status::BLOCK][dice.below(2)];
-        acts.push(talk(drive, Command::Or { low, data }));
+        acts.push(talk(drive, RawCommand::Or { low, data }));
         acts.push(Act::sound(ActKind::Wait(30)));
-        acts.push(talk(drive, Command::ReadWord { cell: ram::NIST }));
+        acts.push(talk(drive, RawCommand::ReadWord { cell: ram::NIST }));
     }
 }
 
@@ -411,7 +411,7 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let low = ram::STATUS as u8;
     acts.push(talk(
         drive,
-        Command::And {
+        RawCommand::And {
             low,
             data: !(status::BLOCK | status::STOP),
         },
@@ -419,7 +419,7 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     // The rotor's present place is where it is (13.2.1.3).
     acts.push(talk(
         drive,
-        Command::WriteByte {
+        RawCommand::WriteByte {
             cell: ram::PS_STATUS,
             data: ps_status::FINISHED,
         },
@@ -427,21 +427,21 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let turns = u16::from(dice.byte() & 3);
     acts.push(talk(
         drive,
-        Command::WriteWord {
+        RawCommand::WriteWord {
             cell: ram::PS_POSITION_H,
             data: turns,
         },
     ));
     acts.push(talk(
         drive,
-        Command::WriteWord {
+        RawCommand::WriteWord {
             cell: ram::PS_POSITION_L,
             data: dice.word(),
         },
     ));
     acts.push(talk(
         drive,
-        Command::Or {
+        RawCommand::Or {
             low: ram::FLAGS2 as u8,
             data: flags2::CALCULATE,
         },
@@ -449,7 +449,7 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     acts.push(Act::sound(ActKind::Wait(60)));
     acts.push(talk(
         drive,
-        Command::Or {
+        RawCommand::Or {
             low: ram::PS_STATUS as u8,
             data: ps_status::START,
         },
@@ -457,9 +457,9 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     acts.push(Act::sound(ActKind::Wait(200 + dice.below(400) as u16)));
     acts.push(talk(
         drive,
-        Command::ReadByte {
+        RawCommand::ReadByte {
             cell: ram::PS_STATUS,
         },
     ));
-    acts.push(talk(drive, Command::ReadLong { cell: ram::UMDRIST }));
+    acts.push(talk(drive, RawCommand::ReadLong { cell: ram::UMDRIST }));
 }

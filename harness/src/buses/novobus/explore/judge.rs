@@ -3,7 +3,7 @@
 use super::case::{Act, ActKind, Case, Harm, OtherRing, Talk, To};
 use super::expect::{Both, Must, RingModel};
 use super::oracle::{Difference, sent};
-use super::order::Command;
+use super::order::RawCommand;
 use crate::buses::novobus::twin;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 /// The first conversation with drives that were made ready: a telegram that addresses no drive, after which every drive knows its
 /// address (ND21 9.3).
 pub(crate) fn prologue(drives: u8, beside: Option<OtherRing>) -> Case {
-    let read = Command::ReadByte { cell: 0xFE13 };
+    let read = RawCommand::ReadByte { cell: 0xFE13 };
     Case {
         drives,
         beside,

@@ -37,7 +37,7 @@ pub use on_record::AttemptRecord;
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
 pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
-pub use order::{Command, CommandSent, Spoil};
+pub use order::{CommandSent, RawCommand, Spoil};
 pub use page::page;
 pub use play::{MasterView, play};
 pub use setup::{Planted, RingSetup};

@@ -2,7 +2,7 @@
 
 use super::case::{Act, ActKind, Case, To};
 use super::generate::Generator;
-use super::order::{Command, CommandSent};
+use super::order::{CommandSent, RawCommand};
 use crate::explore::Dice;
 
 /// A case made of one that is kept, and now and then of two.
@@ -110,15 +110,15 @@ fn like(order: &CommandSent, maker: &Generator<'_>, dice: &mut Dice) -> CommandS
     let new = maker.order(dice);
     let cell = match (order.command.cell(), order.command) {
         (Some(cell), _) => cell,
-        (None, Command::And { low, .. } | Command::Or { low, .. }) => 0xFF00 | u16::from(low),
+        (None, RawCommand::And { low, .. } | RawCommand::Or { low, .. }) => 0xFF00 | u16::from(low),
         _ => return new,
     };
     let command = match new.command {
-        Command::ReadByte { .. } => Command::ReadByte { cell },
-        Command::ReadWord { .. } => Command::ReadWord { cell },
-        Command::ReadLong { .. } => Command::ReadLong { cell },
+        RawCommand::ReadByte { .. } => RawCommand::ReadByte { cell },
+        RawCommand::ReadWord { .. } => RawCommand::ReadWord { cell },
+        RawCommand::ReadLong { .. } => RawCommand::ReadLong { cell },
         other if dice.percent(50) => other,
-        _ => Command::ReadByte { cell },
+        _ => RawCommand::ReadByte { cell },
     };
     CommandSent {
         command,

@@ -4,7 +4,7 @@
 use super::case::{ActKind, Case, Harm, OtherRing};
 use super::judge::{BytesExchanged, Judge, prologue};
 use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, is_silenced, untimely};
-use super::order::{Command, CommandSent};
+use super::order::{CommandSent, RawCommand};
 use super::play::MasterView;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::run::over_bus::monitors;
@@ -402,5 +402,5 @@ fn beside_of(rings: &[RingSize], ring: usize) -> Option<OtherRing> {
 }
 
 fn resets(order: &CommandSent) -> bool {
-    order.command == Command::Reset && order.spoil.is_none()
+    order.command == RawCommand::Reset && order.spoil.is_none()
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct CommandSent {
     /// Which.
     #[serde(flatten)]
-    pub command: Command,
+    pub command: RawCommand,
     /// A byte of it that is put wrong after its checking byte was worked out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoil: Option<Spoil>,
@@ -28,7 +28,7 @@ pub struct Spoil {
 /// A command of chapter 10 with any parameters, proper or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case")]
-pub enum Command {
+pub enum RawCommand {
     /// 10.1.
     ReadByte {
         /// The address.
@@ -81,7 +81,7 @@ pub enum Command {
     Reset,
 }
 
-impl Command {
+impl RawCommand {
     /// Its bytes without the checking byte.
     #[must_use]
     pub fn head(self) -> Vec<u8> {
@@ -190,7 +190,7 @@ impl Command {
 impl CommandSent {
     /// A command as it should be.
     #[must_use]
-    pub const fn sound(command: Command) -> Self {
+    pub const fn sound(command: RawCommand) -> Self {
         Self {
             command,
             spoil: None,

@@ -6,7 +6,7 @@
 
 use super::case::{Act, ActKind, Case, Harm, MOST_NET, OtherRing, Talk, To};
 use super::oracle::Difference;
-use super::order::{Command, CommandSent};
+use super::order::{CommandSent, RawCommand};
 use super::setup::RingSetup;
 use crate::explore::ExploreError;
 use harness_proto::novobus::memory::RAM;
@@ -452,14 +452,16 @@ fn shorten(what: &mut ActKind, length: usize) {
 }
 
 /// Commands with fewer bytes to the same cell.
-fn shorter(command: Command) -> Vec<Command> {
+fn shorter(command: RawCommand) -> Vec<RawCommand> {
     match command {
-        Command::ReadWord { cell } => vec![Command::ReadByte { cell }],
-        Command::ReadLong { cell } => vec![Command::ReadByte { cell }, Command::ReadWord { cell }],
-        Command::WriteByte { cell, .. } => vec![Command::ReadByte { cell }],
-        Command::WriteWord { cell, data } => vec![
-            Command::ReadByte { cell },
-            Command::WriteByte {
+        RawCommand::ReadWord { cell } => vec![RawCommand::ReadByte { cell }],
+        RawCommand::ReadLong { cell } => {
+            vec![RawCommand::ReadByte { cell }, RawCommand::ReadWord { cell }]
+        }
+        RawCommand::WriteByte { cell, .. } => vec![RawCommand::ReadByte { cell }],
+        RawCommand::WriteWord { cell, data } => vec![
+            RawCommand::ReadByte { cell },
+            RawCommand::WriteByte {
                 cell,
                 data: data as u8,
             },
@@ -469,19 +471,21 @@ fn shorter(command: Command) -> Vec<Command> {
 }
 
 /// The same command with lower values: the data 0 or 1.
-fn lower(command: Command) -> Vec<Command> {
+fn lower(command: RawCommand) -> Vec<RawCommand> {
     match command {
-        Command::WriteByte { cell, data } => {
+        RawCommand::WriteByte { cell, data } => {
             let data = [0, 1].into_iter().filter(|new| *new < data);
-            data.map(|data| Command::WriteByte { cell, data }).collect()
+            data.map(|data| RawCommand::WriteByte { cell, data })
+                .collect()
         }
-        Command::WriteWord { cell, data } => {
+        RawCommand::WriteWord { cell, data } => {
             let data = [0, 1, 0x0100].into_iter().filter(|new| *new < data);
-            data.map(|data| Command::WriteWord { cell, data }).collect()
+            data.map(|data| RawCommand::WriteWord { cell, data })
+                .collect()
         }
-        Command::And { low, data } if data > 0 => vec![Command::And { low, data: 0 }],
-        Command::Or { low, data } if data > 1 => vec![Command::Or { low, data: 1 }],
-        Command::WriteIo { code } if code > 0 => vec![Command::WriteIo { code: 0 }],
+        RawCommand::And { low, data } if data > 0 => vec![RawCommand::And { low, data: 0 }],
+        RawCommand::Or { low, data } if data > 1 => vec![RawCommand::Or { low, data: 1 }],
+        RawCommand::WriteIo { code } if code > 0 => vec![RawCommand::WriteIo { code: 0 }],
         _ => Vec::new(),
     }
 }

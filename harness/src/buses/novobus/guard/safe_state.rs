@@ -13,7 +13,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
-use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
+use harness_proto::novobus::sync::{Addressing, SyncByte, TelegramHeader};
 use harness_proto::time::{Instant, Span};
 use std::cell::Cell;
 use std::fmt;
@@ -339,7 +339,7 @@ pub fn blind_stop(size: RingSize) -> Vec<u8> {
 pub(crate) fn telegram(size: RingSize, drive: u8, command: Command) -> Vec<u8> {
     let net = command.encode();
     let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
-    let header = Header::new(Addressing::AddressFollows, false, length);
+    let header = TelegramHeader::new(Addressing::AddressFollows, false, length);
     let (Ok(header), Ok(address)) = (header, size.address_byte(drive)) else {
         return Vec::new();
     };

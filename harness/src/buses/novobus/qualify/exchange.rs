@@ -1,7 +1,7 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
-use crate::buses::novobus::language::syntax::{self, FaultStep, LinkEnds, RingStep};
+use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
@@ -11,7 +11,7 @@ use crate::scenario::write::Text;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
+use harness_proto::novobus::sync::{Addressing, SyncByte, TelegramHeader};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
 use std::collections::BTreeMap;
@@ -182,8 +182,11 @@ impl Sent {
                             let drive = self.roles.get(index + 1)?.drive()?;
                             let (process_data, length) =
                                 (header.process_data(), header.net_length());
-                            let header =
-                                Header::new(Addressing::AddressFollows, process_data, length);
+                            let header = TelegramHeader::new(
+                                Addressing::AddressFollows,
+                                process_data,
+                                length,
+                            );
                             let sync = SyncByte::Telegram(header.ok()?).encode();
                             (sync, Some(drive.wrapping_sub(drives)))
                         }
@@ -282,7 +285,7 @@ impl Sent {
     fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
         let title = format!("The same conversation, each telegram {step} addresses on");
         let mut text: Text = Text::default();
-        text.header(&Scenario::new(&title, syntax::Header::of_rings(&[drives])));
+        text.header(&Scenario::new(&title, Header::of_rings(&[drives])));
         text.empty_line();
         let mut left = bytes.iter().map(|(byte, _)| Expected::Byte(*byte));
         // Bytes stand together up to a gap or a fault.

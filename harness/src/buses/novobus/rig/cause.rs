@@ -3,7 +3,7 @@
 //! [`cause`] is a pure function of what was heard.
 
 use super::health::Unhealthy;
-use super::line_test::{Heard, Pass, RingPace, SENT, pace_of};
+use super::line_test::{LineTestBytes, Pass, RingPace, SENT, pace_of};
 use crate::buses::novobus::locate::locate;
 use crate::medium::ErrorMarks;
 use crate::rig::Rig;
@@ -106,7 +106,7 @@ pub enum LikelyCause {
 }
 
 /// The likely cause, from what the health check and the line test found.
-pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> LikelyCause {
+pub(crate) fn cause(ill: &Unhealthy, heard: &LineTestBytes, stated: Rate) -> LikelyCause {
     if !heard.unasked.is_empty() {
         return unasked(&heard.unasked);
     }
@@ -251,14 +251,14 @@ mod tests {
             .collect()
     }
 
-    fn heard(first: Vec<Received>, second: Vec<Received>) -> Heard {
-        Heard {
+    fn heard(first: Vec<Received>, second: Vec<Received>) -> LineTestBytes {
+        LineTestBytes {
             unasked: Vec::new(),
             passes: [pass_of(first), pass_of(second)],
         }
     }
 
-    fn named(ill: &Unhealthy, heard: &Heard) -> LikelyCause {
+    fn named(ill: &Unhealthy, heard: &LineTestBytes) -> LikelyCause {
         cause(ill, heard, Rate::Baud38400)
     }
 
@@ -311,18 +311,18 @@ mod tests {
         let nothing = heard(Vec::new(), Vec::new());
         assert_eq!(named(&Unhealthy::Silent, &nothing), LikelyCause::Nobody);
 
-        let unasked = |bytes: &[u8]| Heard {
+        let unasked = |bytes: &[u8]| LineTestBytes {
             unasked: bytes.iter().copied().map(Received::good).collect(),
-            ..Heard::default()
+            ..LineTestBytes::default()
         };
         assert_eq!(named(&FOREIGN(), &unasked(&[0; 9])), LikelyCause::Babbling);
         assert_eq!(
             named(&FOREIGN(), &unasked(&[0, 0x55, 0])),
             LikelyCause::Noise
         );
-        let held = Heard {
+        let held = LineTestBytes {
             unasked: vec![Received::bad(0, LineError::Framing); 9],
-            ..Heard::default()
+            ..LineTestBytes::default()
         };
         assert_eq!(named(&FOREIGN(), &held), LikelyCause::HeldLine);
 

@@ -20,7 +20,7 @@ use harness_sim::novobus::deviation;
 const MOST_ADOPTED: usize = 8;
 
 /// What is known of an attempt besides its outcome.
-pub(crate) struct Heard<'h> {
+pub(crate) struct AttemptFacts<'h> {
     /// The rig.
     pub(crate) rig: &'h Rig,
     /// The scenario.
@@ -43,9 +43,9 @@ pub(crate) struct Heard<'h> {
 /// deviation is known. Where no byte differs, what the scenario found stands, unless the drive's own state, a known deviation or the
 /// computer's time explains it. Returns the choices of the manual with which the drives were compared instead of the model's defaults, if
 /// they show before the scenario begins.
-pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanation> {
+pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<Explanation> {
     let mut assumed = None;
-    let comparisons = || heard.comparisons.iter();
+    let comparisons = || facts.comparisons.iter();
     for adopted in comparisons().flat_map(|c| &c.adopted).take(MOST_ADOPTED) {
         outcome.remarks.push(format!(
             "cell {:04X} of drive {} holds {:02X}, which the model did not know",
@@ -56,21 +56,21 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanat
     let untimely = comparisons().find_map(|c| c.untimely.as_ref());
     match (outcome.verdict, divergence, untimely) {
         _ if outcome.unready.is_some() => {
-            not_ready(outcome, divergence, heard);
+            not_ready(outcome, divergence, facts);
         }
         (
             Verdict::Passed | Verdict::Failed | Verdict::Marginal | Verdict::Inconclusive,
             Some(divergence),
             _,
-        ) => assumed = diverged(outcome, divergence, heard),
-        (Verdict::Failed, None, untimely) => failed_alike(outcome, untimely, heard),
+        ) => assumed = diverged(outcome, divergence, facts),
+        (Verdict::Failed, None, untimely) => failed_alike(outcome, untimely, facts),
         (Verdict::Passed, None, Some(untimely)) => {
             outcome.verdict = Verdict::Marginal;
             outcome.remarks.push(format!("the model: {untimely}"));
         }
         _ => {}
     }
-    if heard.unplaced > 0
+    if facts.unplaced > 0
         && matches!(
             outcome.verdict,
             Verdict::Passed | Verdict::Failed | Verdict::Marginal
@@ -79,7 +79,7 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanat
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(format!(
             "{} line errors were reported without their bytes: the transport cannot show which bytes they damaged",
-            heard.unplaced
+            facts.unplaced
         ));
     }
     assumed
@@ -87,14 +87,14 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanat
 
 /// Judges an attempt whose drives could not be made ready. No step was played, so it cannot pass: neither with a known deviation, nor
 /// with a twin that could not be made ready either.
-fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Heard<'_>) {
+fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, facts: &AttemptFacts<'_>) {
     match divergence {
         Some(divergence) => {
-            diverged(outcome, divergence, heard);
+            diverged(outcome, divergence, facts);
         }
         None if outcome.verdict == Verdict::Failed => {
             outcome.verdict = Verdict::Inconclusive;
-            let known = heard.rig.file.deviation.iter();
+            let known = facts.rig.file.deviation.iter();
             outcome.remarks.extend(known.map(told));
             let why = "the model of the manual could not be made ready either";
             outcome.remarks.push(why.to_owned());
@@ -110,10 +110,10 @@ fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Hea
 fn diverged(
     outcome: &mut Outcome,
     divergence: &Divergence,
-    heard: &Heard<'_>,
+    facts: &AttemptFacts<'_>,
 ) -> Option<Explanation> {
     let rule = format!("nd21 {}", divergence.role.rule().0);
-    let mut known = heard.rig.file.deviation.iter();
+    let mut known = facts.rig.file.deviation.iter();
     let explains = |entry: &&Deviation| {
         let drives = &entry.drives;
         let may_be = divergence.drive.or(divergence.role.drive());
@@ -129,7 +129,7 @@ fn diverged(
             }
             outcome.remarks.push(told(entry));
         }
-        None => match left_open::explanation(heard) {
+        None => match left_open::explanation(facts) {
             Some(found) if found.comparisons.iter().any(|own| own.silenced) => {
                 outcome.verdict = Verdict::Inconclusive;
                 outcome.remarks.push(format!(
@@ -149,7 +149,7 @@ fn diverged(
                     found.words
                 ));
             }
-            None if heard.comparisons.iter().any(|own| own.silenced) => {
+            None if facts.comparisons.iter().any(|own| own.silenced) => {
                 outcome.verdict = Verdict::Inconclusive;
                 outcome.remarks.push(SILENCED.to_owned());
             }
@@ -181,15 +181,15 @@ fn compared_with(found: &Explanation, outcome: &mut Outcome) {
 }
 
 /// The scenario failed, and the drives gave every byte that the twin gave.
-fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &Heard<'_>) {
+fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &AttemptFacts<'_>) {
     let Some(finding) = &outcome.finding else {
         return;
     };
-    if explained_by_known(finding, heard) {
+    if explained_by_known(finding, facts) {
         outcome.verdict = Verdict::Passed;
-        let known = heard.rig.file.deviation.iter();
+        let known = facts.rig.file.deviation.iter();
         outcome.remarks.extend(known.map(told));
-    } else if let Some(own) = of_the_drive(finding, heard) {
+    } else if let Some(own) = of_the_drive(finding, facts) {
         outcome.verdict = Verdict::Inconclusive;
         let what = match own.address {
             Some(address) => format!("cell {address:04X}"),
@@ -199,35 +199,35 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
             "{what} of drive {} depends on the drive's own state, which the scenario does not set; set it in the header, or write it first",
             own.drive
         ));
-    } else if in_a_race(finding, heard) {
+    } else if in_a_race(finding, facts) {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(
             "drives sent bytes unasked (ND21 9.9); their order depends on the drives' clocks, and the model cannot tell it"
                 .to_owned(),
         );
-    } else if heard.exactness.tolerance > Span::ZERO
-        && heard.comparisons.iter().any(|own| own.monitored)
-        && passes(heard.rig, heard)
+    } else if facts.exactness.tolerance > Span::ZERO
+        && facts.comparisons.iter().any(|own| own.monitored)
+        && passes(facts.rig, facts)
     {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(
             "every byte is as the model says for these times, and the scenario passes on the model: the drives monitor time-outs (ND21 9.9), and the computer left the line silent"
                 .to_owned(),
         );
-    } else if passes_with_defaults(heard) {
+    } else if passes_with_defaults(facts) {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(
             "it passes on drives with the model's defaults: the rig's drives differ where the manual leaves the choice open"
                 .to_owned(),
         );
-    } else if heard.exactness.knows_cells && passes(heard.rig, heard) {
+    } else if facts.exactness.knows_cells && passes(facts.rig, facts) {
         outcome.remarks.push(
             "it passes on drives that have just been switched on: what was played before left these in another state; set the cell in the header, or permit resets in the rig's [limits]"
                 .to_owned(),
         );
     } else if let Some(untimely) = untimely
         && (finding.difference.as_ref()).is_none_or(ByteDifference::is_absence)
-        && heard.exactness.tolerance > Span::ZERO
+        && facts.exactness.tolerance > Span::ZERO
     {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(format!(
@@ -242,49 +242,49 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
 }
 
 /// The outcome of the scenario on a rig's model with drives that have just been switched on and have these known deviations.
-fn switched_on(rig: &Rig, header: &Header, heard: &Heard<'_>) -> Option<Outcome> {
+fn switched_on(rig: &Rig, header: &Header, facts: &AttemptFacts<'_>) -> Option<Outcome> {
     let mut link = twin(rig, header).ok()?.into_link();
     let mut forgotten: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut forgotten);
-    play_one(&mut recording, heard.plan, heard.way).ok()
+    play_one(&mut recording, facts.plan, facts.way).ok()
 }
 
-fn passes(rig: &Rig, heard: &Heard<'_>) -> bool {
-    let outcome = switched_on(rig, &known(rig), heard);
+fn passes(rig: &Rig, facts: &AttemptFacts<'_>) -> bool {
+    let outcome = switched_on(rig, &known(rig), facts);
     outcome.is_some_and(|outcome| outcome.verdict == Verdict::Passed)
 }
 
 /// Whether the rig's file or its profile settles properties that the manual leaves open, and the scenario passes without them but not with
 /// them, on drives that have just been switched on: what was played before explains nothing here.
-fn passes_with_defaults(heard: &Heard<'_>) -> bool {
+fn passes_with_defaults(facts: &AttemptFacts<'_>) -> bool {
     let settles = |own: &Setup| own.sets().is_some();
-    let mut rig = heard.rig.clone();
+    let mut rig = facts.rig.clone();
     let settled = rig.profile.take().is_some() | rig.setup.setups.iter().any(settles);
     rig.setup = rig.setup.only(|own| !settles(own));
-    settled && !passes(heard.rig, heard) && passes(&rig, heard)
+    settled && !passes(facts.rig, facts) && passes(&rig, facts)
 }
 
 /// Whether the scenario passes on the model of the manual and fails at the same line on the model with the known deviations.
-fn explained_by_known(finding: &Mismatch, heard: &Heard<'_>) -> bool {
-    let deviations = known(heard.rig);
+fn explained_by_known(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
+    let deviations = known(facts.rig);
     let fails_alike = |outcome: Outcome| {
         let found = outcome.finding;
         found.is_some_and(|found| found.span == finding.span)
     };
     !deviations.is_empty()
-        && switched_on(heard.rig, &Header::default(), heard)
+        && switched_on(facts.rig, &Header::default(), facts)
             .is_some_and(|right| right.verdict == Verdict::Passed)
-        && switched_on(heard.rig, &deviations, heard).is_some_and(fails_alike)
+        && switched_on(facts.rig, &deviations, facts).is_some_and(fails_alike)
 }
 
 /// Whether a finding may be about bytes of the scenario's own conversation, behind the first one of that ring that a drive sent unasked.
-fn in_a_race(finding: &Mismatch, heard: &Heard<'_>) -> bool {
-    let compared = heard.conversations.iter().zip(heard.comparisons);
+fn in_a_race(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
+    let compared = facts.conversations.iter().zip(facts.comparisons);
     let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
     let compared = of_scenario.clone().next();
     if compared.is_none_or(|(_, comparison)| comparison.left_out) {
         // A race before the scenario: its ring has not been compared since.
-        let mut before = heard.comparisons.iter().flat_map(|own| &own.unasked);
+        let mut before = facts.comparisons.iter().flat_map(|own| &own.unasked);
         let ring = finding.difference.as_ref().map(|found| found.ring);
         return before.any(|race| ring.is_none_or(|ring| race.ring == ring));
     }
@@ -299,9 +299,9 @@ fn in_a_race(finding: &Mismatch, heard: &Heard<'_>) -> bool {
 
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
 /// that the line of the finding asked for. The cells of the scenario's header are not the drive's own.
-fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h OwnByte> {
+fn of_the_drive<'h>(finding: &Mismatch, facts: &AttemptFacts<'h>) -> Option<&'h OwnByte> {
     let set = |own: &OwnByte| {
-        let mut setups = heard.plan.memory_setups();
+        let mut setups = facts.plan.memory_setups();
         setups.any(|(ring, drives, from, bytes)| {
             let offset = own.address.and_then(|address| address.checked_sub(from));
             let within = offset.is_some_and(|offset| usize::from(offset) < bytes.len());
@@ -322,7 +322,7 @@ fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h OwnByte
         }
         None => conversation.step_at(own.ring, own.place) == Some(finding.span.start),
     };
-    let compared = heard.conversations.iter().zip(heard.comparisons);
+    let compared = facts.conversations.iter().zip(facts.comparisons);
     let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
     let mut all = of_scenario.flat_map(|(conversation, comparison)| {
         comparison.own.iter().map(move |own| (conversation, own))

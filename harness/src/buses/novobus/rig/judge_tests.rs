@@ -1,6 +1,6 @@
 //! Verdicts of attempts on rings in virtual time that are seen as through a port.
 
-use super::{Heard, judge, known};
+use super::{AttemptFacts, judge, known};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
@@ -101,7 +101,7 @@ pub(super) fn judged_early(
     let mut twin = twin(&rig, &known(&rig)).expect("a twin");
     let (mut comparisons, _) = twin.follow_all(&conversations, exactness);
     change(&mut comparisons);
-    let heard = Heard {
+    let facts = AttemptFacts {
         rig: &rig,
         plan,
         way,
@@ -111,7 +111,7 @@ pub(super) fn judged_early(
         unplaced: 0,
         alive: &|| {},
     };
-    judge(&mut outcome, &heard);
+    judge(&mut outcome, &facts);
     outcome
 }
 
@@ -573,7 +573,7 @@ fn judged_simulated(setup: &[&str], before: &str, scenario: &str) -> Outcome {
         let all = Conversation::all(&events, byte_time, true);
         let (conversations, _) = way.compared(all, exactness);
         let (comparisons, _) = twin.follow_all(&conversations, exactness);
-        let heard = Heard {
+        let facts = AttemptFacts {
             rig: &rig,
             plan: &plan,
             way: &way,
@@ -583,7 +583,7 @@ fn judged_simulated(setup: &[&str], before: &str, scenario: &str) -> Outcome {
             unplaced: 0,
             alive: &|| {},
         };
-        judge(&mut outcome, &heard);
+        judge(&mut outcome, &facts);
         last = Some(outcome);
     }
     last.expect("two were played")

@@ -2,7 +2,7 @@
 //!
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
-use super::judge::{Heard, known};
+use super::judge::{AttemptFacts, known};
 use crate::buses::novobus::choice::{Choice, of_drives, of_the_bus};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::language::write::ring_prefix;
@@ -27,33 +27,33 @@ pub(crate) struct Explanation {
 }
 
 /// The choices that explain every byte of an attempt; `None` where the model's defaults explain them as well, or where no choice does.
-pub(crate) fn explanation(heard: &Heard<'_>) -> Option<Explanation> {
-    let real = heard.exactness.tolerance > Span::ZERO && !heard.exactness.knows_cells;
+pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
+    let real = facts.exactness.tolerance > Span::ZERO && !facts.exactness.knows_cells;
     if !real {
         return None;
     }
-    let (mut first, monitored) = compare(&Header::default(), heard).err()?;
-    let mut open = choices(heard.rig);
+    let (mut first, monitored) = compare(&Header::default(), facts).err()?;
+    let mut open = choices(facts.rig);
     open.retain(|choice| choice.property != "time-out" || monitored);
     let (mut header, mut chosen) = (Header::default(), Vec::new());
     // Each choice explains more bytes than those before it.
     loop {
         let mut further = None;
-        for (choice, whose, more) in candidates(&open, &first, &header, heard) {
+        for (choice, whose, more) in candidates(&open, &first, &header, facts) {
             let all = header.and(&more);
-            match compare(&all, heard) {
+            match compare(&all, facts) {
                 // It moves the model's bytes so that they seem to be late, and explains nothing.
                 Ok(comparisons)
                     if silence(&comparisons).is_some_and(|own| !own.is_behind(&first)) => {}
                 Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
                     let has_steps = |own: &Conversation| own.has_steps();
-                    let last = first.conversation.min(heard.conversations.len());
+                    let last = first.conversation.min(facts.conversations.len());
                     return Some(Explanation {
                         words: chosen.join(" and "),
                         header: all,
                         comparisons,
-                        before_steps: !heard.conversations[..last].iter().any(has_steps),
+                        before_steps: !facts.conversations[..last].iter().any(has_steps),
                     });
                 }
                 Err((place, _)) if further.is_none() && place.is_behind(&first) => {
@@ -100,18 +100,18 @@ fn candidates<'c>(
     open: &'c [Choice],
     first: &Place,
     header: &Header,
-    heard: &Heard<'_>,
+    facts: &AttemptFacts<'_>,
 ) -> Vec<(&'c Choice, String, Header)> {
-    let rings = || heard.way.rings.iter().enumerate();
+    let rings = || facts.way.rings.iter().enumerate();
     let setup = |whom: DriveRange, choice: &Choice| Setup::new(whom, choice.setting.clone());
-    let every = |choice: &Choice| choice.in_all(heard.way.rings.len());
+    let every = |choice: &Choice| choice.in_all(facts.way.rings.len());
     let mut all: Vec<_> = open
         .iter()
         .map(|choice| (choice, String::new(), every(choice)))
         .collect();
     for choice in open {
         let whole = header.and(&every(choice));
-        let tells = match compare(&whole, heard) {
+        let tells = match compare(&whole, facts) {
             Ok(comparisons) => silence(&comparisons).is_some(),
             Err((place, _)) => place != *first,
         };
@@ -150,16 +150,16 @@ fn choices(rig: &Rig) -> Vec<Choice> {
 ///
 /// # Errors
 /// Where it first differs, and whether one of the drives monitors time-outs.
-fn compare(header: &Header, heard: &Heard<'_>) -> Result<Vec<Comparison>, (Place, bool)> {
-    (heard.alive)();
-    let Ok(mut twin) = twin(heard.rig, &known(heard.rig).and(header)) else {
+fn compare(header: &Header, facts: &AttemptFacts<'_>) -> Result<Vec<Comparison>, (Place, bool)> {
+    (facts.alive)();
+    let Ok(mut twin) = twin(facts.rig, &known(facts.rig).and(header)) else {
         let nowhere = Place {
             conversation: 0,
             divergence: None,
         };
         return Err((nowhere, false));
     };
-    let comparisons = twin.follow_while_alike(heard.conversations, heard.exactness);
+    let comparisons = twin.follow_while_alike(facts.conversations, facts.exactness);
     let conversation = comparisons.len();
     // What differs behind a silence of the bench says nothing about a choice.
     let last = comparisons.last().filter(|own| !own.silenced);

@@ -34,7 +34,7 @@ pub(super) type Pass = Vec<(Instant, Received)>;
 
 /// What the line test heard on one ring.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Heard {
+pub(crate) struct LineTestBytes {
     /// Bytes that came before anything was sent.
     pub unasked: Vec<Received>,
     /// What came back for [`SENT`] SYNCO, twice.
@@ -52,10 +52,10 @@ impl From<LineFormat> for Rate {
 }
 
 /// Listens, and sends SYNCO twice.
-pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
+pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> LineTestBytes {
     let unasked = unasked(line, ring);
     let passes = [pass(line, ring), pass(line, ring)];
-    Heard { unasked, passes }
+    LineTestBytes { unasked, passes }
 }
 
 /// The first bytes that come back for SYNCO without a gap.

@@ -3,7 +3,7 @@
 
 use super::driven::Driven;
 use super::health::{Unhealthy, examine};
-use super::judge::{Heard, judge, known};
+use super::judge::{AttemptFacts, judge, known};
 use super::session::Session;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
@@ -215,7 +215,7 @@ impl<'s> Run<'s> {
         // In real time a record does not hold every moment at which the master was asked.
         let driven = driven.filter(|_| simulated);
         let alive = || self.alive();
-        let heard = Heard {
+        let facts = AttemptFacts {
             rig: self.session.rig(),
             plan,
             way: &way,
@@ -226,7 +226,7 @@ impl<'s> Run<'s> {
             alive: &alive,
         };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-        let assumed = judge(&mut outcome, &heard);
+        let assumed = judge(&mut outcome, &facts);
         Ok(Attempt {
             driven,
             master_is_right,

@@ -1,7 +1,7 @@
 //! A conversation of the master with a drive on a segment.
 
 use super::file::{CampaignStep, FrameCampaignFile};
-use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Outcome};
 use harness_proto::unitek::properties::Properties;
@@ -218,7 +218,7 @@ impl Desk {
                 break;
             }
             let heard = self.host().and_then(Host::receive);
-            if let Some((at, Heard::Frame(frame))) = heard {
+            if let Some((at, CanEvent::Frame(frame))) = heard {
                 self.log.push(MasterFrame::Received(frame));
                 self.master.handle_frame(at, &frame);
             }

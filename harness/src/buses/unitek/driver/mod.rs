@@ -10,7 +10,7 @@ pub use error::Error;
 use super::rig::Axis;
 use crate::link::Line;
 use crate::medium::{Heard, Out};
-use harness_proto::can::{self, BusError, Frame};
+use harness_proto::can::{self, CanError, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
 use harness_proto::unitek::master::{Event, Job, JobId, Master, Options, Outcome};
@@ -45,7 +45,7 @@ pub struct Driver<'l> {
     drives: Vec<Drive>,
     events: VecDeque<(Instant, Axis, Event)>,
     /// What went wrong on the bus.
-    errors: Vec<BusError>,
+    errors: Vec<CanError>,
 }
 
 struct Drive {
@@ -207,7 +207,7 @@ impl<'l> Driver<'l> {
     }
 
     /// What went wrong on the bus since the last call.
-    pub fn bus_errors(&mut self) -> Vec<BusError> {
+    pub fn bus_errors(&mut self) -> Vec<CanError> {
         std::mem::take(&mut self.errors)
     }
 
@@ -289,11 +289,11 @@ impl<'l> Driver<'l> {
     fn receive(&mut self) {
         while let Some((at, heard)) = self.line.receive(0) {
             match heard {
-                Heard::Frame(can::Heard::Frame(frame)) => self.hear(at, &frame),
-                Heard::Frame(can::Heard::Error(error)) if self.errors.len() < MOST_EVENTS => {
+                Heard::Frame(can::CanEvent::Frame(frame)) => self.hear(at, &frame),
+                Heard::Frame(can::CanEvent::Error(error)) if self.errors.len() < MOST_EVENTS => {
                     self.errors.push(error);
                 }
-                Heard::Frame(can::Heard::Error(_)) | Heard::Octet(_) => {}
+                Heard::Frame(can::CanEvent::Error(_)) | Heard::Octet(_) => {}
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Plays a case on a simulated segment.
 
 use super::act::{FrameActKind, FrameTalk};
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::buses::unitek::simulate::{Bench, Setup};
 use crate::explore::line::LineSeen;
 use crate::link::{DriveFault, Line, Link, Moment, PlacedFault};
@@ -36,7 +36,7 @@ pub fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
             }
             own => {
                 if let Some((drive, stimulus)) = stimulus(own) {
-                    let fault = PlacedFault::Stimulus(drive, Stimulus::Unitek(stimulus));
+                    let fault = PlacedFault::Stimulus(drive, AnyStimulus::Unitek(stimulus));
                     bench.inject(0, fault, Moment::Now);
                 }
             }

@@ -4,7 +4,7 @@ use super::Unitek;
 use super::plan::{Act, WantedFrame, WantedOutcome, WantedValue};
 use super::syntax::DriveHarm;
 use super::write::identifier;
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::buses::unitek::simulate::Bench;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
@@ -12,7 +12,7 @@ use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::{Mismatch, Stop};
 use crate::scenario::run::player::Runner;
-use harness_proto::can::{BusError, Frame, Heard};
+use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Event, Job, JobId, Options, Outcome};
 use harness_proto::unitek::units::{Scaling, shown, usual};
@@ -28,7 +28,7 @@ const LONGEST: Span = Span::from_millis(10_000);
 #[derive(Debug, Default)]
 pub struct State {
     /// What the bench last noticed of the bus.
-    error: Option<BusError>,
+    error: Option<CanError>,
     /// The reply that a `read` waits for: identifier and register.
     awaited: Option<(u16, u8)>,
     reply: Option<(Instant, Reply)>,
@@ -80,8 +80,8 @@ impl State {
         loop {
             let (at, heard) = link.receive(port)?;
             match heard.frame()? {
-                Heard::Error(error) => self.error = Some(error),
-                Heard::Frame(frame) => {
+                CanEvent::Error(error) => self.error = Some(error),
+                CanEvent::Frame(frame) => {
                     if !self.takes(at, &frame) {
                         return Some((at, frame));
                     }
@@ -270,7 +270,7 @@ pub(super) fn act(
 }
 
 pub(super) fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault {
-    PlacedFault::Stimulus(node, Stimulus::Unitek(stimulus))
+    PlacedFault::Stimulus(node, AnyStimulus::Unitek(stimulus))
 }
 
 /// The write that sets a register of a drive which is not simulated beside the bus.

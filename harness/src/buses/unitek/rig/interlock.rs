@@ -268,7 +268,7 @@ impl RegisterInterlock {
 
     /// What a piece says of a register of this drive.
     fn reply(&self, heard: &Heard, register: u8) -> Option<Reply> {
-        let Heard::Frame(can::Heard::Frame(frame)) = heard else {
+        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
             return None;
         };
         let reply = Reply::decode(frame, self.axis.tx).ok()?;

@@ -70,7 +70,7 @@ impl LinkNotes for FrameNotes {
     }
 
     fn heard(&mut self, _: Medium, at: Instant, now: Instant, heard: Heard) {
-        let Heard::Frame(can::Heard::Frame(frame)) = heard else {
+        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
             return;
         };
         self.heard.pieces += 1;

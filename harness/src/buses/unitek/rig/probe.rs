@@ -182,7 +182,7 @@ impl Probe<'_, '_> {
         let mut heard = Vec::new();
         loop {
             while let Some((at, piece)) = self.link.receive(0) {
-                if let Heard::Frame(can::Heard::Frame(frame)) = piece
+                if let Heard::Frame(can::CanEvent::Frame(frame)) = piece
                     && let Ok(reply) = Reply::decode(&frame, self.known.axis.tx)
                 {
                     heard.push((at, reply));

@@ -111,7 +111,7 @@ fn listen(session: &mut Session) -> Result<(), SessionError> {
     let axes = session.axes().to_vec();
     let mut other = None;
     session.listen(|heard| {
-        let Heard::Frame(can::Heard::Frame(frame)) = heard else {
+        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
             return;
         };
         let number = frame.id().number();

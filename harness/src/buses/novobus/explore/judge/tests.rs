@@ -197,7 +197,9 @@ impl Target for AnyRing {
         self.history.extend(case.acts.iter().cloned());
         tried.difference = self.judge.see(BytesExchanged::of(case, received));
         self.stale = tried.difference.is_some()
-            || case.orders().any(|order| order.command == Command::Reset);
+            || case
+                .orders()
+                .any(|order| order.command == RawCommand::Reset);
         Ok(tried)
     }
 

@@ -1,7 +1,7 @@
 //! What a drive must not take, and what it does then: wrong bytes at each place, and the way back (ND21 9.2 to 9.8, 10.4, 10.5).
 
 use super::super::case::{Act, ActKind, Damage, Harm, Talk, To};
-use super::super::order::{Command, CommandSent};
+use super::super::order::{CommandSent, RawCommand};
 use super::{Tour, page_cell, recover, shuffled, spare, spoiled, talk};
 use crate::explore::Dice;
 use harness_proto::novobus::check_sequence::SEQUENCE;
@@ -21,35 +21,35 @@ pub(crate) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
             };
             let (low, data) = (cell as u8, dice.byte());
             let command = match kind {
-                0 => Command::WriteByte { cell, data },
-                1 => Command::WriteWord {
+                0 => RawCommand::WriteByte { cell, data },
+                1 => RawCommand::WriteWord {
                     cell,
                     data: dice.word(),
                 },
-                2 => Command::And {
+                2 => RawCommand::And {
                     low,
                     data: data & 0x0F,
                 },
-                3 => Command::Or {
+                3 => RawCommand::Or {
                     low,
                     data: data | 0xF0,
                 },
-                4 => Command::ReadByte { cell },
-                5 => Command::ReadWord { cell },
-                _ => Command::ReadLong { cell },
+                4 => RawCommand::ReadByte { cell },
+                5 => RawCommand::ReadWord { cell },
+                _ => RawCommand::ReadLong { cell },
             };
             let bytes = CommandSent::sound(command).bytes();
             let last = bytes.len() - 1;
             // The checking byte as often as all others together.
             for at in (1..=last).chain(vec![last; last - 1]) {
                 let wrong = wrong_byte(bytes[at], (round, at == last), dice);
-                let held = [Command::WriteWord {
+                let held = [RawCommand::WriteWord {
                     cell: cell & !1,
                     data: dice.word(),
                 }];
                 let mut acts = vec![talk(drive, &held), spoiled(drive, command, at as u8, wrong)];
                 acts.extend(between_error_and_recovery(tour, dice));
-                acts.push(talk(drive, &[Command::ReadWord { cell: cell & !1 }]));
+                acts.push(talk(drive, &[RawCommand::ReadWord { cell: cell & !1 }]));
                 groups.push(acts);
             }
         }
@@ -125,7 +125,7 @@ pub(crate) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
             } else {
                 0xFF00 | u16::from(page)
             };
-            acts.push(talk(drive, &[Command::ReadByte { cell }]));
+            acts.push(talk(drive, &[RawCommand::ReadByte { cell }]));
         }
         acts
     });
@@ -138,7 +138,7 @@ pub(crate) fn outputs(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
     let wrong = tour.share(drive, (4..=u8::MAX).collect());
     let all = (0..4).chain(wrong).collect();
     let groups = shuffled(all, dice).into_iter().map(|code| {
-        let mut acts = vec![talk(drive, &[Command::WriteIo { code }])];
+        let mut acts = vec![talk(drive, &[RawCommand::WriteIo { code }])];
         if code > 3 {
             acts.extend([Act::sound(ActKind::Synco(2)), recover()]);
         }
@@ -153,19 +153,19 @@ pub(crate) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
     let mut groups = Vec::new();
     for round in 0..12 {
         let cell = spare(dice);
-        let write = Command::WriteByte { cell, data: 0 };
+        let write = RawCommand::WriteByte { cell, data: 0 };
         let sum = |data| Checksum::over(&write.with_data(data).head());
         let data = (0..=u8::MAX).find(|data| sum(*data) == Checksum::EMPTY);
         let zero = write.with_data(data.unwrap_or(0));
-        let read = Command::ReadByte { cell };
+        let read = RawCommand::ReadByte { cell };
         let held = [0xC0, cell as u8]
             .iter()
             .fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
-        let answer = Command::WriteByte {
+        let answer = RawCommand::WriteByte {
             cell,
             data: held.wrapping_neg(),
         };
-        let other = Command::WriteByte {
+        let other = RawCommand::WriteByte {
             cell,
             data: dice.byte(),
         };
@@ -191,7 +191,7 @@ pub(crate) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec
     let own = tour.share(drive, bad.collect());
     let groups = shuffled(own, dice).into_iter().map(|byte| {
         let mut acts = vec![
-            talk(drive, &[Command::ReadByte { cell: spare(dice) }]),
+            talk(drive, &[RawCommand::ReadByte { cell: spare(dice) }]),
             Act::sound(ActKind::Bytes(vec![byte])),
         ];
         acts.extend(between_error_and_recovery(tour, dice));
@@ -218,7 +218,7 @@ pub(crate) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> V
         // What broke it may be its first byte again.
         let from = usize::from(breaker == SEQUENCE[0] && dice.percent(50));
         bytes.extend(&SEQUENCE[from..]);
-        let read = talk(drive, &[Command::ReadByte { cell: spare(dice) }]);
+        let read = talk(drive, &[RawCommand::ReadByte { cell: spare(dice) }]);
         vec![
             Act::sound(ActKind::Bytes(vec![dice.byte() & 0x7F])),
             Act::sound(ActKind::Zeros(zeros)),
@@ -245,16 +245,16 @@ pub(crate) fn cuts(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>>
                 };
                 let (low, data) = (cell as u8, dice.byte());
                 let command = match kind {
-                    0 => Command::WriteByte { cell, data },
-                    1 => Command::WriteWord {
+                    0 => RawCommand::WriteByte { cell, data },
+                    1 => RawCommand::WriteWord {
                         cell,
                         data: dice.word(),
                     },
-                    2 => Command::And { low, data },
-                    3 => Command::Or { low, data },
-                    4 => Command::ReadByte { cell },
-                    5 => Command::ReadWord { cell },
-                    _ => Command::ReadLong { cell },
+                    2 => RawCommand::And { low, data },
+                    3 => RawCommand::Or { low, data },
+                    4 => RawCommand::ReadByte { cell },
+                    5 => RawCommand::ReadWord { cell },
+                    _ => RawCommand::ReadLong { cell },
                 };
                 let cut = Talk {
                     room,
@@ -264,13 +264,13 @@ pub(crate) fn cuts(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>>
                 groups.push(vec![
                     talk(
                         drive,
-                        &[Command::WriteWord {
+                        &[RawCommand::WriteWord {
                             cell,
                             data: dice.word(),
                         }],
                     ),
                     Act::sound(ActKind::Talk(cut)),
-                    talk(drive, &[Command::ReadWord { cell }]),
+                    talk(drive, &[RawCommand::ReadWord { cell }]),
                 ]);
             }
         }
@@ -290,11 +290,11 @@ fn between(tour: &Tour<'_>, drive: u8, gap: u8, dice: &mut Dice) -> Vec<u8> {
         2 => vec![PAUSE; 1 + dice.below(3)],
         3 if other != drive => telegrams(Talk::one(
             To::Drive(other),
-            Command::ReadByte { cell: spare(dice) },
+            RawCommand::ReadByte { cell: spare(dice) },
         )),
         4 => telegrams(Talk::one(
             To::Nobody(dice.byte() & 0x7F),
-            Command::ReadByte { cell: spare(dice) },
+            RawCommand::ReadByte { cell: spare(dice) },
         )),
         _ => vec![SYNCO, PAUSE, SYNCO],
     }
@@ -309,7 +309,7 @@ pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
     for at in 0..8_u16 {
         for kind in 0..3 {
             let cell = spare(dice);
-            let mut act = talk(drive, &[Command::WriteByte { cell, data: 0 }]);
+            let mut act = talk(drive, &[RawCommand::WriteByte { cell, data: 0 }]);
             let harm = match kind {
                 0 => Harm::Flip {
                     data: 0,
@@ -333,7 +333,7 @@ pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
             let mut acts = vec![
                 talk(
                     drive,
-                    &[Command::WriteByte {
+                    &[RawCommand::WriteByte {
                         cell,
                         data: dice.byte() | 1,
                     }],
@@ -356,7 +356,7 @@ pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
                 ]);
             }
             acts.extend(between_error_and_recovery(tour, dice));
-            acts.push(talk(drive, &[Command::ReadByte { cell }]));
+            acts.push(talk(drive, &[RawCommand::ReadByte { cell }]));
             groups.push(acts);
         }
     }
@@ -371,14 +371,14 @@ pub(crate) fn resets(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act
         let data = dice.byte() | 1;
         let wrong = dice.byte() & 0x1F;
         cases.push(vec![
-            talk(drive, &[Command::WriteByte { cell, data }]),
-            spoiled(drive, Command::Reset, at, wrong),
+            talk(drive, &[RawCommand::WriteByte { cell, data }]),
+            spoiled(drive, RawCommand::Reset, at, wrong),
             recover(),
-            talk(drive, &[Command::ReadByte { cell }]),
+            talk(drive, &[RawCommand::ReadByte { cell }]),
         ]);
     }
     if tour.resets {
-        cases.push(vec![talk(drive, &[Command::Reset])]);
+        cases.push(vec![talk(drive, &[RawCommand::Reset])]);
     }
     cases
 }

@@ -1,7 +1,7 @@
 //! What a drive's memory must do: each cell, each value, each mask, and the ends of what commands may touch (ND21 9.4, 10.1 to 10.3).
 
 use super::super::case::{Act, ActKind};
-use super::super::order::Command;
+use super::super::order::RawCommand;
 use super::{Tour, exchange, page_cell, recover, shuffled, spare, talk};
 use crate::explore::Dice;
 use harness_proto::nd21::{own, ram};
@@ -16,17 +16,17 @@ pub(crate) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
     let all = || words.iter().copied().zip(content.iter().copied());
     let mut groups = Vec::new();
     for (cell, data) in all() {
-        groups.push(vec![talk(drive, &[Command::WriteWord { cell, data }])]);
+        groups.push(vec![talk(drive, &[RawCommand::WriteWord { cell, data }])]);
     }
     for (cell, data) in all() {
         let [high, low] = (!data).to_be_bytes();
         let next = cell + 1;
         groups.push(vec![
-            talk(drive, &[Command::ReadWord { cell }]),
-            talk(drive, &[Command::WriteByte { cell, data: high }]),
+            talk(drive, &[RawCommand::ReadWord { cell }]),
+            talk(drive, &[RawCommand::WriteByte { cell, data: high }]),
             talk(
                 drive,
-                &[Command::WriteByte {
+                &[RawCommand::WriteByte {
                     cell: next,
                     data: low,
                 }],
@@ -35,21 +35,21 @@ pub(crate) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
     }
     for (cell, data) in all().collect::<Vec<_>>().into_iter().rev() {
         groups.push(vec![
-            talk(drive, &[Command::ReadByte { cell }]),
-            talk(drive, &[Command::ReadByte { cell: cell + 1 }]),
-            talk(drive, &[Command::WriteWord { cell, data }]),
+            talk(drive, &[RawCommand::ReadByte { cell }]),
+            talk(drive, &[RawCommand::ReadByte { cell: cell + 1 }]),
+            talk(drive, &[RawCommand::WriteWord { cell, data }]),
         ]);
     }
     for cell in own::SPARE.step_by(4) {
-        groups.push(vec![talk(drive, &[Command::ReadLong { cell }])]);
+        groups.push(vec![talk(drive, &[RawCommand::ReadLong { cell }])]);
     }
     tour.packed(groups)
 }
 
 /// The ROM: what it holds is the drive's choice, but it holds it, whichever command reads (10.1).
 pub(crate) fn rom(tour: &Tour<'_>, drive: u8, _: &mut Dice) -> Vec<Vec<Act>> {
-    let word = |cell| vec![talk(drive, &[Command::ReadWord { cell }])];
-    let byte = |cell| vec![talk(drive, &[Command::ReadByte { cell }])];
+    let word = |cell| vec![talk(drive, &[RawCommand::ReadWord { cell }])];
+    let byte = |cell| vec![talk(drive, &[RawCommand::ReadByte { cell }])];
     let words = ROM_WORDS.step_by(2).map(word);
     tour.packed(words.chain(ROM_BYTES.map(byte)).collect())
 }
@@ -62,8 +62,8 @@ pub(crate) fn values(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act
         vec![talk(
             drive,
             &[
-                Command::WriteByte { cell, data },
-                Command::ReadByte { cell },
+                RawCommand::WriteByte { cell, data },
+                RawCommand::ReadByte { cell },
             ],
         )]
     });
@@ -78,7 +78,7 @@ pub(crate) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
         let cell = page_cell(dice);
         let low = cell as u8;
         let other = dice.byte();
-        let read = Command::ReadByte { cell };
+        let read = RawCommand::ReadByte { cell };
         let held = match dice.below(4) {
             0 => 0,
             1 => 0xFF,
@@ -87,10 +87,10 @@ pub(crate) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
         vec![talk(
             drive,
             &[
-                Command::WriteByte { cell, data: held },
-                Command::And { low, data },
+                RawCommand::WriteByte { cell, data: held },
+                RawCommand::And { low, data },
                 read,
-                Command::Or { low, data: other },
+                RawCommand::Or { low, data: other },
                 read,
             ],
         )]
@@ -105,7 +105,7 @@ pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
     for round in 0..24_u16 {
         let first = ram::NKP + (round & 1);
         let other = ram::NKP + 2 * (round >> 1 & 1);
-        let pointer = |cell: u16, data: u16| Command::WriteByte {
+        let pointer = |cell: u16, data: u16| RawCommand::WriteByte {
             cell,
             data: data as u8,
         };
@@ -114,14 +114,14 @@ pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
             talk(drive, &[pointer(ram::DATA_OUT, other)]),
             talk(
                 drive,
-                &[Command::WriteWord {
+                &[RawCommand::WriteWord {
                     cell: ram::NKP,
                     data: dice.word(),
                 }],
             ),
             talk(
                 drive,
-                &[Command::WriteWord {
+                &[RawCommand::WriteWord {
                     cell: ram::LKP,
                     data: dice.word(),
                 }],
@@ -134,16 +134,16 @@ pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
                 0 => exchange(
                     drive,
                     data,
-                    &[Command::WriteByte {
+                    &[RawCommand::WriteByte {
                         cell,
                         data: dice.byte(),
                     }],
                 ),
-                1 => exchange(drive, data, &[Command::ReadByte { cell }]),
+                1 => exchange(drive, data, &[RawCommand::ReadByte { cell }]),
                 2 => exchange(
                     drive,
                     data,
-                    &[Command::WriteWord {
+                    &[RawCommand::WriteWord {
                         cell: ram::NKP,
                         data: dice.word(),
                     }],
@@ -152,11 +152,11 @@ pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
             });
             if dice.percent(30) {
                 let next = (drive + 1) % tour.ring.drives;
-                acts.push(talk(next, &[Command::ReadByte { cell: spare(dice) }]));
+                acts.push(talk(next, &[RawCommand::ReadByte { cell: spare(dice) }]));
             }
         }
-        acts.push(talk(drive, &[Command::ReadWord { cell: ram::NKP }]));
-        acts.push(talk(drive, &[Command::ReadWord { cell: ram::LKP }]));
+        acts.push(talk(drive, &[RawCommand::ReadWord { cell: ram::NKP }]));
+        acts.push(talk(drive, &[RawCommand::ReadWord { cell: ram::LKP }]));
         acts.push(exchange(drive, dice.word(), &[]));
         cases.push(acts);
     }
@@ -175,27 +175,27 @@ pub(crate) fn edges(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
     for cell in PLACES {
         let data = dice.word();
         let commands = [
-            Command::ReadByte { cell },
-            Command::ReadWord { cell },
-            Command::ReadLong { cell },
-            Command::WriteByte {
+            RawCommand::ReadByte { cell },
+            RawCommand::ReadWord { cell },
+            RawCommand::ReadLong { cell },
+            RawCommand::WriteByte {
                 cell,
                 data: data as u8,
             },
-            Command::WriteWord { cell, data },
+            RawCommand::WriteWord { cell, data },
         ];
         groups.extend(commands.map(|command| beside(tour, drive, command, dice)));
     }
     for low in [0x7F, 0x80, 0x81, 0xF0, 0xFF] {
         let data = dice.byte();
-        let commands = [Command::And { low, data }, Command::Or { low, data }];
+        let commands = [RawCommand::And { low, data }, RawCommand::Or { low, data }];
         groups.extend(commands.map(|command| beside(tour, drive, command, dice)));
     }
     let groups = shuffled(groups, dice);
     tour.packed(groups)
 }
 
-fn beside(tour: &Tour<'_>, drive: u8, command: Command, dice: &mut Dice) -> Vec<Act> {
+fn beside(tour: &Tour<'_>, drive: u8, command: RawCommand, dice: &mut Dice) -> Vec<Act> {
     let known = [0xFD80, 0xFF7E, 0xFF7F];
     let near = command
         .cell()
@@ -204,7 +204,7 @@ fn beside(tour: &Tour<'_>, drive: u8, command: Command, dice: &mut Dice) -> Vec<
         .into_iter()
         .filter(|cell| near.as_ref().is_some_and(|near| near.contains(cell)));
     let known: Vec<u16> = known.collect();
-    let write = |cell: u16, data| talk(drive, &[Command::WriteByte { cell, data }]);
+    let write = |cell: u16, data| talk(drive, &[RawCommand::WriteByte { cell, data }]);
     let mut acts: Vec<Act> = known.iter().map(|cell| write(*cell, dice.byte())).collect();
     let (kind, address) = kind_of(command);
     acts.push(talk(drive, &[command]));
@@ -215,22 +215,22 @@ fn beside(tour: &Tour<'_>, drive: u8, command: Command, dice: &mut Dice) -> Vec<
         });
         acts.push(recover());
     }
-    let read = |cell: &u16| talk(drive, &[Command::ReadByte { cell: *cell }]);
+    let read = |cell: &u16| talk(drive, &[RawCommand::ReadByte { cell: *cell }]);
     acts.extend(known.iter().map(read));
     acts
 }
 
-fn kind_of(command: Command) -> (Kind, u16) {
+fn kind_of(command: RawCommand) -> (Kind, u16) {
     let kind = match command {
-        Command::ReadByte { .. } => Kind::ReadByte,
-        Command::ReadWord { .. } => Kind::ReadWord,
-        Command::ReadLong { .. } => Kind::ReadLong,
-        Command::WriteByte { .. } => Kind::WriteByte,
-        Command::WriteWord { .. } => Kind::WriteWord,
-        Command::And { low, .. } => return (Kind::And, 0xFF00 | u16::from(low)),
-        Command::Or { low, .. } => return (Kind::Or, 0xFF00 | u16::from(low)),
-        Command::WriteIo { .. } => Kind::WriteIo,
-        Command::Reset => Kind::ResetH8,
+        RawCommand::ReadByte { .. } => Kind::ReadByte,
+        RawCommand::ReadWord { .. } => Kind::ReadWord,
+        RawCommand::ReadLong { .. } => Kind::ReadLong,
+        RawCommand::WriteByte { .. } => Kind::WriteByte,
+        RawCommand::WriteWord { .. } => Kind::WriteWord,
+        RawCommand::And { low, .. } => return (Kind::And, 0xFF00 | u16::from(low)),
+        RawCommand::Or { low, .. } => return (Kind::Or, 0xFF00 | u16::from(low)),
+        RawCommand::WriteIo { .. } => Kind::WriteIo,
+        RawCommand::Reset => Kind::ResetH8,
     };
     (kind, command.cell().unwrap_or(0))
 }

@@ -6,7 +6,7 @@ mod memory;
 
 use super::case::{Act, ActKind, Case, Talk, To};
 use super::generate::{CaseScope, RingScope};
-use super::order::{Command, CommandSent, Spoil};
+use super::order::{CommandSent, RawCommand, Spoil};
 use crate::explore::Dice;
 use crate::explore::Spice;
 use harness_proto::nd21::{own, ram};
@@ -127,17 +127,17 @@ impl Tour<'_> {
     }
 }
 
-fn talk(drive: u8, commands: &[Command]) -> Act {
+fn talk(drive: u8, commands: &[RawCommand]) -> Act {
     Act::sound(ActKind::Talk(Talk {
         orders: commands
             .iter()
             .map(|command| CommandSent::sound(*command))
             .collect(),
-        ..Talk::one(To::Drive(drive), Command::Reset)
+        ..Talk::one(To::Drive(drive), RawCommand::Reset)
     }))
 }
 
-fn exchange(drive: u8, data: u16, commands: &[Command]) -> Act {
+fn exchange(drive: u8, data: u16, commands: &[RawCommand]) -> Act {
     let mut act = talk(drive, commands);
     if let ActKind::Talk(talk) = &mut act.what {
         talk.process_data = Some(data);
@@ -145,7 +145,7 @@ fn exchange(drive: u8, data: u16, commands: &[Command]) -> Act {
     act
 }
 
-fn spoiled(drive: u8, command: Command, at: u8, byte: u8) -> Act {
+fn spoiled(drive: u8, command: RawCommand, at: u8, byte: u8) -> Act {
     let order = CommandSent {
         command,
         spoil: Some(Spoil { at, byte }),

@@ -3,7 +3,7 @@
 use super::drive::Running;
 use super::setup::model_unless_said;
 use super::types::{PlannedBench, PlannedCheck, RingAct};
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{
@@ -310,7 +310,7 @@ impl Planner {
                 };
                 self.only_nd21(&drives, "monitoring", drive.span)?;
                 let drive = self.drive(fault.ring, drive)?;
-                PlacedFault::Stimulus(drive, Stimulus::Novobus(nd21::Stimulus::Error(*error)))
+                PlacedFault::Stimulus(drive, AnyStimulus::Novobus(nd21::Stimulus::Error(*error)))
             }
         };
         let moment = match (&fault.byte, fault.at) {

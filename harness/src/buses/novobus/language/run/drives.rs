@@ -1,7 +1,7 @@
 //! What a step does to drives, and what it waits for or reads of them.
 
 use super::look::{Miss, judge};
-use crate::buses::Stimulus;
+use crate::buses::AnyStimulus;
 use crate::buses::novobus::language::plan::{LOOK, NumberCheck, PlannedDriveCheck};
 use crate::buses::novobus::language::syntax::Influence;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
@@ -18,7 +18,7 @@ impl Influence {
             match self {
                 Self::Stimuli(stimuli) => {
                     for stimulus in stimuli {
-                        let fault = PlacedFault::Stimulus(drive, Stimulus::Novobus(*stimulus));
+                        let fault = PlacedFault::Stimulus(drive, AnyStimulus::Novobus(*stimulus));
                         link.inject(ring, fault, Moment::Now);
                     }
                 }
