@@ -57,7 +57,7 @@ pub struct Stamp {
 
 /// What a client says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
+pub enum SocketcandRequest {
     /// `open`: the bus with this name.
     Open(String),
     /// `rawmode`: report every frame.
@@ -70,7 +70,7 @@ pub enum Request {
     Send(Frame),
 }
 
-impl Request {
+impl SocketcandRequest {
     /// Reads a message, its brackets included.
     ///
     /// # Errors
@@ -315,18 +315,18 @@ mod tests {
     #[test]
     fn requests_are_read_and_written() {
         for (text, request) in [
-            ("< open can0 >", Request::Open("can0".to_owned())),
-            ("< rawmode >", Request::RawMode),
-            ("< bcmmode >", Request::BcmMode),
-            ("< echo >", Request::Echo),
-            ("< send 123 0 >", Request::Send(a_frame("123#"))),
+            ("< open can0 >", SocketcandRequest::Open("can0".to_owned())),
+            ("< rawmode >", SocketcandRequest::RawMode),
+            ("< bcmmode >", SocketcandRequest::BcmMode),
+            ("< echo >", SocketcandRequest::Echo),
+            ("< send 123 0 >", SocketcandRequest::Send(a_frame("123#"))),
             (
                 "< send 1AAAAAAA 2 1 f1 >",
-                Request::Send(a_frame("1AAAAAAA#01F1")),
+                SocketcandRequest::Send(a_frame("1AAAAAAA#01F1")),
             ),
         ] {
             assert_eq!(
-                Request::parse(text.as_bytes()),
+                SocketcandRequest::parse(text.as_bytes()),
                 Ok(request.clone()),
                 "{text}"
             );
@@ -335,8 +335,12 @@ mod tests {
             assert_eq!(String::from_utf8(out).expect("text"), text);
         }
         for text in ["< send 123 0  >", "<send 123 0>", "< send 123 0\t>"] {
-            let request = Request::parse(text.as_bytes());
-            assert_eq!(request, Ok(Request::Send(a_frame("123#"))), "{text}");
+            let request = SocketcandRequest::parse(text.as_bytes());
+            assert_eq!(
+                request,
+                Ok(SocketcandRequest::Send(a_frame("123#"))),
+                "{text}"
+            );
         }
     }
 
@@ -353,7 +357,9 @@ mod tests {
             ("< add 1 0 123 1 11 >", "< rawmode >"),
             ("<>", "< rawmode >"),
         ] {
-            let error = Request::parse(text.as_bytes()).expect_err(text).to_string();
+            let error = SocketcandRequest::parse(text.as_bytes())
+                .expect_err(text)
+                .to_string();
             assert!(error.contains(text) && error.contains(words), "{error}");
         }
     }
@@ -444,7 +450,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_message_panics(message in prop::collection::vec(any::<u8>(), 0..80)) {
-            let _any = (Request::parse(&message), SocketcandAnswer::parse(&message));
+            let _any = (SocketcandRequest::parse(&message), SocketcandAnswer::parse(&message));
             let mut messages = Messages::default();
             for character in message {
                 let _any = messages.push(character);
@@ -457,8 +463,8 @@ mod tests {
             let frame = Frame::new(id, &data).expect("short");
             let stamp = Stamp { seconds: 1_700_000_000, micros };
             let mut out = Vec::new();
-            Request::Send(frame).write(&mut out);
-            prop_assert_eq!(Request::parse(&out), Ok(Request::Send(frame)));
+            SocketcandRequest::Send(frame).write(&mut out);
+            prop_assert_eq!(SocketcandRequest::parse(&out), Ok(SocketcandRequest::Send(frame)));
             out.clear();
             SocketcandAnswer::Frame(frame, stamp).write(&mut out);
             prop_assert!(out.len() <= MAX_MESSAGE);

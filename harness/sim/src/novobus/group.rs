@@ -13,7 +13,7 @@
 
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
-use crate::novobus::node::Node;
+use crate::novobus::node::RingNode;
 use crate::novobus::under_way::UnderWay;
 use crate::record::LineByte;
 use harness_proto::novobus::bus_end::{Passing, Relay};
@@ -99,7 +99,7 @@ impl Group {
     /// one. Nothing may be due before `now`.
     pub(crate) fn form<D: Device>(
         first: usize,
-        nodes: &[Node<D>],
+        nodes: &[RingNode<D>],
         links: &mut [Link],
         end: usize,
         now: Instant,
@@ -170,7 +170,7 @@ impl Group {
     /// that is due up to then. `nodes` are those of the group, `outbound` leads away from the last.
     pub(crate) fn run<D: Device>(
         &mut self,
-        nodes: &mut [Node<D>],
+        nodes: &mut [RingNode<D>],
         links: &mut [Link],
         until: Instant,
     ) -> Result<(), Instant> {
@@ -276,7 +276,7 @@ impl Group {
     /// Gives byte `number` to the drive that is addressed; false where that drive then is no longer one of the group.
     fn give<D: Device>(
         &mut self,
-        nodes: &mut [Node<D>],
+        nodes: &mut [RingNode<D>],
         inner: &[Link],
         at: Instant,
         number: usize,
@@ -386,7 +386,12 @@ impl Group {
     }
 
     /// Ends the group at `now`, up to which everything has happened: gives each drive and each inner link its own state.
-    pub(crate) fn end<D: Device>(&self, nodes: &mut [Node<D>], links: &mut [Link], now: Instant) {
+    pub(crate) fn end<D: Device>(
+        &self,
+        nodes: &mut [RingNode<D>],
+        links: &mut [Link],
+        now: Instant,
+    ) {
         for ((place, node), inbound) in self.places().zip(nodes).zip(links) {
             let arrived = self.arrived(place, now);
             self.make_up(place, arrived, node.device_mut());
@@ -430,7 +435,7 @@ struct Row {
 
 impl Row {
     /// The longest row that ends with the last of `nodes`.
-    fn of<D: Device>(nodes: &[Node<D>], links: &[Link], now: Instant) -> Option<Self> {
+    fn of<D: Device>(nodes: &[RingNode<D>], links: &[Link], now: Instant) -> Option<Self> {
         let first = nodes.len().checked_sub(1)?;
         let mut row = Self {
             first,
@@ -449,7 +454,12 @@ impl Row {
     }
 
     /// Takes one more drive into the row, and the link that leads away from it; `None` where it is none of the row.
-    fn lengthen<D: Device>(&mut self, ahead: &Node<D>, link: &Link, now: Instant) -> Option<()> {
+    fn lengthen<D: Device>(
+        &mut self,
+        ahead: &RingNode<D>,
+        link: &Link,
+        now: Instant,
+    ) -> Option<()> {
         // What the links of the row have carried is counted without these bytes.
         let counted = link.arrived() >= self.bytes.len() as u64;
         if !link.is_clear(now) || !counted {

@@ -10,7 +10,7 @@ use harness_proto::time::{Instant, Span};
 
 /// A device in its place in the ring.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Node<D> {
+pub struct RingNode<D> {
     device: D,
     powered: bool,
     stuck: Option<u8>,
@@ -22,7 +22,7 @@ pub struct Node<D> {
     head_start: Span,
 }
 
-impl<D: Device> Node<D> {
+impl<D: Device> RingNode<D> {
     pub(crate) fn new(device: D, drive: u8) -> Self {
         Self {
             head_start: device.head_start(),
@@ -37,8 +37,8 @@ impl<D: Device> Node<D> {
     }
 
     /// The same place around another device.
-    pub(crate) fn around<E: Device>(&self, device: E) -> Node<E> {
-        Node {
+    pub(crate) fn around<E: Device>(&self, device: E) -> RingNode<E> {
+        RingNode {
             device,
             powered: self.powered,
             stuck: self.stuck,

@@ -9,7 +9,7 @@ use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
 use crate::novobus::group::{Group, LEAST};
 use crate::novobus::link::Link;
-use crate::novobus::node::Node;
+use crate::novobus::node::RingNode;
 use crate::record::{Channel, LineByte, Remark, Trace};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
@@ -42,7 +42,7 @@ pub struct Ring<D> {
     rate: Rate,
     /// `links[i]` ends at `nodes[i]`; the last one ends at the master.
     links: Vec<Link>,
-    nodes: Vec<Node<D>>,
+    nodes: Vec<RingNode<D>>,
     /// What the master still has to send, with the time before which it must not.
     outbox: VecDeque<(Instant, u8)>,
     /// Bytes that the master has received and the caller has not fetched.
@@ -65,7 +65,7 @@ impl<D: Device> Ring<D> {
             size,
             rate,
             links: vec![Link::new(rate.byte_time()); usize::from(size.drives()) + 1],
-            nodes: drives.map(|k| Node::new(device(k), k)).collect(),
+            nodes: drives.map(|k| RingNode::new(device(k), k)).collect(),
             outbox: VecDeque::new(),
             inbox: VecDeque::new(),
             now: Instant::START,
@@ -197,14 +197,14 @@ impl<D: Device> Ring<D> {
     pub fn stop_recording(&mut self) {
         self.end_groups(|_| true);
         self.links.iter_mut().for_each(Link::stop_recording);
-        self.nodes.iter_mut().for_each(Node::stop_recording);
+        self.nodes.iter_mut().for_each(RingNode::stop_recording);
     }
 
     /// Forgets what was recorded, and records bytes and marks from now on.
     pub fn record_anew(&mut self) {
         self.end_groups(|_| true);
         self.links.iter_mut().for_each(Link::record_anew);
-        self.nodes.iter_mut().for_each(Node::record_anew);
+        self.nodes.iter_mut().for_each(RingNode::record_anew);
     }
 
     /// Records what link `link` carries from now on, for [`Self::take_record`]: a tap.
@@ -226,12 +226,16 @@ impl<D: Device> Ring<D> {
 
     /// Records what drives remark from now on, for [`Self::take_remarks`].
     pub fn record_remarks(&mut self) {
-        self.nodes.iter_mut().for_each(Node::record_anew);
+        self.nodes.iter_mut().for_each(RingNode::record_anew);
     }
 
     /// What drives have remarked since the last call, as far as it was recorded, in order of time.
     pub fn take_remarks(&mut self) -> Vec<Remark> {
-        let mut remarks: Vec<_> = self.nodes.iter_mut().flat_map(Node::take_remarks).collect();
+        let mut remarks: Vec<_> = self
+            .nodes
+            .iter_mut()
+            .flat_map(RingNode::take_remarks)
+            .collect();
         remarks.sort_by_key(|remark| remark.at);
         remarks
     }
@@ -285,13 +289,13 @@ impl<D: Device> Ring<D> {
     pub fn begin(&mut self) {
         self.end_groups(|_| true);
         self.links.iter_mut().for_each(Link::begin);
-        self.nodes.iter_mut().for_each(Node::begin);
+        self.nodes.iter_mut().for_each(RingNode::begin);
         self.inbox.clear();
     }
 
     /// Its links and nodes, where nothing is left to be done for any of them: no drive is in a group, the master has nothing to send, and
     /// every byte has been fetched.
-    pub(crate) fn at_rest(&self) -> Option<(&[Link], &[Node<D>])> {
+    pub(crate) fn at_rest(&self) -> Option<(&[Link], &[RingNode<D>])> {
         let rests = self.groups.is_empty() && self.outbox.is_empty() && self.inbox.is_empty();
         rests.then_some((&self.links, &self.nodes))
     }
@@ -349,7 +353,7 @@ impl<D: Device> Ring<D> {
     #[must_use]
     pub fn powered(&self, k: u8) -> bool {
         let node = self.place(k).and_then(|place| self.nodes.get(place));
-        node.is_some_and(Node::powered)
+        node.is_some_and(RingNode::powered)
     }
 
     fn place(&self, k: u8) -> Option<usize> {

@@ -11,7 +11,7 @@
 use crate::fault::LinkFault;
 use crate::novobus::drive::Drive;
 use crate::novobus::link::Link;
-use crate::novobus::node::Node;
+use crate::novobus::node::RingNode;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::ring::Ring;
 use crate::novobus::under_way::UnderWay;
@@ -24,7 +24,7 @@ use std::hash::{BuildHasher, BuildHasherDefault, Hash, Hasher};
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Place {
     inbound: Link,
-    node: Option<Node<PlainDrive>>,
+    node: Option<RingNode<PlainDrive>>,
     /// When the drive's transmitter can start its next byte.
     line_free: Instant,
 }
@@ -448,7 +448,7 @@ impl SharedRing {
     #[must_use]
     pub fn drive(&self, state: &SharedState, k: u8) -> Option<&PlainDrive> {
         let place = self.places.get(state.of_drive(k)?.place);
-        place.node.as_ref().map(Node::device)
+        place.node.as_ref().map(RingNode::device)
     }
 
     /// The number of the state of drive `k`, if the ring has it: a drive that has the same number later is the same, with the same memory.

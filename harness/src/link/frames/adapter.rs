@@ -2,7 +2,7 @@
 
 use super::clock::AdapterClock;
 use crate::frames::slcan::{self, Report, STAMP_PERIOD, SlcanCommand, flags};
-use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, class};
+use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest, class};
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
@@ -40,7 +40,7 @@ impl Adapter {
         match self {
             Self::Slcan(own) => own.command(now, SlcanCommand::Send(*frame), out),
             Self::Socketcand(_) if frame.is_remote() => return false,
-            Self::Socketcand(_) => Request::Send(*frame).write(out),
+            Self::Socketcand(_) => SocketcandRequest::Send(*frame).write(out),
         }
         true
     }
@@ -54,7 +54,7 @@ impl Adapter {
     pub(super) fn encode(&self, frame: &Frame, out: &mut Vec<u8>) {
         match self {
             Self::Slcan(_) => SlcanCommand::Send(*frame).write(out),
-            Self::Socketcand(_) => Request::Send(*frame).write(out),
+            Self::Socketcand(_) => SocketcandRequest::Send(*frame).write(out),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::adapter::{Adapter, Slcan, Socketcand};
 use super::transport::{Stream, Transport};
 use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, rate_of};
-use crate::frames::socketcand::{Messages, Request, SocketcandAnswer};
+use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
 use crate::port::{OpenError, Outgoing, PortAddress, Wire, open_adapter};
 use crate::trouble::Trouble;
 use harness_proto::can::BitRate;
@@ -351,9 +351,9 @@ impl<'a> Talk<'a> {
         const CHANNEL: &str =
             "name a bus that the server has, such as can0, and let the server bring it up";
         self.expect("a greeting", &SocketcandAnswer::Hi, "")?;
-        self.request(&Request::Open(channel.to_owned()))?;
+        self.request(&SocketcandRequest::Open(channel.to_owned()))?;
         self.expect("< open >", &SocketcandAnswer::Ok, CHANNEL)?;
-        self.request(&Request::RawMode)?;
+        self.request(&SocketcandRequest::RawMode)?;
         self.expect(
             "< rawmode >",
             &SocketcandAnswer::Ok,
@@ -361,7 +361,7 @@ impl<'a> Talk<'a> {
         )
     }
 
-    fn request(&mut self, request: &Request) -> Result<(), AdapterError> {
+    fn request(&mut self, request: &SocketcandRequest) -> Result<(), AdapterError> {
         let mut bytes = Vec::new();
         request.write(&mut bytes);
         self.send(&bytes)

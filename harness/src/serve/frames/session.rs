@@ -1,7 +1,7 @@
 //! A conversation with a client, without I/O: requests in; answers, and what the client's station hears, out.
 
 use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, flags, rate_of};
-use crate::frames::socketcand::{Messages, Request, SocketcandAnswer, Stamp, class};
+use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest, Stamp, class};
 use harness_proto::can::{BitRate, CanError, CanEvent, Frame};
 use harness_proto::time::Instant;
 use std::time::Duration;
@@ -274,7 +274,7 @@ impl Daemon {
         let Some(message) = self.messages.push(byte) else {
             return;
         };
-        let request = match message.and_then(|message| Request::parse(&message)) {
+        let request = match message.and_then(|message| SocketcandRequest::parse(&message)) {
             Ok(request) => request,
             Err(error) => {
                 // The daemon answers no `send`, not even one with a mistake, and clients expect no answer to it.
@@ -286,23 +286,25 @@ impl Daemon {
             }
         };
         let refusal = match (self.mode, request) {
-            (_, Request::Echo) => return SocketcandAnswer::Echo.write(out),
-            (Mode::NoBus, Request::Open(_)) => {
+            (_, SocketcandRequest::Echo) => return SocketcandAnswer::Echo.write(out),
+            (Mode::NoBus, SocketcandRequest::Open(_)) => {
                 self.mode = Mode::Bcm;
                 acts.push(Act::Join { listen_only: false });
                 return SocketcandAnswer::Ok.write(out);
             }
             (Mode::NoBus, _) => "no bus is open; < open can0 > expected first",
-            (_, Request::RawMode) => {
+            (_, SocketcandRequest::RawMode) => {
                 self.mode = Mode::Raw;
                 return SocketcandAnswer::Ok.write(out);
             }
-            (_, Request::BcmMode) => {
+            (_, SocketcandRequest::BcmMode) => {
                 self.mode = Mode::Bcm;
                 return SocketcandAnswer::Ok.write(out);
             }
-            (_, Request::Send(frame)) => return acts.push(Act::Send(frame)),
-            (_, Request::Open(_)) => "a bus is open already; connect again for another one",
+            (_, SocketcandRequest::Send(frame)) => return acts.push(Act::Send(frame)),
+            (_, SocketcandRequest::Open(_)) => {
+                "a bus is open already; connect again for another one"
+            }
         };
         SocketcandAnswer::Error(refusal.to_owned()).write(out);
         acts.push(Act::Say(refusal.to_owned()));
