@@ -1,6 +1,6 @@
 //! Parameters: what a number stands for, and how people write it (NORDAC 5, 4.1.3).
 
-use super::pkw::Index;
+use super::pkw::{Index, Pkw};
 use super::table::PARAMETERS;
 use super::units::Unit;
 use core::fmt;
@@ -97,6 +97,17 @@ impl fmt::Display for Limit {
     }
 }
 
+/// The row of each number in [`PARAMETERS`]; behind the last row where a number has none.
+static ROWS: [u8; Pkw::LAST_NUMBER as usize + 1] = {
+    let mut rows = [u8::MAX; Pkw::LAST_NUMBER as usize + 1];
+    let mut row = 0;
+    while row < PARAMETERS.len() {
+        rows[PARAMETERS[row].number as usize] = row as u8;
+        row += 1;
+    }
+    rows
+};
+
 /// One row of the list of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter {
@@ -124,10 +135,8 @@ impl Parameter {
     /// The parameter with this number.
     #[must_use]
     pub fn of(number: u16) -> Option<&'static Self> {
-        PARAMETERS
-            .binary_search_by_key(&number, |parameter| parameter.number)
-            .ok()
-            .map(|place| &PARAMETERS[place])
+        let place = ROWS.get(usize::from(number))?;
+        PARAMETERS.get(usize::from(*place))
     }
 
     /// The parameter with this number in decimal, or with this name in capital or small letters.

@@ -5,45 +5,63 @@ use harness_proto::nordac::{PARAMETERS, Parameter, Pkw};
 use std::sync::Arc;
 use std::sync::LazyLock;
 
-/// Where the values of each number begin.
+/// Where the values of each parameter stand, by its number.
 static PLACES: LazyLock<Places> = LazyLock::new(Places::new);
 
-/// A place that no parameter has.
-const NOWHERE: u16 = u16::MAX;
+/// The values of one parameter: all elements of set 1, of set 2, and so on.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    first: u16,
+    /// Number of elements; 0 where no parameter has the number.
+    elements: u16,
+    sets: u8,
+}
 
-/// The layout of the values: all elements of set 1, of set 2, and so on.
+/// The layout of the values.
 struct Places {
-    first: Vec<u16>,
+    of: Vec<Place>,
     count: usize,
 }
 
 impl Places {
     fn new() -> Self {
-        let mut first = vec![NOWHERE; usize::from(Pkw::LAST_NUMBER) + 1];
+        let mut of = vec![Place::default(); usize::from(Pkw::LAST_NUMBER) + 1];
         let mut count = 0;
         for parameter in &PARAMETERS {
-            first[usize::from(parameter.number)] = count;
-            count += u16::from(parameter.sets()) * u16::from(parameter.count);
+            let place = Place {
+                first: count,
+                elements: parameter.count.into(),
+                sets: parameter.sets(),
+            };
+            count += u16::from(place.sets) * place.elements;
+            of[usize::from(parameter.number)] = place;
         }
         Self {
-            first,
+            of,
             count: usize::from(count),
         }
     }
 
-    fn of(&self, parameter: &Parameter, index: Index) -> Option<usize> {
-        let count = u16::from(parameter.count);
-        let within = index.element < count && index.set < parameter.sets();
-        let place = self.first[usize::from(parameter.number)]
-            + u16::from(index.set) * count
-            + index.element;
-        within.then_some(usize::from(place))
+    /// The values of a number; none where no parameter has it.
+    fn of(number: u16) -> Place {
+        let place = PLACES.of.get(usize::from(number));
+        place.copied().unwrap_or_default()
+    }
+}
+
+impl Place {
+    fn at(self, index: Index) -> Option<usize> {
+        let within = index.element < self.elements && index.set < self.sets;
+        within.then(|| {
+            let place = self.first + u16::from(index.set) * self.elements + index.element;
+            usize::from(place)
+        })
     }
 }
 
 /// All values. A copy shares them until one of the two is changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parameters(Arc<Vec<i32>>);
+pub struct Parameters(Arc<[i32]>);
 
 impl Default for Parameters {
     /// The factory settings.
@@ -53,7 +71,7 @@ impl Default for Parameters {
             let count = usize::from(parameter.sets()) * usize::from(parameter.count);
             values.extend(std::iter::repeat_n(parameter.default, count));
         }
-        Self(Arc::new(values))
+        Self(values.into())
     }
 }
 
@@ -61,23 +79,23 @@ impl Parameters {
     /// A value; 0 for an index that the parameter does not have.
     #[must_use]
     pub fn get(&self, parameter: &Parameter, index: Index) -> i32 {
-        PLACES.of(parameter, index).map_or(0, |place| self.0[place])
+        let place = Places::of(parameter.number).at(index);
+        place.map_or(0, |place| self.0[place])
     }
 
-    /// The first element in a set (0 to 3) of the parameter with this number, which must exist; the set does not count where
-    /// the parameter does not depend on it.
+    /// The first element in a set (0 to 3) of the parameter with this number; the set does not count where the parameter does not depend
+    /// on it. 0 where there is no such parameter.
     #[must_use]
     pub fn value(&self, number: u16, set: u8) -> i32 {
-        let Some(parameter) = Parameter::of(number) else {
-            return 0;
-        };
-        let set = set.min(parameter.sets() - 1);
-        self.get(parameter, Index { element: 0, set })
+        let place = Places::of(number);
+        let set = set.min(place.sets.saturating_sub(1));
+        let place = place.at(Index { element: 0, set });
+        place.map_or(0, |place| self.0[place])
     }
 
     /// Stores a value; nothing happens for an index that the parameter does not have.
     pub fn store(&mut self, parameter: &Parameter, index: Index, value: i32) {
-        if let Some(place) = PLACES.of(parameter, index) {
+        if let Some(place) = Places::of(parameter.number).at(index) {
             Arc::make_mut(&mut self.0)[place] = value;
         }
     }
