@@ -25,7 +25,13 @@ pub(super) struct Heard<'a> {
 
 impl Heard<'_> {
     /// What the telegram was to the drive.
-    pub(super) fn events(&self, reply: Option<&[u8]>) -> Vec<Event> {
+    pub(super) fn events(&self, reply: Option<&[u8]>) -> impl Iterator<Item = Event> {
+        let (event, task) = self.event(reply);
+        std::iter::once(event).chain(task)
+    }
+
+    /// The event of a telegram, and the one of its task.
+    fn event(&self, reply: Option<&[u8]>) -> (Event, Option<Event>) {
         let octets = self.octets;
         let data = octets.first() == Some(&0x68);
         let own = octets.len() > 6 && self.own == Some(octets[5] & 0x7F);
@@ -53,7 +59,7 @@ impl Heard<'_> {
             Some(_) if sap == 60 => Event::Diagnosis,
             Some(_) => Event::Read,
         };
-        vec![event]
+        (event, None)
     }
 
     fn parameters(&self, own: bool) -> Event {
@@ -67,11 +73,11 @@ impl Heard<'_> {
     }
 
     /// What the words of an exchange are, and its task.
-    fn exchange(&self) -> Vec<Event> {
+    fn exchange(&self) -> (Event, Option<Event>) {
         let words = 7 + self.ppo.words_begin();
         let word = u16::from_be_bytes([self.octets[words], self.octets[words + 1]]);
         let clear = |mask: u16| word & mask == 0;
-        let mut events = vec![match word {
+        let event = match word {
             _ if clear(stw::VALID) => Event::Invalid,
             _ if !clear(stw::ACKNOWLEDGE) => Event::Acknowledge,
             _ if clear(stw::NO_OFF2) => Event::Off2,
@@ -79,14 +85,14 @@ impl Heard<'_> {
             _ if clear(stw::ON) => Event::Off1,
             _ if clear(stw::ENABLE) => Event::Disable,
             _ => Event::Enable,
-        }];
+        };
         let changes = Task::of(self.octets[7] >> 4).is_change();
-        match self.executed {
-            Some(Answer::Error(_)) => events.push(Event::TaskError),
-            Some(Answer::None) | None => {}
-            Some(_) if changes => events.push(Event::Changed),
-            Some(_) => events.push(Event::Requested),
-        }
-        events
+        let task = match self.executed {
+            Some(Answer::Error(_)) => Some(Event::TaskError),
+            Some(Answer::None) | None => None,
+            Some(_) if changes => Some(Event::Changed),
+            Some(_) => Some(Event::Requested),
+        };
+        (event, task)
     }
 }

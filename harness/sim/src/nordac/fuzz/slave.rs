@@ -2,7 +2,7 @@
 
 use super::cells::{Cell, Event, State};
 use super::heard::Heard;
-use super::telegrams::{ADDRESS, any_telegram, parameters, telegram};
+use super::telegrams::{ADDRESS, any_telegram, octets, parameters, telegram};
 use crate::fuzz::{LONGEST, Notebook};
 use crate::nordac::reference::ReferenceSlave;
 use crate::nordac::{Drive, InverterSetup};
@@ -12,8 +12,8 @@ use harness_proto::line::{LineError, Received};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES, Properties};
 use harness_proto::nordac::words::{State as DriveState, stw};
-use harness_proto::profibus::BusRate;
 use harness_proto::profibus::dp::DpState;
+use harness_proto::profibus::{Buffer, BusRate};
 use harness_proto::time::{Instant, Span};
 use std::sync::LazyLock;
 
@@ -79,7 +79,7 @@ struct Pair {
     now: Instant,
     /// The upper half of FC of the next counted request.
     count: u8,
-    last: Vec<u8>,
+    last: Buffer,
 }
 
 /// The defaults, and each other value of each open point that the reference model knows.
@@ -173,7 +173,7 @@ impl Pair {
             reference: ReferenceSlave::new(&setup),
             now: Instant::START,
             count: 0x60,
-            last: Vec::new(),
+            last: Buffer::new(),
         }
     }
 
@@ -196,14 +196,14 @@ impl Pair {
                 self.send(operation, Some(sap), more, reached);
             }
             13 => self.control(operation, reached),
-            14 if !self.last.is_empty() => self.telegram(&self.last.clone(), None, reached),
+            14 if !self.last.is_empty() => self.telegram(&{ self.last }, None, reached),
             15 => self.telegram(&any_telegram(&data), None, reached),
             _ => self.world(a, b, reached),
         }
     }
 
     /// The outputs of a Data_Exchange: a word, a setpoint, and a task where the PPO type has a parameter channel.
-    fn outputs(&self, what: u8, data: &[u8; 9]) -> Vec<u8> {
+    fn outputs(&self, what: u8, data: &[u8; 9]) -> Buffer {
         let [a, b, hsw_high, hsw_low, pke_high, pke_low, ind, high, low] = *data;
         let word = if what == 7 {
             u16::from_be_bytes([a, b])
@@ -211,25 +211,28 @@ impl Pair {
             WORDS[usize::from(a % 16)]
         };
         let ppo = self.drive.slave().ppo();
-        let mut outputs = Vec::new();
-        if ppo.has_pkw() {
-            outputs.extend([pke_high, pke_low, ind, 0, 0, 0, high, low]);
+        let [word_high, word_low] = word.to_be_bytes();
+        // As PPO2, of which each type is a part.
+        let mut all = [low; 20];
+        all[..8].copy_from_slice(&[pke_high, pke_low, ind, 0, 0, 0, high, low]);
+        all[8..12].copy_from_slice(&[word_high, word_low, hsw_high, hsw_low]);
+        let begin = if ppo.has_pkw() { 0 } else { 8 };
+        let outputs = &all[begin..begin + ppo.octets()];
+        if what != 8 {
+            return octets(&[outputs]);
         }
-        outputs.extend(word.to_be_bytes());
-        outputs.extend([hsw_high, hsw_low]);
-        outputs.resize(ppo.octets(), low);
-        if what == 8 {
-            outputs.resize(usize::from(b % 32), a);
-        }
-        outputs
+        // Another length.
+        let length = usize::from(b % 32);
+        let shorter = &outputs[..outputs.len().min(length)];
+        octets(&[shorter, &[a; 32][shorter.len()..length]])
     }
 
     /// Mostly the own configuration.
-    fn configuration(&self, a: u8, b: u8) -> Vec<u8> {
+    fn configuration(&self, a: u8, b: u8) -> Buffer {
         match a % 4 {
-            0 | 1 => self.drive.slave().ppo().cfg().to_vec(),
-            2 => vec![0xF3, b],
-            _ => vec![0xF5; usize::from(b % 4)],
+            0 | 1 => octets(&[self.drive.slave().ppo().cfg()]),
+            2 => octets(&[&[0xF3, b]]),
+            _ => octets(&[&[0xF5; 3][..usize::from(b % 4)]]),
         }
     }
 
@@ -270,13 +273,13 @@ impl Pair {
         self.transmit(&octets, operation, reached);
     }
 
-    fn transmit(&mut self, octets: &[u8], operation: &Operation, reached: &mut impl FnMut(Cell)) {
+    fn transmit(&mut self, octets: &Buffer, operation: &Operation, reached: &mut impl FnMut(Cell)) {
         let damage = (operation.how >> 4 & 3 == 3).then_some(operation.data[7]);
         self.telegram(octets, damage, reached);
     }
 
     /// A telegram to both, and both must answer the same at the same time.
-    fn telegram(&mut self, octets: &[u8], damage: Option<u8>, reached: &mut impl FnMut(Cell)) {
+    fn telegram(&mut self, octets: &Buffer, damage: Option<u8>, reached: &mut impl FnMut(Cell)) {
         let start = self.now + RATE.bit_time() * 33;
         let end = start + RATE.octet_time() * octets.len() as u64;
         self.pass(end, reached);
@@ -298,11 +301,12 @@ impl Pair {
             Some(_) => None,
         };
         let reply = self.drive.take_reply();
-        let sent = reply.as_ref().map(|(_, reply)| reply.to_vec());
-        assert_eq!(sent, expected, "the reply to {octets:02X?}");
+        let sent = reply.as_ref().map(|(_, reply)| &**reply);
+        let expected = expected.as_deref();
+        assert_eq!(sent, expected, "the reply to {octets}");
         self.now = end;
         if let Some((begin, reply)) = reply {
-            assert_eq!(begin, end + delay, "the reply to {octets:02X?} begins");
+            assert_eq!(begin, end + delay, "the reply to {octets} begins");
             self.now = begin + RATE.octet_time() * reply.len() as u64;
             self.drive.sent(self.now);
             self.pass(self.now, reached);
@@ -316,10 +320,10 @@ impl Pair {
             ppo,
             executed: self.reference.executed(),
         };
-        for event in heard.events(expected.as_deref()) {
+        for event in heard.events(expected) {
             reached(Cell { state, event });
         }
-        self.last = octets.to_vec();
+        self.last = *octets;
     }
 
     fn world(&mut self, a: u8, b: u8, reached: &mut impl FnMut(Cell)) {

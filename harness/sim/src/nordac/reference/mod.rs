@@ -1,7 +1,9 @@
 //! Models of inverter and module that share no code with them, to be compared with them.
 
+mod bytes;
 pub mod inverter;
 pub mod slave;
 
+pub use bytes::Bytes;
 pub use inverter::ReferenceInverter;
 pub use slave::ReferenceSlave;

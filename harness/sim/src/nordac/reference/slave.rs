@@ -2,6 +2,7 @@
 //!
 //! It knows whole telegrams and no octets on a line. Behind it stands an inverter of its own.
 
+use super::bytes::Bytes;
 use crate::nordac::InverterSetup;
 use crate::nordac::inverter::{Inverter, Outputs};
 use harness_proto::nordac::properties::Properties;
@@ -16,9 +17,6 @@ const GET_CFG: u8 = 59;
 const SLAVE_DIAG: u8 = 60;
 const SET_PRM: u8 = 61;
 const CHK_CFG: u8 = 62;
-
-/// Bytes of a PPO in one direction.
-type Bytes = Vec<u8>;
 
 /// What a service gives.
 enum Reply {
@@ -105,7 +103,7 @@ impl ReferenceSlave {
             synced: false,
             waiting: None,
             frozen: None,
-            outputs: vec![0; settings.ppo.octets()],
+            outputs: Bytes::zeros(settings.ppo.octets()),
             task: Pkw::default(),
             shown: None,
             due: None,
@@ -218,7 +216,7 @@ impl ReferenceSlave {
             && let Some(last) = &self.last
         {
             self.repeated = true;
-            return last.clone();
+            return *last;
         }
         self.record = (fcv || fcb).then_some((request.sa, fcb));
         let reply = if sends {
@@ -228,20 +226,20 @@ impl ReferenceSlave {
         };
         let octets = match reply {
             Reply::Rs => self.short(request.sa, 3),
-            Reply::Sc => vec![0xE5],
+            Reply::Sc => Bytes::of(&[&[0xE5]]),
             Reply::Inputs(data) => {
                 let fc = if self.diagnosis_waits { 0x0A } else { 0x08 };
                 long(request.sa, self.address, fc, &data)
             }
             Reply::Data(data) => {
-                let mut all = vec![request.ssap.unwrap_or(0), request.dsap.unwrap_or(0)];
-                all.extend(data);
+                let saps = [request.ssap.unwrap_or(0), request.dsap.unwrap_or(0)];
+                let all = Bytes::of(&[&saps, &data]);
                 long(request.sa | 0x80, self.address | 0x80, 0x08, &all)
             }
         };
         // The reply to the exchange that changes the address or the PPO type still comes from the old one.
         let settings = self.inverter.settings();
-        self.last = Some(octets.clone());
+        self.last = Some(octets);
         if settings.restarts != self.restarts {
             self.begin_anew();
         }
@@ -278,10 +276,10 @@ impl ReferenceSlave {
             (Some(SET_PRM), _) => self.set_prm(at, sa, data),
             (Some(CHK_CFG), _) => self.chk_cfg(own, data),
             _ if !data.is_empty() => Reply::Rs,
-            (Some(GET_CFG), _) => Reply::Data(self.ppo.cfg().to_vec()),
+            (Some(GET_CFG), _) => Reply::Data(Bytes::of(&[self.ppo.cfg()])),
             (Some(SLAVE_DIAG), _) => Reply::Data(self.slave_diag(own)),
             (Some(RD_INP), _) if exchanges => Reply::Data(self.read_inputs(at)),
-            (Some(RD_OUTP), _) if exchanges => Reply::Data(self.outputs.clone()),
+            (Some(RD_OUTP), _) if exchanges => Reply::Data(self.outputs),
             _ => Reply::Rs,
         }
     }
@@ -362,7 +360,7 @@ impl ReferenceSlave {
 
     fn forget_data(&mut self) {
         self.waiting = None;
-        self.outputs = vec![0; self.ppo.octets()];
+        self.outputs = Bytes::zeros(self.ppo.octets());
         self.task = Pkw::default();
         self.shown = None;
         self.due = None;
@@ -383,11 +381,9 @@ impl ReferenceSlave {
             | bit(self.watchdog.is_some(), 3)
             | bit(self.frozen.is_some(), 4)
             | bit(self.synced, 5);
-        let mut all = vec![first, second, 0, self.master.unwrap_or(0xFF), 0x75, 0x31];
-        if extended {
-            all.extend([0x02, 0x04]);
-        }
-        all
+        let master = self.master.unwrap_or(0xFF);
+        let block: &[u8] = if extended { &[0x02, 0x04] } else { &[] };
+        Bytes::of(&[&[first, second, 0, master, 0x75, 0x31], block])
     }
 
     fn exchange(&mut self, at: Instant, data: &[u8]) -> Reply {
@@ -406,12 +402,12 @@ impl ReferenceSlave {
             }
         }
         let inputs = match (&self.frozen, &self.apart) {
-            (Some(frozen), _) => frozen.clone(),
-            (None, Some(kept)) => kept.clone(),
+            (Some(frozen), _) => *frozen,
+            (None, Some(kept)) => *kept,
             (None, None) => self.live(at),
         };
         if self.synced {
-            self.waiting = Some(data.to_vec());
+            self.waiting = Some(Bytes::of(&[data]));
         } else {
             self.put_out(at, data);
         }
@@ -420,7 +416,7 @@ impl ReferenceSlave {
 
     /// Outputs become effective.
     fn put_out(&mut self, at: Instant, data: &[u8]) {
-        self.outputs = data.to_vec();
+        self.outputs = Bytes::of(&[data]);
         if self.apart.is_some() {
             return;
         }
@@ -455,7 +451,7 @@ impl ReferenceSlave {
 
     /// The inputs as they are now.
     fn live(&self, at: Instant) -> Bytes {
-        let mut all = Bytes::new();
+        let mut all = Bytes::zeros(0);
         if self.ppo.has_pkw() {
             let answer = self.shown.map_or(Pkw::default(), |(task, answer)| {
                 let now = match answer {
@@ -464,22 +460,22 @@ impl ReferenceSlave {
                 };
                 self.inverter.encode(now, task)
             });
-            all.extend(answer.encode());
+            all.extend(&answer.encode());
         }
         let inputs = self.inverter.inputs(at);
         for word in [inputs.zsw, inputs.hiw, inputs.pzd3, inputs.pzd4, 0, 0]
             .iter()
             .take(self.ppo.words())
         {
-            all.extend(word.to_be_bytes());
+            all.extend(&word.to_be_bytes());
         }
         all
     }
 
     fn read_inputs(&self, at: Instant) -> Bytes {
         match (&self.frozen, &self.apart) {
-            (Some(frozen), _) if self.p.rd_inp_under_freeze.word() == "frozen" => frozen.clone(),
-            (_, Some(kept)) => kept.clone(),
+            (Some(frozen), _) if self.p.rd_inp_under_freeze.word() == "frozen" => *frozen,
+            (_, Some(kept)) => *kept,
             _ => self.live(at),
         }
     }
@@ -493,12 +489,12 @@ impl ReferenceSlave {
         let has = |bit: u8| command & bit != 0;
         if has(0x02) {
             self.waiting = None;
-            self.put_out(at, &vec![0; self.ppo.octets()]);
+            self.put_out(at, &Bytes::zeros(self.ppo.octets()));
         }
         if has(0x04) {
             self.frozen = None;
         } else if freeze && has(0x08) {
-            self.frozen = Some(self.apart.clone().unwrap_or_else(|| self.live(at)));
+            self.frozen = Some(self.apart.unwrap_or_else(|| self.live(at)));
         }
         if has(0x10) || sync && has(0x20) {
             self.synced = !has(0x10);
@@ -521,19 +517,18 @@ impl ReferenceSlave {
     /// SD1 to `sa`.
     fn short(&self, sa: u8, fc: u8) -> Bytes {
         let sum = sa.wrapping_add(self.address).wrapping_add(fc);
-        vec![0x10, sa, self.address, fc, sum, 0x16]
+        Bytes::of(&[&[0x10, sa, self.address, fc, sum, 0x16]])
     }
 }
 
 /// SD2.
 fn long(da: u8, sa: u8, fc: u8, data: &[u8]) -> Bytes {
     let length = data.len() as u8 + 3;
-    let mut all = vec![0x68, length, length, 0x68, da, sa, fc];
-    all.extend(data);
+    let mut all = Bytes::of(&[&[0x68, length, length, 0x68, da, sa, fc], data]);
     let sum = all[4..]
         .iter()
         .fold(0_u8, |sum, octet| sum.wrapping_add(*octet));
-    all.extend([sum, 0x16]);
+    all.extend(&[sum, 0x16]);
     all
 }
 
