@@ -94,18 +94,39 @@ impl Drive {
 impl Drive {
     /// Takes an octet; gives the telegram that it completes, to be answered by [`Drive::answer`]. A drive without power hears nothing.
     pub fn receive(&mut self, at: Instant, octet: Received) -> Option<Telegram> {
+        self.hears_end(at, octet)
+            .then(|| self.receiver.telegram())
+            .flatten()
+    }
+
+    /// Takes an octet; `true` if it is the last one of what may be a telegram.
+    fn hears_end(&mut self, at: Instant, octet: Received) -> bool {
         self.torn = self.powered && self.receiver.tears(at);
-        if self.powered {
-            if self.torn
-                && let Some((slave, inverter)) = self.before.take()
-            {
-                (self.slave, self.inverter) = (slave, inverter);
-                self.reply = None;
-            }
-            return self.receiver.hear(at, octet);
+        if !self.powered {
+            self.receiver.skip(at);
+            return false;
         }
-        self.receiver.skip(at);
-        None
+        if self.torn {
+            self.undo();
+        }
+        self.receiver.hear(at, octet)
+    }
+
+    /// The last telegram was none: module and inverter are as they were before it.
+    #[cold]
+    fn undo(&mut self) {
+        if let Some((slave, inverter)) = self.before.take() {
+            (self.slave, self.inverter) = (slave, inverter);
+            self.reply = None;
+        }
+    }
+
+    /// Answers the telegram that has just ended. A function of its own: most octets are no last ones.
+    #[inline(never)]
+    fn end(&mut self, at: Instant) {
+        if let Some(telegram) = self.receiver.telegram() {
+            self.answer(at, &telegram);
+        }
     }
 
     /// Takes a telegram that has ended at `at`. The reply, if there is one, waits from now on.
@@ -145,8 +166,8 @@ impl Drive {
 
 impl LineStation for Drive {
     fn hear(&mut self, at: Instant, octet: Received) {
-        if let Some(telegram) = self.receive(at, octet) {
-            self.answer(at, &telegram);
+        if self.hears_end(at, octet) {
+            self.end(at);
         }
     }
 

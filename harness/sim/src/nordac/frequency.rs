@@ -70,16 +70,28 @@ impl Frequency {
     /// The frequency times `factor` / `divisor`, rounded to the nearest whole number, a half away from 0. `divisor` must be positive.
     #[must_use]
     pub const fn rounded(self, factor: i64, divisor: i64) -> i128 {
+        if self.is_zero() {
+            return 0;
+        }
         let numerator = self.numerator * factor as i128;
         let denominator = self.denominator * divisor as i128;
-        let nearest = (2 * numerator.abs() + denominator) / (2 * denominator);
+        let nearest = quotient(2 * numerator.abs() + denominator, 2 * denominator);
         nearest * numerator.signum()
     }
 
     /// The frequency times `factor` / `divisor`, cut off towards 0. `divisor` must be positive.
     #[must_use]
     pub const fn cut(self, factor: i64, divisor: i64) -> i128 {
-        self.numerator * factor as i128 / (self.denominator * divisor as i128)
+        quotient(
+            self.numerator * factor as i128,
+            self.denominator * divisor as i128,
+        )
+    }
+
+    /// Numerator and denominator, if both have 64 bits.
+    fn short(self) -> Option<(i64, i64)> {
+        let numerator = i64::try_from(self.numerator).ok()?;
+        Some((numerator, i64::try_from(self.denominator).ok()?))
     }
 
     /// In lowest terms, and rounded where the denominator is larger than [`FINEST`].
@@ -106,6 +118,16 @@ impl Frequency {
     }
 }
 
+/// `a` / `b`, where `b` is positive. Most numbers here have 64 bits, and their division is several times faster.
+const fn quotient(a: i128, b: i128) -> i128 {
+    let (short_a, short_b) = (a as i64, b as i64);
+    if short_a as i128 == a && short_b as i128 == b {
+        (short_a / short_b) as i128
+    } else {
+        a / b
+    }
+}
+
 impl PartialEq for Frequency {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
@@ -122,6 +144,14 @@ impl PartialOrd for Frequency {
 
 impl Ord for Frequency {
     fn cmp(&self, other: &Self) -> Ordering {
+        if self.denominator == other.denominator {
+            return self.numerator.cmp(&other.numerator);
+        }
+        if let (Some(left), Some(right)) = (self.short(), other.short()) {
+            // 64 bits times 64 bits: two instructions, and no check.
+            return (i128::from(left.0) * i128::from(right.1))
+                .cmp(&(i128::from(right.0) * i128::from(left.1)));
+        }
         let left = self.numerator.checked_mul(other.denominator);
         let right = other.numerator.checked_mul(self.denominator);
         if let (Some(left), Some(right)) = (left, right) {

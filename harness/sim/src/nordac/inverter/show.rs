@@ -63,10 +63,10 @@ impl Inverter {
             (zsw::ANTICLOCKWISE, frequency.is_negative()),
         ];
         let shown = bits
-            .iter()
-            .filter(|(_, shown)| *shown)
-            .map(|(mask, _)| mask);
-        self.state_bits() | u16::from(self.set()) << zsw::SET_SHIFT | shown.sum::<u16>()
+            .into_iter()
+            .map(|(mask, shown)| if shown { mask } else { 0 });
+        let set = u16::from(self.set()) << zsw::SET_SHIFT;
+        shown.fold(self.state_bits() | set, |all, bit| all | bit)
     }
 
     /// Bits 6 and 3 to 0.

@@ -8,7 +8,6 @@ use harness_proto::nordac::properties::{LeaveDxWrongLength, RdInpUnderFreeze, Sy
 use harness_proto::profibus::Buffer;
 use harness_proto::profibus::dp::{DpState, GlobalControl};
 use harness_proto::time::Instant;
-use std::collections::VecDeque;
 
 /// Inputs and outputs, and what Sync and Freeze keep of them.
 #[derive(Clone, Debug, Default)]
@@ -22,7 +21,7 @@ pub(super) struct ProcessData {
     /// The inputs of the last Freeze.
     frozen: Option<Image>,
     /// Process words of former exchanges, the oldest first, where replies show these.
-    former: VecDeque<Inputs>,
+    former: Vec<Inputs>,
 }
 
 impl ProcessData {
@@ -80,11 +79,11 @@ impl Slave {
         let former = usize::from(self.properties.pzd_latency).saturating_sub(1);
         if former > 0 {
             let now = inverter.inputs(at);
-            self.data.former.push_back(now);
+            self.data.former.push(now);
             if self.data.former.len() > former + 1 {
-                self.data.former.pop_front();
+                self.data.former.remove(0);
             }
-            inputs.words = words(self.data.former.front().copied().unwrap_or(now));
+            inputs.words = words(self.data.former.first().copied().unwrap_or(now));
         }
         self.data.frozen.unwrap_or(inputs)
     }

@@ -12,10 +12,14 @@ use harness_proto::time::{Instant, Span};
 pub(in crate::nordac) struct Receiver {
     bit: Span,
     octet: Span,
+    /// The idle time in front of a telegram.
+    pause: Span,
     /// The end of the last octet on the line.
     idle_since: Instant,
     /// The telegram so far.
     octets: Buffer,
+    /// How many octets it will have, by its first two.
+    length: usize,
     /// Whether the octets up to the next idle time are not read.
     skips: bool,
     /// Whether the last octet was the last one of a telegram.
@@ -28,8 +32,10 @@ impl Receiver {
         Self {
             bit: rate.bit_time(),
             octet: rate.octet_time(),
+            pause: rate.bit_time() * SYN_BITS,
             idle_since: at,
             octets: Buffer::new(),
+            length: 0,
             skips: true,
             complete: false,
         }
@@ -47,33 +53,35 @@ impl Receiver {
         self.complete && (at - self.octet).since(self.idle_since) < self.bit
     }
 
-    /// Takes an octet whose last stop bit has passed at `at`; gives the telegram that it completes.
-    pub(in crate::nordac) fn hear(&mut self, at: Instant, octet: Received) -> Option<Telegram> {
+    /// Takes an octet whose last stop bit has passed at `at`; `true` if it is the last one of what may be a telegram.
+    pub(in crate::nordac) fn hear(&mut self, at: Instant, octet: Received) -> bool {
         let start = at - self.octet;
         let idle = start.since(self.idle_since);
         self.idle_since = at;
         self.complete = false;
-        if idle >= self.bit * SYN_BITS {
+        if idle >= self.pause {
             self.octets.clear();
             self.skips = false;
         } else if idle >= self.bit {
             self.skips = true;
         }
         if self.skips {
-            return None;
+            return false;
         }
         let fits = octet.error.is_none() && self.octets.push(octet.byte);
-        match expected(&self.octets).filter(|_| fits) {
-            None => self.skips = true,
-            Some(length) if length == self.octets.len() => {
-                self.skips = true;
-                let telegram = Telegram::decode(&self.octets).value();
-                self.complete = telegram.is_some();
-                return telegram;
-            }
-            Some(_) => {}
+        if fits && self.octets.len() <= 2 {
+            self.length = expected(&self.octets).unwrap_or(0);
         }
-        None
+        // The octets of no telegram have a length of 0.
+        self.skips = !fits || self.octets.len() >= self.length;
+        fits && self.octets.len() == self.length
+    }
+
+    /// The telegram that has just ended.
+    pub(in crate::nordac) fn telegram(&mut self) -> Option<Telegram> {
+        let telegram = Telegram::decode(&self.octets).value();
+        self.complete = telegram.is_some();
+        telegram
     }
 }
 
