@@ -74,6 +74,11 @@ impl Link {
         self.bytes.logged()
     }
 
+    /// All of them, in order.
+    pub(crate) fn log(&self) -> impl Iterator<Item = LineByte> + '_ {
+        self.bytes.log()
+    }
+
     /// One of them, in order.
     pub(crate) fn logged_byte(&self, index: usize) -> Option<LineByte> {
         self.bytes.logged_byte(index)
@@ -95,9 +100,7 @@ impl Link {
 
     /// Returns the bytes recorded since the last call.
     pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
-        let log = (0..self.logged())
-            .filter_map(|index| self.logged_byte(index))
-            .collect();
+        let log = self.log().collect();
         self.bytes.forget_arrived();
         log
     }

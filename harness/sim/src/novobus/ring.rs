@@ -572,8 +572,11 @@ impl<D: Device> Ring<D> {
         let end = |place: usize| u8::try_from(place).ok().and_then(|p| drives.checked_sub(p));
         let channels = (0..self.links.len()).map(|i| {
             let from = end(i).filter(|&k| k < drives);
-            let carried = self.carried_by(i).into_iter().flatten();
-            Channel::of_octets(from, end(i + 1), carried.collect())
+            let carried = match self.groups.is_empty() {
+                true => self.links[i].log().collect(),
+                false => self.carried_by(i).into_iter().flatten().collect(),
+            };
+            Channel::of_octets(from, end(i + 1), carried)
         });
         let remarks = self.nodes.iter().flat_map(|node| node.remarks().to_vec());
         let mut remarks: Vec<_> = remarks.collect();

@@ -142,6 +142,11 @@ impl Bytes {
         if self.recording { self.arrived } else { 0 }
     }
 
+    /// All of them, in order.
+    pub(crate) fn log(&self) -> impl Iterator<Item = LineByte> + '_ {
+        self.bytes[..self.logged()].iter().map(|byte| byte.unpack())
+    }
+
     /// One of them.
     #[inline]
     pub(crate) fn logged_byte(&self, index: usize) -> Option<LineByte> {
