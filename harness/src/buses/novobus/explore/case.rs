@@ -187,10 +187,20 @@ impl Talk {
     /// The telegrams, each with its bytes, in a ring of `drives`.
     #[must_use]
     pub fn telegrams(&self, drives: u8) -> Vec<Vec<u8>> {
-        let room = usize::from(self.room.clamp(2, MOST_NET));
-        let all: Vec<u8> = self.orders.iter().flat_map(CommandSent::bytes).collect();
-        let mut rest = &all[..];
         let mut telegrams = Vec::new();
+        self.each_telegram(drives, |bytes| telegrams.push(bytes.to_vec()));
+        telegrams
+    }
+
+    /// Gives the bytes of each telegram to `take`, in order.
+    fn each_telegram(&self, drives: u8, mut take: impl FnMut(&[u8])) {
+        let room = usize::from(self.room.clamp(2, MOST_NET));
+        let mut all = Vec::with_capacity(8 * self.orders.len());
+        for order in &self.orders {
+            order.append_to(&mut all);
+        }
+        let mut rest = &all[..];
+        let mut bytes = Vec::new();
         let mut first = true;
         while first || !rest.is_empty() {
             let data = self.process_data.filter(|_| first);
@@ -206,18 +216,19 @@ impl Talk {
                 false => To::Same,
             };
             if !first && !self.between.is_empty() {
-                telegrams.push(self.between.clone());
+                take(&self.between);
             }
-            telegrams.push(telegram(to, data, now, drives));
+            bytes.clear();
+            telegram(&mut bytes, to, data, now, drives);
+            take(&bytes);
             rest = later;
             first = false;
         }
-        telegrams
     }
 }
 
-/// A telegram of any kind (9.1, 9.2), an address byte without net bytes among them.
-fn telegram(to: To, data: Option<u16>, parameters: &[u8], drives: u8) -> Vec<u8> {
+/// Appends a telegram of any kind (9.1, 9.2), an address byte without net bytes among them.
+fn telegram(bytes: &mut Vec<u8>, to: To, data: Option<u16>, parameters: &[u8], drives: u8) {
     let (form, address) = match to {
         // 9.3: the master sends k-N.
         To::Drive(drive) => (0x80, Some(drive.wrapping_sub(drives))),
@@ -228,11 +239,10 @@ fn telegram(to: To, data: Option<u16>, parameters: &[u8], drives: u8) -> Vec<u8>
     let data_bytes = data.map(u16::to_be_bytes);
     let length = parameters.len() + data_bytes.map_or(0, |bytes| bytes.len());
     let length = u8::try_from(length).unwrap_or(MOST_NET).min(MOST_NET);
-    let mut bytes = vec![form | length << 1 | u8::from(data.is_some())];
+    bytes.push(form | length << 1 | u8::from(data.is_some()));
     bytes.extend(address);
     bytes.extend(data_bytes.into_iter().flatten());
     bytes.extend(parameters);
-    bytes
 }
 
 impl Act {
@@ -248,26 +258,36 @@ impl Act {
     /// What is sent, telegram by telegram.
     #[must_use]
     pub fn parts(&self, drives: u8) -> Vec<Vec<u8>> {
+        let mut parts = Vec::new();
+        self.each_part(drives, |part| parts.push(part.to_vec()));
+        parts
+    }
+
+    /// Gives what is sent to `take`, telegram by telegram.
+    pub(super) fn each_part(&self, drives: u8, mut take: impl FnMut(&[u8])) {
+        const MOST: usize = u8::MAX as usize;
         match &self.what {
-            ActKind::Synco(count) => vec![vec![SYNCO; usize::from(*count)]],
-            ActKind::Pause(count) => vec![vec![PAUSE; usize::from(*count)]],
-            ActKind::Zeros(count) => vec![vec![0; usize::from(*count)]],
+            ActKind::Synco(count) => take(&[SYNCO; MOST][..usize::from(*count)]),
+            ActKind::Pause(count) => take(&[PAUSE; MOST][..usize::from(*count)]),
+            ActKind::Zeros(count) => take(&[0; MOST][..usize::from(*count)]),
             ActKind::Recover => {
                 let mut bytes = vec![0; usize::from(ZEROS)];
                 bytes.extend(SEQUENCE);
-                vec![bytes]
+                take(&bytes);
             }
-            ActKind::Sequence => vec![SEQUENCE.to_vec()],
-            ActKind::Bytes(bytes) => vec![bytes.clone()],
-            ActKind::Talk(talk) => talk.telegrams(drives),
-            ActKind::Wait(_) | ActKind::Power { .. } => Vec::new(),
+            ActKind::Sequence => take(&SEQUENCE),
+            ActKind::Bytes(bytes) => take(bytes),
+            ActKind::Talk(talk) => talk.each_telegram(drives, take),
+            ActKind::Wait(_) | ActKind::Power { .. } => {}
         }
     }
 
     /// How many bytes are sent.
     #[must_use]
     pub fn length(&self, drives: u8) -> usize {
-        self.parts(drives).iter().map(Vec::len).sum()
+        let mut length = 0;
+        self.each_part(drives, |part| length += part.len());
+        length
     }
 }
 
@@ -294,15 +314,25 @@ impl Case {
     /// All bytes that are sent.
     #[must_use]
     pub fn bytes(&self) -> Vec<u8> {
-        let acts = self.acts.iter();
-        acts.flat_map(|act| act.parts(self.drives).concat())
-            .collect()
+        let mut bytes = Vec::with_capacity(MOST_BYTES);
+        for act in &self.acts {
+            act.each_part(self.drives, |part| bytes.extend(part));
+        }
+        bytes
+    }
+
+    /// How many bytes are sent.
+    fn length(&self) -> usize {
+        self.acts.iter().map(|act| act.length(self.drives)).sum()
     }
 
     /// The faults on links: link, byte counted from 1 over all bytes that the master sends, and what happens.
     #[must_use]
     pub fn faults(&self) -> Vec<(u8, u64, Harm)> {
         let mut faults = Vec::new();
+        if self.acts.iter().all(|act| act.damages.is_empty()) {
+            return faults;
+        }
         let mut before = 0;
         for act in &self.acts {
             let length = act.length(self.drives);
@@ -339,7 +369,7 @@ impl Case {
     fn is_within(&self, times: usize) -> bool {
         let is_ring = |drives: &u8| RingSize::new(u64::from(*drives)).is_ok();
         self.acts.len() <= MOST_ACTS * times
-            && self.bytes().len() <= MOST_BYTES * times
+            && self.length() <= MOST_BYTES * times
             && self.sizes().iter().all(is_ring)
     }
 
@@ -354,7 +384,7 @@ impl Case {
             _ => 0,
         });
         [
-            self.bytes().len() as u64,
+            self.length() as u64,
             damages.map(|damage| damage.harm.weight()).sum(),
             self.acts.len() as u64,
             self.sizes().into_iter().map(u64::from).sum(),

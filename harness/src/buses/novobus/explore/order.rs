@@ -4,6 +4,9 @@ use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::guard::DriveAct as GuardedAct;
 use serde::{Deserialize, Serialize};
 
+/// The bytes of the longest command (ND21 10).
+const LONGEST: usize = 6;
+
 /// A command, perhaps spoiled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CommandSent {
@@ -85,23 +88,26 @@ impl RawCommand {
     /// Its bytes without the checking byte.
     #[must_use]
     pub fn head(self) -> Vec<u8> {
-        let parts = |cell: u16| {
-            let [high, low] = cell.to_be_bytes();
-            (low, high)
-        };
+        let mut bytes = Vec::with_capacity(LONGEST);
+        self.append_head(&mut bytes);
+        bytes
+    }
+
+    fn append_head(self, bytes: &mut Vec<u8>) {
+        let [high, low] = self.cell().unwrap_or(0).to_be_bytes();
         match self {
-            Self::ReadByte { cell } => vec![0xC0, parts(cell).0, parts(cell).1],
-            Self::ReadWord { cell } => vec![0xC1, parts(cell).0, parts(cell).1, b'?'],
-            Self::ReadLong { cell } => vec![0xC7, parts(cell).0, parts(cell).1, b'1', b'2'],
-            Self::WriteByte { cell, data } => vec![0x82, data, parts(cell).0, parts(cell).1],
-            Self::WriteWord { cell, data } => {
+            Self::ReadByte { .. } => bytes.extend([0xC0, low, high]),
+            Self::ReadWord { .. } => bytes.extend([0xC1, low, high, b'?']),
+            Self::ReadLong { .. } => bytes.extend([0xC7, low, high, b'1', b'2']),
+            Self::WriteByte { data, .. } => bytes.extend([0x82, data, low, high]),
+            Self::WriteWord { data, .. } => {
                 let [upper, lower] = data.to_be_bytes();
-                vec![0x63, lower, upper, parts(cell).0, parts(cell).1]
+                bytes.extend([0x63, lower, upper, low, high]);
             }
-            Self::And { low, data } => vec![0xA4, data, low],
-            Self::Or { low, data } => vec![0xA5, data, low],
-            Self::WriteIo { code } => vec![0xC8, code],
-            Self::Reset => vec![0xDD, b'!'],
+            Self::And { low, data } => bytes.extend([0xA4, data, low]),
+            Self::Or { low, data } => bytes.extend([0xA5, data, low]),
+            Self::WriteIo { code } => bytes.extend([0xC8, code]),
+            Self::Reset => bytes.extend([0xDD, b'!']),
         }
     }
 
@@ -200,12 +206,19 @@ impl CommandSent {
     /// Its bytes with the checking byte.
     #[must_use]
     pub fn bytes(&self) -> Vec<u8> {
-        let mut bytes = self.command.head();
-        bytes.push(Checksum::over(&bytes).plus());
-        if let Some(spoil) = self.spoil {
-            let at = usize::from(spoil.at).min(bytes.len() - 1);
-            bytes[at] = spoil.byte;
-        }
+        let mut bytes = Vec::with_capacity(LONGEST);
+        self.append_to(&mut bytes);
         bytes
+    }
+
+    /// Appends its bytes with the checking byte.
+    pub(super) fn append_to(&self, bytes: &mut Vec<u8>) {
+        let begin = bytes.len();
+        self.command.append_head(bytes);
+        bytes.push(Checksum::over(&bytes[begin..]).plus());
+        if let Some(spoil) = self.spoil {
+            let at = usize::from(spoil.at).min(bytes.len() - begin - 1);
+            bytes[begin + at] = spoil.byte;
+        }
     }
 }
