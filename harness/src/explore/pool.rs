@@ -3,7 +3,8 @@
 use super::Case;
 use super::FuzzCase;
 use crate::explore::Dice;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Maximum number of cases kept.
 pub const MOST_KEPT: usize = 2_000;
@@ -14,7 +15,7 @@ pub struct Pool<C: FuzzCase = Case> {
     cases: Vec<C>,
     /// Which of them are with which drives ([`FuzzCase::lane`]).
     of_lane: [Vec<usize>; 2],
-    shown: BTreeSet<u32>,
+    shown: HashSet<u32, BuildHasherDefault<Spread>>,
 }
 
 impl<C: FuzzCase> Default for Pool<C> {
@@ -22,15 +23,38 @@ impl<C: FuzzCase> Default for Pool<C> {
         Self {
             cases: Vec::new(),
             of_lane: Default::default(),
-            shown: BTreeSet::new(),
+            shown: HashSet::default(),
         }
+    }
+}
+
+/// A hash of features, which are hashes already.
+#[derive(Clone, Debug, Default)]
+struct Spread(u64);
+
+impl Hasher for Spread {
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = self.0 << 8 | u64::from(*byte);
+        }
+    }
+
+    fn write_u32(&mut self, feature: u32) {
+        // The table takes the lowest bits for the place and the highest for a quick comparison.
+        self.0 = u64::from(feature).wrapping_mul(0x1_0000_0001);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
     }
 }
 
 impl<C: FuzzCase> Pool<C> {
     /// Keeps a case that shows new features. Returns the number of new features, 0 if the case is not kept.
     pub fn offer(&mut self, case: &C, features: &BTreeSet<u32>) -> usize {
-        let new = features.difference(&self.shown).count();
+        // Looked up one by one: `difference` goes through all that was ever shown.
+        let new = features.iter().filter(|own| !self.shown.contains(own));
+        let new = new.count();
         if new == 0 || self.cases.len() >= MOST_KEPT {
             return 0;
         }

@@ -15,18 +15,19 @@ use std::collections::BTreeSet;
 /// The features of a run of the model.
 #[must_use]
 pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> {
-    let mut found = BTreeSet::new();
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
-        return found;
+        return BTreeSet::new();
     };
     let bytes = case.bytes();
     let sent: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
     let roles = roles(size, &sent);
     let role_at = |index: usize| roles.get(index).map_or(0, |role| number(*role));
+    // Sorted at the end: that costs less than a set that grows.
+    let mut found = Vec::with_capacity(2 * bytes.len() + trace.remarks.len() + 1);
     let mut before = 0;
+    let mut last = None;
     for (index, byte) in bytes.iter().enumerate() {
         let role = role_at(index);
-        found.insert(hash(&[1, before, role]));
         let answer = match seen.received.get(index) {
             None => 0,
             Some((_, answer)) if answer.error.is_some() => 1,
@@ -35,7 +36,10 @@ pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> 
             Some((_, answer)) if answer.byte < case.drives => 4,
             Some(_) => 5,
         };
-        found.insert(hash(&[2, role, answer]));
+        // Most bytes show what the one before has shown: idle bytes and zeros come in rows.
+        if last.replace((before, role, answer)) != Some((before, role, answer)) {
+            found.extend([hash(&[1, before, role]), hash(&[2, role, answer])]);
+        }
         before = role;
     }
     for mark in &trace.remarks {
@@ -45,18 +49,20 @@ pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> 
             let own = sign(bit);
             signs | u32::from(mark.marks().contains(own)) << bit
         });
-        found.insert(hash(&[3, signs, cause, role_at(index.saturating_sub(1))]));
+        found.push(hash(&[3, signs, cause, role_at(index.saturating_sub(1))]));
     }
     let surplus = seen.received.len().saturating_sub(bytes.len());
-    found.insert(hash(&[4, surplus.min(3) as u32]));
-    match case.ring() {
-        0 => found,
+    found.push(hash(&[4, surplus.min(3) as u32]));
+    let ring = case.ring();
+    if ring > 0 {
         // Features of one ring are independent of those of the other ring.
-        ring => found
-            .into_iter()
-            .map(|own| hash(&[own, ring as u32]))
-            .collect(),
+        for own in &mut found {
+            *own = hash(&[*own, ring as u32]);
+        }
     }
+    found.sort_unstable();
+    found.dedup();
+    found.into_iter().collect()
 }
 
 fn sign(bit: u32) -> harness_proto::novobus::error_mode::Marks {
