@@ -72,6 +72,13 @@ impl SimulatedLink {
         self.record(false);
     }
 
+    /// Makes room for this number of bytes on every link of a ring.
+    pub fn reserve(&mut self, ring: usize, bytes: usize) {
+        if let Some(ring) = self.bench.ring_mut(ring) {
+            ring.reserve(bytes);
+        }
+    }
+
     /// Adds a [witness](harness_sim::novobus::witness) to every drive, before anything is sent. Returns false if a drive is not a whole ND21
     /// and has no witness.
     #[must_use]

@@ -9,6 +9,9 @@ use harness_proto::time::{Instant, Span};
 /// How long bytes may be on their way round: far more than the longest case takes.
 const MOST_ROUND: Span = Span::from_millis(60_000);
 
+/// Room for the bytes of most cases, so that links and queues do not grow byte by byte.
+const USUAL: usize = 128;
+
 /// What the master saw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MasterView {
@@ -21,6 +24,7 @@ pub struct MasterView {
 /// Plays a case on a ring to which nothing has been sent, in the steps of a scenario.
 pub fn play(link: &mut SimulatedLink, case: &Case) -> MasterView {
     let ring = case.ring();
+    link.reserve(ring, USUAL);
     for (place, byte, harm) in case.faults() {
         let fault = PlacedFault::Link(usize::from(place), harm.fault());
         link.inject(ring, fault, Moment::Byte(byte));
@@ -38,20 +42,22 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> MasterView {
                 link.inject(ring, PlacedFault::Drive(drive, fault), Moment::Now);
             }
             _ => {
-                for part in act
-                    .parts(case.drives)
-                    .iter()
-                    .filter(|part| !part.is_empty())
-                {
-                    line_before = link.send_octets(ring, part);
-                }
+                act.each_part(case.drives, |part| {
+                    if !part.is_empty() {
+                        line_before = link.send_octets(ring, part);
+                    }
+                });
             }
         }
     }
     let end = link.now() + MOST_ROUND;
+    // The last byte is under way until then at least, so that nothing ends before.
+    link.run_until(line_before);
     while link.busy() && link.now() < end && link.wait(end) {}
+    let mut received = Vec::with_capacity(USUAL);
+    received.extend(std::iter::from_fn(|| link.receive_octet(ring)));
     MasterView {
-        received: std::iter::from_fn(|| link.receive_octet(ring)).collect(),
+        received,
         took: link.now().since_start(),
     }
 }
