@@ -23,6 +23,7 @@ impl Buffer {
 
     /// These octets; `None` if there are more than [`MAX_TELEGRAM`].
     #[must_use]
+    #[inline]
     pub fn of(octets: &[u8]) -> Option<Self> {
         let mut all = Self::new();
         all.extend(octets).then_some(all)
@@ -36,6 +37,7 @@ impl Buffer {
 
     /// Appends octets; `false`, and nothing is changed, if there is not room for all.
     #[must_use]
+    #[inline]
     pub fn extend(&mut self, octets: &[u8]) -> bool {
         let begin = usize::from(self.len);
         let end = begin + octets.len();

@@ -169,7 +169,9 @@ impl Pdu {
         self.payload.get(saps..).unwrap_or_default()
     }
 
-    fn encode(&self) -> Buffer {
+    /// The octets from the start to the end.
+    #[must_use]
+    pub fn encode(&self) -> Buffer {
         let mut all = Buffer::new();
         let length = u8::try_from(self.payload.len() + 3).unwrap_or(u8::MAX);
         let head: &[u8] = match self.form() {

@@ -100,6 +100,7 @@ impl Drive {
     }
 
     /// Takes an octet; `true` if it is the last one of what may be a telegram.
+    #[inline]
     fn hears_end(&mut self, at: Instant, octet: Received) -> bool {
         self.torn = self.powered && self.receiver.tears(at);
         if !self.powered {
@@ -165,6 +166,7 @@ impl Drive {
 }
 
 impl LineStation for Drive {
+    #[inline]
     fn hear(&mut self, at: Instant, octet: Received) {
         if self.hears_end(at, octet) {
             self.end(at);

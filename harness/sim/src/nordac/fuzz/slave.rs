@@ -287,14 +287,15 @@ impl Pair {
         let (own, ppo) = (self.drive.slave().master(), self.drive.slave().ppo());
         let delay = RATE.bit_time() * self.reference.delay();
         let damaged = damage.map(|place| usize::from(place) % octets.len().max(1));
+        let mut at = start;
         for (place, &octet) in octets.iter().enumerate() {
             let received = if damaged == Some(place) {
                 Received::bad(octet ^ 1, LineError::Parity)
             } else {
                 Received::good(octet)
             };
-            self.drive
-                .hear(start + RATE.octet_time() * (place as u64 + 1), received);
+            at += RATE.octet_time();
+            self.drive.hear(at, received);
         }
         let expected = match damaged {
             None => self.reference.telegram(end, octets),

@@ -287,14 +287,14 @@ impl Slave {
             request.dsap(),
             &data,
         );
-        pdu.ok().map(|pdu| Telegram::Pdu(pdu).encode())
+        pdu.ok().as_ref().map(Pdu::encode)
     }
 
     /// A reply without data.
     fn plain(&self, request: &Pdu, status: Status) -> Option<Buffer> {
         let control = FrameControl::reply(status);
         let pdu = Pdu::new(request.sa(), self.address(), control, &[]);
-        pdu.ok().map(|pdu| Telegram::Pdu(pdu).encode())
+        pdu.ok().as_ref().map(Pdu::encode)
     }
 
     /// Enters Wait_Prm.

@@ -54,6 +54,7 @@ impl Receiver {
     }
 
     /// Takes an octet whose last stop bit has passed at `at`; `true` if it is the last one of what may be a telegram.
+    #[inline]
     pub(in crate::nordac) fn hear(&mut self, at: Instant, octet: Received) -> bool {
         let start = at - self.octet;
         let idle = start.since(self.idle_since);
