@@ -179,6 +179,9 @@ impl Trace {
 
     /// Counts all times from `origin` on.
     pub fn count_from(&mut self, origin: Span) {
+        if origin == Span::ZERO {
+            return;
+        }
         let earlier = |at: &mut Instant| *at = *at - origin;
         for channel in &mut self.channels {
             match &mut channel.carried {

@@ -51,14 +51,15 @@ impl Hasher for Spread {
 
 impl<C: FuzzCase> Pool<C> {
     /// Keeps a case that shows new features. Returns the number of new features, 0 if the case is not kept.
-    pub fn offer(&mut self, case: &C, features: &BTreeSet<u32>) -> usize {
-        // Looked up one by one: `difference` goes through all that was ever shown.
-        let new = features.iter().filter(|own| !self.shown.contains(own));
-        let new = new.count();
-        if new == 0 || self.cases.len() >= MOST_KEPT {
+    pub fn offer(&mut self, case: &C, features: &[u32]) -> usize {
+        if self.cases.len() >= MOST_KEPT {
             return 0;
         }
-        self.shown.extend(features);
+        let new = features.iter().filter(|own| self.shown.insert(**own));
+        let new = new.count();
+        if new == 0 {
+            return 0;
+        }
         self.of_lane[case.lane()].push(self.cases.len());
         self.cases.push(case.clone());
         new
@@ -99,8 +100,11 @@ pub(crate) fn hash(words: &[u32]) -> u32 {
 
 /// Cases in an order in which each shows as much new as any could, as long as one shows something.
 #[must_use]
-pub fn by_novelty<C>(cases: Vec<(C, BTreeSet<u32>)>) -> Vec<C> {
-    let mut rest = cases;
+pub fn by_novelty<C>(cases: Vec<(C, Vec<u32>)>) -> Vec<C> {
+    let cases = cases.into_iter();
+    let mut rest: Vec<(C, BTreeSet<u32>)> = cases
+        .map(|(case, features)| (case, features.into_iter().collect()))
+        .collect();
     let mut shown: BTreeSet<u32> = BTreeSet::new();
     let mut ordered = Vec::new();
     while !rest.is_empty() {

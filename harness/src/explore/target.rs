@@ -4,7 +4,6 @@ use super::Case;
 use super::FuzzCase;
 use super::error::ExploreError;
 use harness_proto::time::Span;
-use std::collections::BTreeSet;
 
 /// What the model makes of a case before it is tried.
 #[derive(Clone, Debug)]
@@ -13,8 +12,8 @@ pub struct Rehearsal<C: FuzzCase = Case> {
     pub seen: C::Seen,
     /// How long the line is used for it, with all that comes before it on a rig.
     pub took: Span,
-    /// What it shows.
-    pub features: BTreeSet<u32>,
+    /// What it shows; the same feature may come several times.
+    pub features: Vec<u32>,
     /// Why it is not tried: the rig does not allow it, or cannot do it.
     pub denied: Option<String>,
     /// How the model differs from the reference model.
@@ -26,7 +25,7 @@ impl<C: FuzzCase> Default for Rehearsal<C> {
         Self {
             seen: C::Seen::default(),
             took: Span::ZERO,
-            features: BTreeSet::new(),
+            features: Vec::new(),
             denied: None,
             of_model: None,
         }

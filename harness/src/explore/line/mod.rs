@@ -31,7 +31,6 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::collections::BTreeSet;
 use std::fmt::Debug;
 
 /// A bus whose drives share one line, as fuzz runs explore it.
@@ -115,8 +114,8 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     fn model(setup: &Self::Setup, properties: &[Self::Properties]) -> Self::Setup;
     /// Plays a conversation on fresh drives.
     fn play(setup: &Self::Setup, talk: &LineTalk<Self>) -> Seen<Self>;
-    /// What a conversation shows.
-    fn features(talk: &LineTalk<Self>, seen: &Seen<Self>) -> BTreeSet<u32>;
+    /// What a conversation shows; the same feature may come several times.
+    fn features(talk: &LineTalk<Self>, seen: &Seen<Self>) -> Vec<u32>;
 
     /// With which values of the open points a search begins, the most likely ones first: a value for each drive.
     fn begins(setup: &Self::Setup) -> Vec<Vec<Self::Properties>>;

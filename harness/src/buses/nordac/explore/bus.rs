@@ -25,7 +25,6 @@ use harness_proto::nordac::{PpoType, Properties};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Instant;
 use harness_sim::nordac::deviation::deviation;
-use std::collections::BTreeSet;
 
 /// A slave as conversations address it: its address, and the PPO type that it is set to.
 type Station = (u8, PpoType);
@@ -192,7 +191,7 @@ impl LineBus for Nordac {
         play(setup, talk)
     }
 
-    fn features(_: &TelegramTalk, seen: &TelegramsSeen) -> BTreeSet<u32> {
+    fn features(_: &TelegramTalk, seen: &TelegramsSeen) -> Vec<u32> {
         features(seen)
     }
 
@@ -241,8 +240,8 @@ impl LineBus for Nordac {
 }
 
 /// What a case shows: which reply followed which act and which reply before it, and what the replies say.
-fn features(seen: &TelegramsSeen) -> BTreeSet<u32> {
-    let mut found = BTreeSet::new();
+fn features(seen: &TelegramsSeen) -> Vec<u32> {
+    let mut found = Vec::new();
     let mut before = 0;
     let mut replies = seen.said.iter().peekable();
     let ends = seen.done.iter().skip(1).map(|own| own.at);
@@ -253,8 +252,8 @@ fn features(seen: &TelegramsSeen) -> BTreeSet<u32> {
         while let Some(own) = replies.next_if(|own| own.at <= end) {
             reply = hash(&[reply, kind(&own.octets), u32::from(own.error.is_some())]);
         }
-        found.insert(hash(&[1, request, reply]));
-        found.insert(hash(&[2, before, reply]));
+        found.push(hash(&[1, request, reply]));
+        found.push(hash(&[2, before, reply]));
         before = reply;
     }
     found

@@ -10,19 +10,17 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::Trace;
-use std::collections::BTreeSet;
 
-/// The features of a run of the model.
+/// The features of a run of the model; the same one may come several times.
 #[must_use]
-pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> {
+pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> Vec<u32> {
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
-        return BTreeSet::new();
+        return Vec::new();
     };
     let bytes = case.bytes();
     let sent: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
     let roles = roles(size, &sent);
     let role_at = |index: usize| roles.get(index).map_or(0, |role| number(*role));
-    // Sorted at the end: that costs less than a set that grows.
     let mut found = Vec::with_capacity(2 * bytes.len() + trace.remarks.len() + 1);
     let mut before = 0;
     let mut last = None;
@@ -60,9 +58,7 @@ pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> 
             *own = hash(&[*own, ring as u32]);
         }
     }
-    found.sort_unstable();
-    found.dedup();
-    found.into_iter().collect()
+    found
 }
 
 fn sign(bit: u32) -> harness_proto::novobus::error_mode::Marks {

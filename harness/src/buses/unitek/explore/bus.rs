@@ -26,7 +26,6 @@ use harness_proto::unitek::Register;
 use harness_proto::unitek::properties::Properties;
 use harness_sim::record::LineFrame;
 use harness_sim::unitek::deviation::deviation;
-use std::collections::BTreeSet;
 
 impl Differing for FrameDifference {
     fn is_like(&self, other: &Self) -> bool {
@@ -191,7 +190,7 @@ impl LineBus for Unitek {
         play(setup, talk)
     }
 
-    fn features(talk: &FrameTalk, seen: &FramesSeen) -> BTreeSet<u32> {
+    fn features(talk: &FrameTalk, seen: &FramesSeen) -> Vec<u32> {
         features(talk, seen)
     }
 
@@ -240,15 +239,15 @@ impl LineBus for Unitek {
 }
 
 /// What a case shows: which request followed which, what a frame was written to, and how the drives answered.
-fn features(case: &FrameTalk, seen: &FramesSeen) -> BTreeSet<u32> {
-    let mut found = BTreeSet::new();
+fn features(case: &FrameTalk, seen: &FramesSeen) -> Vec<u32> {
+    let mut found = Vec::new();
     let mut before = 0;
     for act in &case.acts {
         let own = kind(&act.what);
-        found.insert(hash(&[1, before, own]));
+        found.push(hash(&[1, before, own]));
         if let FrameActKind::Send(frame) = &act.what {
             let register = frame.data().first().copied().unwrap_or(0);
-            found.insert(hash(&[2, own, register.into()]));
+            found.push(hash(&[2, own, register.into()]));
         }
         before = own;
     }
@@ -261,9 +260,9 @@ fn features(case: &FrameTalk, seen: &FramesSeen) -> BTreeSet<u32> {
                 .fold(0, |sum, byte| sum << 8 | u32::from(*byte)),
             _ => 0,
         };
-        found.insert(hash(&[3, register.into(), frame.frame.dlc() as u32, shown]));
+        found.push(hash(&[3, register.into(), frame.frame.dlc() as u32, shown]));
     }
-    found.insert(hash(&[
+    found.push(hash(&[
         4,
         seen.said.len().min(64).next_power_of_two() as u32,
     ]));
