@@ -4,7 +4,8 @@ use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::PlannedSetupKind;
 use crate::link::{Line, Link};
 use crate::scenario::plan::Plan;
-use harness_proto::nd21::ee;
+use harness_proto::nd21::bits::status;
+use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};
@@ -93,8 +94,16 @@ fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     for setup in plan.setups_of(ring, k) {
         if let PlannedSetupKind::Memory(address, bytes) = setup {
             for (address, byte) in (*address..=u16::MAX).zip(bytes) {
+                let cells = drive.cells_mut();
+                let byte = match (model, address) {
+                    // A whole drive reports a reset by itself (11.8).
+                    (Model::Nd21, ram::STATUS) => {
+                        byte & !status::RESET | cells.peek(address) & status::RESET
+                    }
+                    _ => *byte,
+                };
                 // Planning has refused addresses where there is no memory.
-                let _known = drive.cells_mut().poke(address, *byte);
+                let _known = cells.poke(address, byte);
             }
         }
     }

@@ -55,6 +55,14 @@ fn stimuli_are_header_lines_and_steps() {
     ));
 }
 
+/// ND21 11.8: a whole drive reports its reset by itself, whatever the header says that `Status` held.
+#[test]
+fn a_header_resets_no_drive() {
+    passes(&nd21(
+        "drive 0 memory Status = C0\n> 80*9\n? drive 0 Status & C0 = 80\n? drive 0 normal",
+    ));
+}
+
 #[test]
 fn stimuli_that_cannot_be_are_refused() {
     let lines = |line: &str| nd21(&format!("{line}\n> 80"));
