@@ -219,7 +219,7 @@ impl Output {
                 self.say(&(text + "\n"));
             }
         }
-        self.complain(&problems.to_string());
+        self.complain(&problems.count());
     }
 
     /// Shows why a scenario cannot be loaded.

@@ -161,15 +161,19 @@ impl Problems {
 
     /// Each mistake on a line: `file:line: what is wrong; what was expected (help)`.
     pub(crate) fn lines(&self) -> String {
-        let line = |problem: &Problem| {
-            let number = line_number(self.source.inner(), problem.span.start);
-            format!("{}:{number}: {}", self.source.name(), problem.sentence())
-        };
-        self.problems
-            .iter()
-            .map(line)
-            .collect::<Vec<_>>()
-            .join("\n")
+        let lines: Vec<_> = self.problems.iter().map(|own| self.line(own)).collect();
+        lines.join("\n")
+    }
+
+    fn line(&self, problem: &Problem) -> String {
+        let number = line_number(self.source.inner(), problem.span.start);
+        format!("{}:{number}: {}", self.source.name(), problem.sentence())
+    }
+
+    /// How many mistakes the file has, for a reader who has seen each of them.
+    pub(crate) fn count(&self) -> String {
+        let count = counted(self.problems.len(), "mistake");
+        format!("{}: {count}", self.source.name())
     }
 
     /// Each mistake as something that can be shown.
@@ -178,10 +182,17 @@ impl Problems {
     }
 }
 
+/// The first mistake, and how many more there are.
 impl fmt::Display for Problems {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.problems.len();
-        write!(f, "{}: {}", self.source.name(), counted(count, "mistake"))
+        match self.problems.as_slice() {
+            [] => f.write_str(&self.count()),
+            [only] => f.write_str(&self.line(only)),
+            [first, more @ ..] => {
+                let more = counted(more.len(), "more mistake");
+                write!(f, "{} (and {more})", self.line(first))
+            }
+        }
     }
 }
 
