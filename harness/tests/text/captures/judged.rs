@@ -234,6 +234,36 @@ fn monitoring_excuses_no_wrong_drive() {
     }
 }
 
+/// A drive that loads what the master has written to its EEPROM (ND21 14.2.2, 14.3.6) is right.
+#[test]
+fn whole_drives_are_right_drives() {
+    let judged = judge(&imported(&built_in("14.3.6-ee-selftest")), &options(None));
+    let judged = judged.expect("judged");
+    assert_eq!((judged.verdict, judged.links.differ), (Verdict::Passed, 0));
+    let why = judged.remarks.last().expect("a remark");
+    assert!(why.contains("whole ND21s"), "{why}");
+}
+
+/// ND21 10.5, 11.8: a drive may be silent behind ResetH8. It may not answer wrong when it is back, nor be silent without one.
+#[test]
+fn a_drive_may_be_silent_while_it_tests_itself() {
+    let silent = text("10.5-silent-self-test");
+    let judged = |text: &str| judge(&imported(&run(text)), &options(None)).expect("judged");
+    let right = judged(&silent);
+    let why = right.remarks.join("; ");
+    assert_eq!(right.verdict, Verdict::Inconclusive, "{why}");
+    assert!(why.contains("tests itself"), "{why}");
+    let wrong = silent.replace(
+        "strict\n",
+        "strict\ndrive 1 deviates checksum-not-negated\n",
+    );
+    assert_ne!(wrong, silent);
+    assert_eq!(judged(&wrong).verdict, Verdict::Failed);
+    let swallows =
+        "title t\nring 3\ndrive 1 deviates swallows-synco\n> 80*3\nwait 60ms\n> 82 FE 00\n";
+    assert_eq!(judged(swallows).verdict, Verdict::Failed);
+}
+
 /// A value that the manual leaves open and that explains every byte is named, and settles nothing.
 #[test]
 fn an_open_value_that_explains_a_capture_is_named() {
@@ -340,7 +370,7 @@ fn a_supply_that_was_off_in_a_silence_accuses_no_drive() {
     }
 }
 
-/// Complete ND21s must be declared in the header of a scenario.
+/// A setup says what the drives are and what their cells hold.
 #[test]
 fn with_a_setup() {
     let name = "14.3.6-ee-selftest";
@@ -353,8 +383,6 @@ fn with_a_setup() {
         (Verdict::Passed, 0),
         "{shown}"
     );
-    let plain = judge(&capture, &options(None)).expect("judged");
-    assert_eq!(plain.verdict, Verdict::Failed);
 }
 
 #[test]

@@ -50,6 +50,10 @@ const OF_DRIVES: &str = "what differs is process data, or lies in cells that a d
 const UNDER_WAY: &str = "the capture ends while bytes are under way: those that it lacks at its end were due within the time by which its ports are late; \
      end a capture when the line is silent";
 
+/// Why bytes that are missing behind a ResetH8 accuse no drive.
+const TESTS_ITSELF: &str = "what differs lies between a ResetH8 and the next silence, and nothing differs from there on: the drive may be silent while it tests \
+     itself (ND21 10.5, 11.8); describe the drives with --setup";
+
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
     fn in_doubt(mut self, why: &str) -> Self {
@@ -98,8 +102,14 @@ fn first(problems: &Problems) -> String {
 /// [`JudgeError`].
 pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let judged = judge_whole(capture, options)?;
-    if judged.verdict != Verdict::Failed || !is_midway(capture) {
+    if judged.verdict != Verdict::Failed {
         return Ok(judged);
+    }
+    if !is_midway(capture) {
+        return match may_test_itself(capture, options, &judged)? {
+            true => Ok(judged.in_doubt(TESTS_ITSELF)),
+            false => Ok(judged),
+        };
     }
     let starts = after_silences(capture);
     let Some(start) = starts.first() else {
@@ -133,6 +143,27 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
     Ok(judged)
 }
 
+/// Whether what differs lies between a ResetH8 and the next silence of its rings, and nothing differs from there on.
+fn may_test_itself(
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
+    judged: &Judged,
+) -> Result<bool, JudgeError> {
+    let Some(first) = judged.links.first.as_ref().map(|first| first.at) else {
+        return Ok(false);
+    };
+    let told = unforeseen(capture);
+    let resets = told.iter().flat_map(|told| &told.resets);
+    let Some(reset) = resets.filter(|at| **at <= first).max() else {
+        return Ok(false);
+    };
+    let starts = after_silences(capture);
+    let Some(start) = starts.iter().find(|start| *start > reset) else {
+        return Ok(false);
+    };
+    Ok(judge_whole(&from(capture, *start), options)?.verdict != Verdict::Failed)
+}
+
 fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let told = unforeseen(capture);
     let judged = judge_as(capture, options, &told, &Header::default())?;
@@ -146,8 +177,8 @@ fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, 
         if explained.links.differ > 0 {
             continue;
         }
-        explained.remarks.push(explanation.remark());
-        if !explanation.is_a_setting() {
+        explained.remarks.push(explanation.remark);
+        if !explanation.is_right {
             explained.verdict = Verdict::Inconclusive;
         }
         return Ok(explained);

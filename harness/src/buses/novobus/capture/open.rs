@@ -21,29 +21,24 @@ const MOST_BYTES: usize = 100_000;
 pub(super) struct Explanation {
     /// What makes simulated drives behave so.
     pub(super) header: Header,
-    /// The choices, in words; empty where the drives only monitor time-outs.
-    pub(super) words: String,
+    /// Whether right drives are so, and it is nothing that the manual leaves open.
+    pub(super) is_right: bool,
+    /// What it says to the user.
+    pub(super) remark: String,
 }
 
 impl Explanation {
-    /// Whether it is a setting of right drives, and nothing that the manual leaves open.
-    pub(super) fn is_a_setting(&self) -> bool {
-        self.words.is_empty()
-    }
-
-    /// What it says to the user.
-    pub(super) fn remark(&self) -> String {
-        match self.is_a_setting() {
-            true => "the drives are taken to monitor time-outs (ND21 9.9, 14.10.2): so every byte is as the model says".to_owned(),
-            false => format!(
-                "{} explains every byte that differs: the manual leaves it open; describe the drives with --setup",
-                self.words
-            ),
+    /// Drives that do nothing that the manual leaves open.
+    fn right(header: Header, what: &str) -> Self {
+        Self {
+            header,
+            is_right: true,
+            remark: format!("the drives are taken to {what}: so every byte is as the model says"),
         }
     }
 }
 
-/// What may explain a difference, the simplest first: monitoring, then each open value of the bus without it and with it.
+/// What may explain a difference, the simplest first: monitoring, whole drives, then each open value of the bus without monitoring and with it.
 pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation> {
     if capture.bytes() > MOST_BYTES {
         return Vec::new();
@@ -51,7 +46,10 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
     let monitoring = monitoring(capture, told);
     let with = |choice: &Choice, more: &Header, words: &str| Explanation {
         header: choice.in_all(capture.traces.len()).and(more),
-        words: format!("`{choice}`{words}"),
+        is_right: false,
+        remark: format!(
+            "`{choice}`{words} explains every byte that differs: the manual leaves it open; describe the drives with --setup"
+        ),
     };
     let open: Vec<_> = of_the_bus().collect();
     let plain = open
@@ -61,14 +59,15 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
     let monitored = open
         .iter()
         .map(|choice| with(choice, &monitoring, " with time-out monitoring"));
-    let alone = Explanation {
-        header: monitoring.clone(),
-        words: String::new(),
-    };
-    std::iter::once(alone)
-        .chain(plain)
-        .chain(monitored)
-        .collect()
+    let whole = Header::whole(capture.traces.len());
+    [
+        Explanation::right(monitoring.clone(), "monitor time-outs (ND21 9.9, 14.10.2)"),
+        Explanation::right(whole, "be whole ND21s, with their EEPROM (ND21 14.2.2)"),
+    ]
+    .into_iter()
+    .chain(plain)
+    .chain(monitored)
+    .collect()
 }
 
 /// Monitoring in each drive that did not report whether it monitors.

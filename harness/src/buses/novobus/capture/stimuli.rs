@@ -29,6 +29,8 @@ pub(crate) struct Told {
     /// (ND21 9.4), and data of cells that were written and that a drive may write itself or may have lost in a silence, without its supply
     /// (14.2), or that a reset may have changed (10.5), with their checking bytes.
     pub(crate) own: BTreeSet<usize>,
+    /// When the bytes of each ResetH8 were sent (10.5).
+    pub(crate) resets: Vec<Instant>,
 }
 
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
@@ -51,7 +53,11 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .filter(|(role, (_, (byte, _)))| !(*role == Role::Idle && *byte == PAUSE))
         .map(|(role, (at, _))| Asked { role, at: *at })
         .collect();
-    let mut told = Told::default();
+    let is_reset = |own: &&Asked| matches!(own.role, Role::Command { section: RESET, .. });
+    let mut told = Told {
+        resets: asked.iter().filter(is_reset).map(|own| own.at).collect(),
+        ..Told::default()
+    };
     for link in trace.channels.iter().filter(|link| link.from.is_some()) {
         let own = of_link(link, &asked);
         let last = link.to.is_none();
