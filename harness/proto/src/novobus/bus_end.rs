@@ -207,6 +207,15 @@ impl BusEnd {
         matches!(self.state, State::Error(..))
     }
 
+    /// Whether it answers the next byte with received + 1 (ND21 9.7).
+    #[must_use]
+    pub const fn increments(&self) -> bool {
+        match &self.state {
+            State::Error(error, ..) => error.increments(),
+            _ => false,
+        }
+    }
+
     /// The error for which it last went into the error mode, since power-up or reset.
     #[must_use]
     pub const fn cause(&self) -> Option<BusError> {

@@ -63,6 +63,19 @@ fn a_header_resets_no_drive() {
     ));
 }
 
+/// ND21 9.7: a drive with another sum sends the same zeros before it begins to add, behind FF too, which with 1 is 00.
+#[test]
+fn a_zero_of_the_error_mode_is_no_sum() {
+    for (deviation, sum) in [
+        ("increments-twice-in-error-mode", 2),
+        ("adds-3-in-error-mode", 3),
+    ] {
+        passes(&format!(
+            "title t\nring 1\ndrive 0 deviates {deviation}\n> 08 FF*3 00*14\n< 00*17 0{sum}\n"
+        ));
+    }
+}
+
 #[test]
 fn stimuli_that_cannot_be_are_refused() {
     let lines = |line: &str| nd21(&format!("{line}\n> 80"));

@@ -256,6 +256,7 @@ impl Device for Deviant {
         let mut moment = Moment {
             place: self.place(),
             received,
+            increments: self.drive.parts().0.increments(),
             nth: self.nth,
             zeros: self.zeros,
             zeros_before,

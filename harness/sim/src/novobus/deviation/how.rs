@@ -67,6 +67,8 @@ pub(super) struct Moment {
     pub(super) place: Place,
     /// What arrived.
     pub(super) received: Received,
+    /// Whether received + 1 is the answer (9.7).
+    pub(super) increments: bool,
     /// Which byte it is, counted from 1 since power-up.
     pub(super) nth: u64,
     /// How many good zeros, this one included, have come in a row.
@@ -144,7 +146,9 @@ impl Moment {
 
     /// Whether `byte` goes out for it by the rule of received + 1 (ND21 9.7).
     pub(super) fn increments(&self, byte: u8) -> bool {
-        self.place == Place::ErrorMode && byte == self.received.byte.wrapping_add(1)
+        // Behind FF a 00 may be one of the zeros that come before.
+        let is_zero = byte == 0 && !self.increments;
+        self.place == Place::ErrorMode && byte == self.received.byte.wrapping_add(1) && !is_zero
     }
 }
 
