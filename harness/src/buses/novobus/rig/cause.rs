@@ -7,7 +7,7 @@ use super::line_test::{LineTestBytes, Pass, RingPace, SENT, pace_of};
 use crate::buses::novobus::locate::locate;
 use crate::medium::ErrorMarks;
 use crate::rig::Rig;
-use crate::rig::file::{Endpoint, Hooks, LineFormat, Transport};
+use crate::rig::file::{Endpoint, Hooks, LineFormat, Ring, Transport};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::novobus::sync::SYNCO;
@@ -152,6 +152,17 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &LineTestBytes, stated: Rate) -> Lik
     } else {
         LikelyCause::Noise
     }
+}
+
+/// Marks that are missing: SYNCO comes back as 80 plus the number of drives, so that each is in the error mode and adds 1 (ND21 9.7), and no
+/// check sequence has ended it (9.8). With in-band marks its FF is a mark.
+pub(crate) fn of_marks(ring: &Ring, heard: &LineTestBytes) -> Option<LikelyCause> {
+    let can_mark = matches!(ring.endpoint.transport, Transport::Pty | Transport::Tcp);
+    let sum = SYNCO.wrapping_add(ring.drives);
+    let counts_up = |pass: &Pass| !pass.is_empty() && pass.iter().all(|(_, byte)| byte.is(sum));
+    let right = ErrorMarks::InBand;
+    let is_mistaken = can_mark && ring.endpoint.marks != right && heard.unasked.is_empty();
+    (is_mistaken && heard.passes.iter().all(counts_up)).then_some(LikelyCause::Marks { right })
 }
 
 /// The cause of a lost port.
@@ -360,6 +371,25 @@ mod tests {
             named(&Unhealthy::Broken(2), &spelt),
             LikelyCause::LinkInFront(2)
         );
+    }
+
+    /// ND21 9.7, 9.8: three drives that no check sequence takes out of the error mode make 83 of SYNCO.
+    #[test]
+    fn a_ring_that_counts_up_lacks_marks() {
+        let of = |port: &str, byte: u8| {
+            let text = format!("schema = 1\n[rig]\nid = \"x\"\n[ring.1]\ndrives = 3\n{port}\n");
+            let rig = crate::rig::parse(&source("x.toml", text)).expect("a rig");
+            let ring = rig.file.rings().next().expect("a ring").clone();
+            let pass = || vec![Received::good(byte); SENT];
+            of_marks(&ring, &heard(pass(), pass()))
+        };
+        let tcp = "transport = \"tcp\"\nport = \"127.0.0.1:4021\"";
+        let right = ErrorMarks::InBand;
+        assert_eq!(of(tcp, 0x83), Some(LikelyCause::Marks { right }));
+        assert_eq!(of(tcp, 0x84), None);
+        assert_eq!(of(&format!("{tcp}\nmarks = \"in-band\""), 0x83), None);
+        let serial = "transport = \"serial\"\nport = \"/dev/ttyUSB0\"";
+        assert_eq!(of(serial, 0x83), None);
     }
 
     #[test]

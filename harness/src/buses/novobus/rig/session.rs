@@ -314,15 +314,17 @@ impl Session {
     fn with_cause(&mut self, error: SessionError) -> SessionError {
         match error {
             SessionError::Ill { rig, ring, ill, .. } => {
-                let transport = self.rig.file.rings().nth(ring - 1);
-                let transport = transport.map(|ring| ring.endpoint.transport);
+                let file = self.rig.file.rings().nth(ring - 1).cloned();
                 let cause = match self.link.trouble() {
-                    Some(Trouble::Lost(_)) => transport.map(LikelyCause::Gone),
+                    Some(Trouble::Lost(_)) => {
+                        file.map(|file| LikelyCause::Gone(file.endpoint.transport))
+                    }
                     Some(_) => None,
                     None => {
                         self.settle();
                         let heard = line_test::listen(&mut self.link, ring - 1);
-                        Some(cause::cause(&ill, &heard, self.rate()))
+                        let of_marks = file.and_then(|file| cause::of_marks(&file, &heard));
+                        Some(of_marks.unwrap_or_else(|| cause::cause(&ill, &heard, self.rate())))
                     }
                 };
                 SessionError::Ill {
