@@ -7,8 +7,9 @@ use crate::novobus::cells::Cells;
 use crate::novobus::device::Device;
 use harness_proto::line::Received;
 use harness_proto::nd21::functions::Function;
+use harness_proto::nd21::ram;
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction, Relay};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
@@ -128,5 +129,28 @@ impl Device for Nd21Drive {
 
     fn cause(&self) -> Option<BusError> {
         self.bus_end.cause()
+    }
+
+    fn relay(&self) -> Option<Relay> {
+        if !self.program.leaves_the_bus_alone() {
+            return None;
+        }
+        self.bus_end.relay(self.program.cells().byte(ram::BUS_ADDR))
+    }
+
+    fn answer(&mut self, now: Instant, byte: u8) -> Reaction {
+        let step = self.bus_end.answer(now, byte, &mut self.program);
+        self.bus_has_worked();
+        step
+    }
+
+    fn has_relayed(&mut self, at: Instant, relay: Relay) {
+        self.bus_end.has_relayed(at, relay);
+        if let Relay::Passing(passing) = relay
+            && let Some(sum) = passing.sum()
+        {
+            self.program.write(ram::BUS_ADDR, sum);
+        }
+        self.bus_has_worked();
     }
 }

@@ -133,6 +133,14 @@ impl Program {
         self.mode == Mode::Reset && self.properties.self_test_bus == SelfTestBus::Silent
     }
 
+    /// Whether the program does nothing that the bus shows, and sees nothing of bytes that are only passed on, until a byte is for the
+    /// drive: no self-test, no time-out monitoring, no scan, which could be of `busAddr`.
+    pub(super) fn leaves_the_bus_alone(&self) -> bool {
+        self.mode != Mode::Reset
+            && !self.cells.monitors_time_out()
+            && !self.scope.running(&self.cells)
+    }
+
     /// The cells, past all rules of access.
     #[must_use]
     pub fn cells(&self) -> &Cells {

@@ -38,7 +38,8 @@ pub trait Device: Clone {
 
     /// What the device keeps of bytes that it only passes on. While this is not `None`, a byte that is not for it needs no
     /// [`Self::receive`]: the device sends it on as [`Relay::receive`] says, and [`Self::has_relayed`] makes up for any number of them.
-    /// [`Self::answer`] takes a byte that is for it. The device answers each of these, has no deadline, and does nothing of its own.
+    /// [`Self::answer`] takes a byte that is for it. The device answers each of these, has no deadline, and does nothing of its own that the
+    /// bus shows.
     fn relay(&self) -> Option<Relay> {
         None
     }

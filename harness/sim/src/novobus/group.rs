@@ -395,6 +395,7 @@ impl Group {
         for ((place, node), inbound) in self.places().zip(nodes).zip(links) {
             let arrived = self.arrived(place, now);
             self.make_up(place, arrived, node.device_mut());
+            node.device_mut().advance(now);
             if place > self.places.start {
                 let kept = self.entries[..self.arrived(place - 1, now) - self.dropped].iter();
                 let way_home = self.way_home(place);
