@@ -394,47 +394,6 @@ fn what_answers_and_is_no_ring_is_named() {
     assert!(!said(&output).contains("spells out"), "{}", said(&output));
 }
 
-/// A ring whose bytes come back whole and two thirds later than they are sent is late, and no ring at half the rate.
-#[test]
-fn a_late_ring_is_told_no_rate() {
-    let port = port_of(|mut stream| {
-        stream.set_nodelay(true).expect("a socket");
-        let mut due = std::time::Instant::now();
-        let mut bytes = [0; 1];
-        // An echo with its address byte counted up is a ring of three as long as no drive is asked.
-        let mut before = 0;
-        while let Ok(1) = stream.read(&mut bytes) {
-            due = due.max(std::time::Instant::now()) + Duration::from_micros(480);
-            while std::time::Instant::now() < due {
-                std::hint::spin_loop();
-            }
-            let is_address = std::mem::replace(&mut before, bytes[0]) == 0x82;
-            if stream
-                .write_all(&[bytes[0] + 3 * u8::from(is_address)])
-                .is_err()
-            {
-                return;
-            }
-        }
-    });
-    let desk = Desk::new(3, "tcp", &port);
-    let path = desk.path("desk.toml");
-    let text = std::fs::read_to_string(&path).expect("a rig file");
-    std::fs::write(&path, text.replace("marks = \"in-band\"", "")).expect("room");
-    // On a busy computer bytes come so late that they seem to be others.
-    let mut runs = std::iter::repeat_with(|| desk.run(&["run"])).take(6);
-    let whole = |output: &Output| said(output).contains("bytes come back whole and");
-    let output = runs.find(whole).expect("whole bytes in one of six runs");
-    // Or it may be as late as a ring at half the rate; then the rate is one of two causes.
-    ended(&output, 3, "bytes come back whole and");
-    ended(&output, 3, "stop other programs");
-    assert!(
-        !said(&output).contains("Next: set `line"),
-        "{}",
-        said(&output)
-    );
-}
-
 /// A ring that does not open as its file says: the cause and the remedy are named (ND21 8.3, 9.9).
 #[test]
 fn a_ring_that_does_not_open_says_why() {
