@@ -33,6 +33,10 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
             return Ok(Exit::Usage);
         }
     };
+    if entries.is_empty() {
+        output.complain("no scenario was selected; `drivebench list` shows what there is");
+        return Ok(Exit::NothingSelected);
+    }
     let filter = arguments.selection.filter.as_deref();
     let part = arguments
         .partition

@@ -92,15 +92,11 @@ fn folders_are_searched_and_filtered() {
         "{}",
         stdout(&one)
     );
-    assert_eq!(
-        code(&drivebench(&[
-            "run",
-            folder,
-            "--filter",
-            "nothing of the kind"
-        ])),
-        4
-    );
+    let none = ["--filter", "nothing of the kind"];
+    for command in [&["run", folder][..], &["qualify", "--rig", "sim:2"]] {
+        let output = drivebench(&[command, &none].concat());
+        assert_eq!(code(&output), 4, "{}", stdout(&output));
+    }
 }
 
 #[test]
