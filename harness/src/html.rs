@@ -198,19 +198,24 @@ struct Escaped<'o>(&'o mut String);
 
 impl fmt::Write for Escaped<'_> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        for c in text.chars() {
-            match c {
-                '&' => self.0.push_str("&amp;"),
-                '<' => self.0.push_str("&lt;"),
-                '>' => self.0.push_str("&gt;"),
-                '"' => self.0.push_str("&quot;"),
-                '\'' => self.0.push_str("&#39;"),
-                '\t' | '\n' => self.0.push(c),
-                c if c.is_control() || is_invisible(c) => self.0.push('\u{FFFD}'),
-                '\u{FFFE}' | '\u{FFFF}' => self.0.push('\u{FFFD}'),
-                c => self.0.push(c),
-            }
+        let mut plain = 0;
+        for (at, c) in text.char_indices() {
+            let written = match c {
+                '&' => "&amp;",
+                '<' => "&lt;",
+                '>' => "&gt;",
+                '"' => "&quot;",
+                '\'' => "&#39;",
+                '\t' | '\n' | ' '..='~' => continue,
+                c if c.is_control() || is_invisible(c) => "\u{FFFD}",
+                '\u{FFFE}' | '\u{FFFF}' => "\u{FFFD}",
+                _ => continue,
+            };
+            self.0.push_str(&text[plain..at]);
+            self.0.push_str(written);
+            plain = at + c.len_utf8();
         }
+        self.0.push_str(&text[plain..]);
         Ok(())
     }
 }

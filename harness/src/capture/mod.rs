@@ -35,7 +35,6 @@ use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Carried, Channel, Remark, Trace};
-use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -197,14 +196,18 @@ pub(crate) struct LinkRead {
 #[derive(Default)]
 pub(crate) struct Assembly {
     /// In ring order: that of falling numbers of the receiver, the master being the last.
-    rings: [BTreeMap<u16, LinkRead>; 2],
+    rings: [Vec<Option<LinkRead>>; 2],
 }
 
 impl Assembly {
     /// The link with these ends, its bytes so far.
     pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkRead {
-        let order = to.map_or(1_000, |drive| 999 - u16::from(drive));
-        self.rings[ring.min(1)].entry(order).or_insert(LinkRead {
+        let place = to.map_or(256, |drive| 255 - usize::from(drive));
+        let links = &mut self.rings[ring.min(1)];
+        if links.len() <= place {
+            links.resize_with(place + 1, || None);
+        }
+        links[place].get_or_insert_with(|| LinkRead {
             from,
             to,
             bytes: Vec::new(),
@@ -220,7 +223,7 @@ impl Assembly {
     ) -> Result<Capture, CaptureError> {
         let mut traces = Vec::new();
         for ((links, size), remarks) in self.rings.into_iter().zip(sizes).zip(remarks) {
-            let links: Vec<_> = links.into_values().collect();
+            let links: Vec<_> = links.into_iter().flatten().collect();
             let highest = |link: &LinkRead| link.from.max(link.to).map_or(1, |drive| drive + 1);
             let Some(least) = links.iter().map(highest).max() else {
                 continue;

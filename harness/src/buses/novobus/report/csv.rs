@@ -20,6 +20,7 @@ use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
 use harness_sim::record::{Remark, Trace};
+use std::fmt::Write as _;
 use std::io::Write;
 
 /// The first line.
@@ -31,6 +32,8 @@ pub const HEADING: &str = "ring,t_ns,link,n,sent,received,status,role,drive,mean
 /// What the writer says.
 pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     out.write_all(HEADING.as_bytes())?;
+    // A row is written at once: each of its fields would be a call.
+    let mut row = String::new();
     for (ring, trace) in traces.iter().enumerate() {
         let names: Vec<_> = trace.channels.iter().map(|link| name(ring, link)).collect();
         let mut readers = Reader::all(trace);
@@ -39,8 +42,9 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
             let seen = readers[place].see(byte);
             let hex = |byte: Option<u8>| byte.map_or_else(String::new, |b| format!("{b:02X}"));
             let drive = seen.meaning.drive;
-            writeln!(
-                out,
+            row.clear();
+            let _infallible = writeln!(
+                row,
                 "{},{},{},{},{},{},{},{},{},{},{},{}",
                 ring + 1,
                 byte.at.since_start().as_nanos(),
@@ -54,7 +58,8 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
                 quoted(&words(&seen, byte)),
                 seen.meaning.section(),
                 seen.mark.map_or_else(String::new, remark),
-            )?;
+            );
+            out.write_all(row.as_bytes())?;
         }
     }
     out.flush()
