@@ -3,7 +3,7 @@
 //! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
-use super::program::{Program, READ, READ_BYTE, READY};
+use super::program::{CONFIRM, OF_THE_BUS, Program, READ, READ_BYTE, READY};
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
@@ -129,6 +129,10 @@ fn is_lost(address: u16) -> bool {
 /// How long an order to the controller of the EEPROM may take. The manual gives no time; the copy of the 32 parameters takes the model 320 ms.
 const LONGEST_ORDER: Span = Span::from_millis(4_000);
 
+/// How long a drive may take to delete its error once the master has confirmed it. The manual gives no time; the cycle control works in
+/// cycles of 432 us (4.1).
+const LONGEST_CONFIRMATION: Span = Span::from_millis(500);
+
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
@@ -149,8 +153,9 @@ pub(crate) struct Knowledge {
     saved: BTreeSet<(usize, u8)>,
     /// When the byte in hand is due.
     now: Instant,
-    /// When drives were given an order to the controller of the EEPROM whose end they have not reported in the present conversation.
-    ordered: BTreeMap<(usize, u8), Instant>,
+    /// When cells were given an order whose end the drive has not shown in the present conversation: one to the controller of the EEPROM in
+    /// `EEPROMcontrol`, the confirmation of an error in `errorcode`.
+    ordered: BTreeMap<CellByte, Instant>,
     /// Drives that are known not to monitor time-outs (14.10.2): their `Flags2` says so, and nothing was written to it since.
     trusting: BTreeSet<(usize, u8)>,
 }
@@ -200,7 +205,7 @@ impl Knowledge {
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
         self.programs.entry((ring, drive)).or_default().begin();
         self.working.remove(&(ring, drive));
-        self.ordered.remove(&(ring, drive));
+        self.ordered.retain(|place, _| !of_it(place));
         self.trusting.remove(&(ring, drive));
     }
 
@@ -234,15 +239,15 @@ impl Knowledge {
         if started || ordered || address == ram::EEPROM_CONTROL {
             self.saved.insert((ring, drive));
         }
-        if address == ram::EEPROM_CONTROL {
-            match write {
-                Write::Set(order) if order >= READ_BYTE => {
-                    self.ordered.insert((ring, drive), self.now);
-                }
-                _ => {
-                    self.ordered.remove(&(ring, drive));
-                }
-            }
+        let is_order = match (address, write) {
+            (ram::EEPROM_CONTROL, Write::Set(order)) => order >= READ_BYTE,
+            (ram::ERRORCODE, Write::Set(data)) => data == CONFIRM,
+            _ => false,
+        };
+        if is_order {
+            self.ordered.insert(place, self.now);
+        } else {
+            self.ordered.remove(&place);
         }
         if ordered || address == ram::FLAGS2 && write.sets(flags2::MONITORING) {
             self.trusting.remove(&(ring, drive));
@@ -279,7 +284,8 @@ impl Knowledge {
         self.write(place, write);
         self.cells.remove(&place);
         self.programs.remove(&(place.0, place.1));
-        self.ordered.remove(&(place.0, place.1));
+        let of_it = |other: &CellByte| (other.0, other.1) == (place.0, place.1);
+        self.ordered.retain(|other, _| !of_it(other));
     }
 
     /// The cell that `DataIn` or `DataOut` of a drive points at (ND21 14.10.3), where that is known.
@@ -333,14 +339,22 @@ impl Knowledge {
         written & self.kept(place, value)
     }
 
-    /// Whether `EEPROMcontrol` of a drive should long have shown the end of an order (ND21 14.10.5.2, 14.10.5.3).
-    fn is_overdue(&mut self, drive: (usize, u8), wanted: u8, value: u8) -> bool {
-        let ended = |shown: u8| shown & (READ | READY) != 0;
+    /// Whether a cell should long have shown the end of an order: `EEPROMcontrol` that a byte was read or written (ND21 14.10.5.2, 14.10.5.3),
+    /// `errorcode` that the error is deleted (14.10.1). There the AF of the confirmation or the code of a bus error stays.
+    fn is_overdue(&mut self, place: CellByte, wanted: u8, value: u8) -> bool {
+        let (ended, longest): (fn(u8) -> bool, _) = match place.2 {
+            ram::EEPROM_CONTROL => (|shown| shown & (READ | READY) != 0, LONGEST_ORDER),
+            ram::ERRORCODE => (
+                |shown| ![CONFIRM, OF_THE_BUS].contains(&shown),
+                LONGEST_CONFIRMATION,
+            ),
+            _ => return false,
+        };
         if ended(value) {
-            self.ordered.remove(&drive);
+            self.ordered.remove(&place);
         }
-        let since = self.ordered.get(&drive);
-        let late = since.is_some_and(|since| self.now.since(*since) > LONGEST_ORDER);
+        let since = self.ordered.get(&place);
+        let late = since.is_some_and(|since| self.now.since(*since) > longest);
         late && ended(wanted) && !self.disturbed
     }
 
@@ -358,7 +372,7 @@ impl Knowledge {
             Some(false) => return ByteRead::Wrong,
             None => {}
         }
-        if place.2 == ram::EEPROM_CONTROL && self.is_overdue((place.0, place.1), wanted, value) {
+        if self.is_overdue(place, wanted, value) {
             return ByteRead::Wrong;
         }
         if place.2 == ram::STATUS && self.is_in_reset_by_itself((place.0, place.1), wanted, value) {
@@ -608,5 +622,24 @@ mod tests {
         known.converse(true);
         known.write(control, Write::Set(READ_BYTE));
         assert_eq!(after(&mut known, 5_000, READ, 0x00), ByteRead::Own);
+    }
+
+    /// ND21 14.10.1: a confirmed error is deleted, and neither the AF nor the code of a bus error stays.
+    #[test]
+    fn a_confirmed_error_is_deleted() {
+        let code = (0, 1, ram::ERRORCODE);
+        let after = |ms: u64, wanted, value| {
+            let mut known = Knowledge::default();
+            known.converse(false);
+            known.write(code, Write::Set(CONFIRM));
+            known.proceed_to(Instant::START + Span::from_millis(ms));
+            known.read(code, wanted, value)
+        };
+        assert_eq!(after(499, 0, CONFIRM), ByteRead::Own);
+        assert_eq!(after(501, 0, CONFIRM), ByteRead::Wrong);
+        assert_eq!(after(501, 0, OF_THE_BUS), ByteRead::Wrong);
+        // The drive has an error of its own, or another one of the bus came.
+        assert_eq!(after(501, 0, 0x02), ByteRead::Own);
+        assert_eq!(after(501, OF_THE_BUS, OF_THE_BUS), ByteRead::Own);
     }
 }

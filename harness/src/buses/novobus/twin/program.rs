@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 /// What clears the code of an error (ND21 14.10.1).
-const CONFIRM: u8 = 0xAF;
+pub(super) const CONFIRM: u8 = 0xAF;
 
 /// The high byte of the codes of the bus.
-const OF_THE_BUS: u8 = 0x05;
+pub(super) const OF_THE_BUS: u8 = 0x05;
 
 /// Commands of `EEPROMcontrol` (14.10.5.1), and its bit that says that a byte has been read.
 pub(super) const READ_BYTE: u8 = 0x81;
