@@ -122,12 +122,9 @@ impl Comparer<'_> {
                 }
             };
             let role = rows.role(index);
-            let drive = match size.drives() {
-                1 => Some(0),
-                _ => aligned.then(|| self.culprit(&rows, index)).flatten(),
-            };
             let came = received.get(index).copied();
             let mut due = expected.get(index).copied();
+            // What the drive itself has shown before, where the model agrees with the byte that differs from it.
             if let (Some((_, due)), Some((_, came)), Role::Data { drive, address }) =
                 (&mut due, came, role)
                 && due.byte == came.byte
@@ -138,6 +135,11 @@ impl Comparer<'_> {
                     .held((ring, drive, address))
                     .unwrap_or(due.byte);
             }
+            // It looks at the bytes behind this one, with what is known then.
+            let drive = match size.drives() {
+                1 => Some(0),
+                _ => aligned.then(|| self.culprit(&rows, index)).flatten(),
+            };
             let found = Divergence {
                 ring,
                 byte: index + 1,
@@ -271,9 +273,27 @@ impl Comparer<'_> {
                     |place: usize| rows.expected[place].1.byte != rows.received[place].1.byte;
                 let bytes = answer().map(|place| rows.received[place].1.byte);
                 let sum = bytes.fold(Checksum::EMPTY, Checksum::with);
-                answer().any(other).then(|| sum.minus() == value)
+                let own = answer().any(other).then(|| sum.minus() == value);
+                if own.unwrap_or(wanted == value) {
+                    self.learn_zeros(ring, drive, answer_of(&roles[..index], drive, length));
+                }
+                own
             }
             _ => None,
+        }
+    }
+
+    /// The checking byte of an answer is right.
+    fn learn_zeros<'r>(
+        &mut self,
+        ring: usize,
+        drive: u8,
+        answer: impl Iterator<Item = (usize, &'r Role)>,
+    ) {
+        for (_, role) in answer {
+            if let Role::Data { address, .. } = role {
+                self.knowledge.confirm_zero((ring, drive, *address));
+            }
         }
     }
 
