@@ -368,7 +368,11 @@ impl Sent {
         // A 00 of the master's is an error by itself, and is answered so by a drive that has found none before.
         let next = self.bytes.get(index + 1).map_or(0, |own| own.0);
         let tells = next != 0 || came(index) == Some(self.bytes[index].0);
-        let late = expected == Some(0) && !refused && came(index + 1) == Some(0) && tells;
+        // Zeros of an error go on to the checking byte at least, which is none of data (9.6).
+        let is_check = |at: &usize| matches!(self.roles.get(*at), Some(Role::Check { .. }));
+        let check = (index + 1..index + 6).find(is_check).unwrap_or(index + 1);
+        let zeros = (index + 1..=check).all(|at| came(at) == Some(0));
+        let late = expected == Some(0) && !refused && zeros && tells;
         let section = (of_own && late)
             .then_some("9.7")
             .or_else(|| self.comes_back(index, came))
