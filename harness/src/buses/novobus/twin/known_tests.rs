@@ -1,3 +1,5 @@
+//! Tests of what is known of drives.
+
 use super::*;
 
 const CELL: CellByte = (0, 1, 0xFF74);
