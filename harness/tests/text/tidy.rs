@@ -505,6 +505,9 @@ fn every_property_is_exercised_and_described() {
 
 #[test]
 fn files_are_not_over_long_and_have_a_doc() {
+    for (page, most) in [("README.md", 100), ("ARCHITECTURE.md", 130)] {
+        assert!(read(&root().join(page)).lines().count() <= most, "{page}");
+    }
     for path in files("harness", "rs") {
         let text = read(&path);
         assert!(text.lines().count() <= MAX_LINES, "{}", path.display());
