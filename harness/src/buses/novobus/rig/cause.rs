@@ -303,6 +303,12 @@ mod tests {
             }
         }
         assert_eq!(named(&FOREIGN(), &heard), LikelyCause::HeldUp);
+        let said = LikelyCause::HeldUp.to_string();
+        assert!(said.contains("stop other programs"), "{said}");
+        assert!(!said.contains("set `line"), "{said}");
+        let late = Span::from_millis(50);
+        let said = Unhealthy::Late { late }.to_string();
+        assert!(said.contains("bytes come back whole and later"), "{said}");
     }
 
     #[test]

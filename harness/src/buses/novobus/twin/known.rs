@@ -3,11 +3,11 @@
 //! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
-use super::program::{CONFIRM, OF_THE_BUS, Program, READ, READ_BYTE, READY};
+use super::program::{OF_THE_BUS, Program, READ, READ_BYTE, READY};
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{CONFIRM_ERROR, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, PAGE};
 use harness_proto::novobus::output::Output;
@@ -243,7 +243,7 @@ impl Knowledge {
         }
         let is_order = match (address, write) {
             (ram::EEPROM_CONTROL, Write::Set(order)) => order >= READ_BYTE,
-            (ram::ERRORCODE, Write::Set(data)) => data == CONFIRM,
+            (ram::ERRORCODE, Write::Set(data)) => data == CONFIRM_ERROR,
             _ => false,
         };
         if is_order {
@@ -348,7 +348,7 @@ impl Knowledge {
         let (ended, longest): (fn(u8) -> bool, _) = match place.2 {
             ram::EEPROM_CONTROL => (|shown| shown & (READ | READY) != 0, LONGEST_ORDER),
             ram::ERRORCODE => (
-                |shown| ![CONFIRM, OF_THE_BUS].contains(&shown),
+                |shown| ![CONFIRM_ERROR, OF_THE_BUS].contains(&shown),
                 LONGEST_CONFIRMATION,
             ),
             _ => return false,

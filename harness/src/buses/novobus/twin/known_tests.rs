@@ -206,12 +206,12 @@ fn a_confirmed_error_is_deleted() {
     let after = |ms: u64, wanted, value| {
         let mut known = Knowledge::default();
         known.converse(false);
-        known.write(code, Write::Set(CONFIRM));
+        known.write(code, Write::Set(CONFIRM_ERROR));
         known.proceed_to(Instant::START + Span::from_millis(ms));
         known.read(code, wanted, value)
     };
-    assert_eq!(after(499, 0, CONFIRM), ByteRead::Own);
-    assert_eq!(after(501, 0, CONFIRM), ByteRead::Wrong);
+    assert_eq!(after(499, 0, CONFIRM_ERROR), ByteRead::Own);
+    assert_eq!(after(501, 0, CONFIRM_ERROR), ByteRead::Wrong);
     assert_eq!(after(501, 0, OF_THE_BUS), ByteRead::Wrong);
     // The drive has an error of its own, or another one of the bus came.
     assert_eq!(after(501, 0, 0x02), ByteRead::Own);

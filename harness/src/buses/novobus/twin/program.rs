@@ -2,12 +2,9 @@
 //! the data read back from cells of the EEPROM (14.10.5).
 
 use super::known::Write;
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{CONFIRM_ERROR, ram};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-
-/// What clears the code of an error (ND21 14.10.1).
-pub(super) const CONFIRM: u8 = 0xAF;
 
 /// The high byte of the codes of the bus.
 pub(super) const OF_THE_BUS: u8 = 0x05;
@@ -65,7 +62,7 @@ impl Program {
         self.high_is_right = false;
         match cell {
             ram::ERRORCODE => {
-                self.confirmed = data == CONFIRM;
+                self.confirmed = data == CONFIRM_ERROR;
                 self.zeros = 0;
             }
             ram::EEPROM_BUFFER => {
@@ -209,7 +206,7 @@ mod tests {
         let mut drive = Program::default();
         let low = ram::ERRORCODE + 1;
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), None);
-        drive.write(ram::ERRORCODE, Write::Set(CONFIRM));
+        drive.write(ram::ERRORCODE, Write::Set(CONFIRM_ERROR));
         assert_eq!(drive.read(low, 0, 0), None);
         assert_eq!(drive.read(ram::ERRORCODE, 0, 0), Some(true));
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), Some(true));
