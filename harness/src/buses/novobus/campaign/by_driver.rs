@@ -170,7 +170,7 @@ impl ByDriver {
         let every: Vec<_> = (0..link.link.drives(0)).map(quiet).collect();
         self.step(link, &every, &mut evidence, &mut Vec::new());
         settle(&mut link.link);
-        evidence.all_back = self.sound.all_back(&link.link);
+        evidence.all_back = Sound::all_back(&link.link);
         (evidence, answers)
     }
 

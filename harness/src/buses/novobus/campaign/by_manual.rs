@@ -218,7 +218,7 @@ impl<W: Wire> Play<'_, W> {
         self.kept = heard;
         self.evidence.wrong = self.wrong_values();
         if !self.evidence.confirmed || self.of.sound.waits_as(&self.wire) {
-            self.evidence.all_back = self.of.sound.all_back(&self.wire);
+            self.evidence.all_back = Sound::all_back(&self.wire);
             return;
         }
         // Something is left that only the next telegrams can show.
@@ -233,7 +233,7 @@ impl<W: Wire> Play<'_, W> {
             }
             self.repair(answers.restart(wrong));
         }
-        self.evidence.all_back = self.of.sound.all_back(&self.wire);
+        self.evidence.all_back = Sound::all_back(&self.wire);
     }
 
     /// Notes the link that the master blames for a wrong byte.

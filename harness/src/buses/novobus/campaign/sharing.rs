@@ -7,7 +7,7 @@
 
 use super::by_manual::{ByManual, Wire};
 use super::class::CaseEvidence;
-use super::sound::{Compared, DrivesBeyondBus};
+use super::sound::DrivesBeyondBus;
 use crate::campaign::fault::{CaseFaults, Injected};
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::BusEnd;
@@ -57,8 +57,8 @@ pub(crate) struct Sharing<'a> {
     /// The same by the faults, for which nothing is to be worked out.
     damaged: BTreeMap<(usize, Injected), Front>,
     outcomes: HashMap<Fork, Rc<CaseEvidence>>,
-    /// Comparisons of drives, by the numbers of their states.
-    compared: RefCell<Vec<Option<Compared>>>,
+    /// Whether drives hold what they hold without a fault, by the numbers of their states.
+    compared: RefCell<Vec<Option<bool>>>,
 }
 
 /// A ring of which the state is known.
@@ -66,7 +66,7 @@ struct Known<'a> {
     ring: &'a mut SharedRing,
     state: SharedState,
     drives: u8,
-    compared: &'a RefCell<Vec<Option<Compared>>>,
+    compared: &'a RefCell<Vec<Option<bool>>>,
 }
 
 impl Fork {
@@ -89,17 +89,13 @@ impl DrivesBeyondBus for Known<'_> {
         Some(self.ring.drive(&self.state, drive)?.bus_end())
     }
 
-    fn compared(
-        &self,
-        drive: u8,
-        compare: impl FnOnce(&Cells, &BusEnd) -> Compared,
-    ) -> Option<Compared> {
+    fn compared(&self, drive: u8, compare: impl FnOnce(&Cells) -> bool) -> Option<bool> {
         let number = self.ring.drive_number(&self.state, drive)?;
         let mut all = self.compared.borrow_mut();
         if let Some(known) = all.get(number).copied().flatten() {
             return Some(known);
         }
-        let own = compare(self.cells(drive)?, self.bus_end(drive)?);
+        let own = compare(self.cells(drive)?);
         if all.len() <= number {
             all.resize(number + 1, None);
         }

@@ -27,25 +27,11 @@ pub trait DrivesBeyondBus {
     /// Its end of the bus.
     fn bus_end(&self, drive: u8) -> Option<&BusEnd>;
 
-    /// What a comparison of a drive gives, which is always the same for the same state of it; `None` if the ring has not got the drive.
-    fn compared(
-        &self,
-        drive: u8,
-        compare: impl FnOnce(&Cells, &BusEnd) -> Compared,
-    ) -> Option<Compared> {
-        Some(compare(self.cells(drive)?, self.bus_end(drive)?))
+    /// What a comparison of a drive's cells gives, which is always the same for the same state of it; `None` if the ring has not got the
+    /// drive.
+    fn compared(&self, drive: u8, compare: impl FnOnce(&Cells) -> bool) -> Option<bool> {
+        self.cells(drive).map(compare)
     }
-}
-
-/// A drive beside the same drive without a fault.
-#[derive(Clone, Copy, Debug)]
-pub struct Compared {
-    /// A cell holds something else.
-    differs: bool,
-    /// It waits for the same, so that it answers the same to all that follows.
-    waits: bool,
-    /// It is not in the error mode.
-    back: bool,
 }
 
 impl DrivesBeyondBus for SimulatedLink {
@@ -94,24 +80,19 @@ impl Sound {
         self.end = now.clone();
     }
 
-    fn compare(&self, now: &impl DrivesBeyondBus, drive: u8) -> Option<Compared> {
-        let (cells, end) = (self.end.cells(drive)?, self.end.bus_end(drive)?);
-        now.compared(drive, |own, own_end| Compared {
-            differs: differences(cells, own).next().is_some(),
-            waits: own_end.waits_as(end) && own.peek(BUS_ADDR) == cells.peek(BUS_ADDR),
-            back: !own_end.in_error(),
-        })
-    }
-
     /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
     #[must_use]
     pub fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<Wrong> {
         let mut wrong = Vec::new();
         for drive in 0..now.count() {
-            if self.compare(now, drive).is_some_and(|own| !own.differs) {
+            let Some(sound) = self.end.cells(drive) else {
+                continue;
+            };
+            let same = now.compared(drive, |own| differences(sound, own).next().is_none());
+            if same == Some(true) {
                 continue;
             }
-            let (Some(sound), Some(cells)) = (self.end.cells(drive), now.cells(drive)) else {
+            let Some(cells) = now.cells(drive) else {
                 continue;
             };
             for address in differences(sound, cells) {
@@ -130,20 +111,24 @@ impl Sound {
         wrong
     }
 
-    /// Whether every drive waits for the same as without a fault: then all that follows is the same.
+    /// Whether every drive waits for the same as without a fault, so that it answers the same to all that follows.
     #[must_use]
     pub fn waits_as(&self, now: &impl DrivesBeyondBus) -> bool {
-        self.every_drive(now, |own| own.waits)
+        (0..now.count()).all(|drive| {
+            let addressed = |cells: &Cells| cells.peek(BUS_ADDR);
+            let of_sound = self.end.bus_end(drive).zip(self.end.cells(drive));
+            let own = now.bus_end(drive).zip(now.cells(drive));
+            own.zip(of_sound)
+                .is_some_and(|((end, cells), (sound, held))| {
+                    end.waits_as(sound) && addressed(cells) == addressed(held)
+                })
+        })
     }
 
     /// Whether no drive is in the error mode.
     #[must_use]
-    pub fn all_back(&self, now: &impl DrivesBeyondBus) -> bool {
-        self.every_drive(now, |own| own.back)
-    }
-
-    fn every_drive(&self, now: &impl DrivesBeyondBus, which: impl Fn(Compared) -> bool) -> bool {
-        (0..now.count()).all(|drive| self.compare(now, drive).is_some_and(&which))
+    pub fn all_back(now: &impl DrivesBeyondBus) -> bool {
+        (0..now.count()).all(|drive| now.bus_end(drive).is_some_and(|end| !end.in_error()))
     }
 
     /// Whether any drive watches for silence (9.9).
