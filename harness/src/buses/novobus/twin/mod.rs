@@ -9,14 +9,16 @@ mod compare;
 mod comparison;
 mod follow;
 mod known;
+mod places;
 mod program;
 mod rows;
 mod unasked;
 
-pub(crate) use compare::{answered, answering, unknowable, what_of};
+pub(crate) use compare::unknowable;
 pub use comparison::{
     Adopted, Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
 };
 pub use follow::{Conversation, Done, Twin};
 pub use harness_proto::novobus::role::Role;
+pub(crate) use places::{answered, answering, what_of};
 pub(crate) use unasked::{SILENCED, Sent};
