@@ -85,7 +85,7 @@ pub enum LikelyCause {
     },
     /// The number of drives in the rig's file is not that of the ring.
     #[error(
-        "the rig's file is not about this ring, or a drive was added or taken out. Next: compare `drives = {stated}` with the cabinet; with {found} drives set `drives = {found}`"
+        "the rig's file is not about this ring, a drive was added or taken out, or a drive does not add 1 to the address of a telegram (ND21 9.3). Next: compare `drives = {stated}` with the cabinet; with {found} drives set `drives = {found}`"
     )]
     Count {
         /// How many answer.
@@ -95,18 +95,27 @@ pub enum LikelyCause {
     },
     /// A drive spells out its address and does not leave the error mode.
     #[error(
-        "the link in front of drive {0} damages bytes, or drive {0} is defective. Next: check the cable and the connectors in front of drive {0} (ND21 9.7)"
+        "drive {0} receives bytes that are damaged or missing, or is defective. Next: check the cable and the connectors in front of drive {0} (ND21 9.7); if they are sound, exchange drive {0}, and then the drive in front of it"
     )]
     LinkInFront(u8),
+    /// A drive and all drives behind it add 1 to each byte.
+    #[error(
+        "drive {0} stays in the error mode with all drives behind it: each adds 1 to a byte (ND21 9.7), so the check sequence does not reach drive {0} whole, or drive {0} does not know it (ND21 9.8). Next: check the cable and the connectors in front of drive {0}; if they are sound, exchange drive {0}, and then the drive in front of it"
+    )]
+    StaysInErrorMode(u8),
     /// SYNCO comes back well, and no answer does.
     #[error(
-        "SYNCO passes and commands do not: a drive may still be testing itself (ND21 11.8). Next: wait a second and try again; then switch the drives off and on"
+        "SYNCO passes and telegrams do not: a drive may still be testing itself (ND21 11.8), or changes telegrams. Next: wait a second and try again; switch the drives off and on; then put the final connector on X4 of a drive in the middle to find the half that changes them (ND21 8.2)"
     )]
     NoCommands,
 }
 
 /// The likely cause, from what the health check and the line test found.
-pub(crate) fn cause(ill: &Unhealthy, heard: &LineTestBytes, stated: Rate) -> LikelyCause {
+pub(crate) fn cause(
+    ill: &Unhealthy,
+    heard: &LineTestBytes,
+    (drives, stated): (u8, Rate),
+) -> LikelyCause {
     if !heard.unasked.is_empty() {
         return unasked(&heard.unasked);
     }
@@ -141,6 +150,9 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &LineTestBytes, stated: Rate) -> Lik
     if let (&Unhealthy::Broken(drive), _) | (_, [_, Some(drive)]) = (ill, spelt) {
         return LikelyCause::LinkInFront(drive);
     }
+    if let Some(drive) = in_error_mode(&first, drives).filter(|_| first == second) {
+        return drive;
+    }
     if clean(&first) && clean(&second) {
         if let RingPace::Late(_) = pace {
             return LikelyCause::HeldUp;
@@ -151,6 +163,21 @@ pub(crate) fn cause(ill: &Unhealthy, heard: &LineTestBytes, stated: Rate) -> Lik
         LikelyCause::RateOrParity
     } else {
         LikelyCause::Noise
+    }
+}
+
+/// What a ring says that gives the same good byte for each SYNCO: it spells out a drive, or the drives that are in the error mode add 1 each
+/// (ND21 9.7).
+fn in_error_mode(heard: &[Received], drives: u8) -> Option<LikelyCause> {
+    let first = heard.first().filter(|first| first.error.is_none())?;
+    let all_alike = heard.len() == SENT && heard.iter().all(|byte| byte == first);
+    let added = first.byte.checked_sub(SYNCO);
+    match (all_alike, added) {
+        (true, None) if first.byte < drives => Some(LikelyCause::LinkInFront(first.byte)),
+        (true, Some(added)) if (1..=drives).contains(&added) => {
+            Some(LikelyCause::StaysInErrorMode(added - 1))
+        }
+        _ => None,
     }
 }
 
@@ -270,7 +297,7 @@ mod tests {
     }
 
     fn named(ill: &Unhealthy, heard: &LineTestBytes) -> LikelyCause {
-        cause(ill, heard, Rate::Baud38400)
+        cause(ill, heard, (3, Rate::Baud38400))
     }
 
     const FOREIGN: fn() -> Unhealthy = || Unhealthy::Foreign {
@@ -364,6 +391,18 @@ mod tests {
             named(&ill, &heard(noise(37), noise(91))),
             LikelyCause::Noise
         );
+
+        // A check sequence that does not end the error mode: SYNCO comes back as 80 and the number of drives that are in it, or as the
+        // address of the first that is.
+        let same = |byte: u8| {
+            let all = || vec![Received::good(byte); SENT];
+            named(&FOREIGN(), &heard(all(), all()))
+        };
+        assert_eq!(same(0x81), LikelyCause::StaysInErrorMode(0));
+        assert_eq!(same(0x83), LikelyCause::StaysInErrorMode(2));
+        assert_eq!(same(0x84), LikelyCause::RateOrParity);
+        assert_eq!(same(0x02), LikelyCause::LinkInFront(2));
+        assert_eq!(same(0x03), LikelyCause::RateOrParity);
 
         let address = |k: u8| {
             let zeros = std::iter::repeat_n(Received::good(0), 20);

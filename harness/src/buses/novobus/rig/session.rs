@@ -323,8 +323,10 @@ impl Session {
                     None => {
                         self.settle();
                         let heard = line_test::listen(&mut self.link, ring - 1);
+                        let drives = file.as_ref().map_or(0, |file| file.drives);
                         let of_marks = file.and_then(|file| cause::of_marks(&file, &heard));
-                        Some(of_marks.unwrap_or_else(|| cause::cause(&ill, &heard, self.rate())))
+                        let other = || cause::cause(&ill, &heard, (drives, self.rate()));
+                        Some(of_marks.unwrap_or_else(other))
                     }
                 };
                 SessionError::Ill {
