@@ -1,6 +1,6 @@
 //! Which known deviation explains how a ring differed from the model; and which one of the master does, where the bench's own master is wrong.
 
-use super::hypothesis::{Fit, judge};
+use super::hypothesis::{Fit, fit, judge};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
@@ -176,9 +176,14 @@ fn name_among<E>(
         if simulated && differed == MOST_SIMULATED {
             break;
         }
-        let right = explains(&manual, attempt);
-        let better = |own: &Fit| right.is_none_or(|right| own.timely && !right.timely);
-        if right.is_some_and(|right| right.timely) {
+        let right = twin(&manual).map(|twin| fit(twin, attempt, seen.exactness));
+        // What is not compared up to the byte that differs explains nothing.
+        let better = |own: &Fit| match right {
+            Ok(Ok(right)) => own.timely && !right.timely,
+            Ok(Err(differs)) => own.compared >= differs,
+            Err(_) => true,
+        };
+        if matches!(right, Ok(Ok(right)) if right.timely) {
             continue;
         }
         differed += 1;

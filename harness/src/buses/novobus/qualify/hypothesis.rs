@@ -22,6 +22,8 @@ pub struct Fit {
     pub timely: bool,
     /// How many cells hold what the master wrote, where the hypothesis says that they hold something else.
     pub against: u64,
+    /// How many bytes were compared. Behind bytes that drives send unasked (ND21 9.9) none is.
+    pub compared: u64,
 }
 
 /// The hypotheses that explain every byte of all conversations, with their evidence, in the order given. If one of them also explains the
@@ -50,21 +52,34 @@ pub fn explaining<'h, E>(
 
 /// How well a twin explains conversations; none where a byte differs.
 pub(crate) fn judge(
-    mut twin: Twin,
+    twin: Twin,
     conversations: &[Conversation],
     exactness: Exactness,
 ) -> Option<Fit> {
+    fit(twin, conversations, exactness).ok()
+}
+
+/// The same.
+///
+/// # Errors
+/// How many bytes were compared up to the first that differs.
+pub(super) fn fit(
+    mut twin: Twin,
+    conversations: &[Conversation],
+    exactness: Exactness,
+) -> Result<Fit, u64> {
     let mut evidence = Fit {
         timely: true,
         ..Fit::default()
     };
     for comparison in twin.follow_while_alike(conversations, exactness) {
+        evidence.compared += comparison.compared;
         if comparison.divergence.is_some() {
-            return None;
+            return Err(evidence.compared);
         }
         evidence.apart = evidence.apart + comparison.apart;
         evidence.timely &= comparison.untimely.is_none();
         evidence.against += comparison.against;
     }
-    Some(evidence)
+    Ok(evidence)
 }

@@ -3,7 +3,7 @@
 use super::left_open::{self, Explanation};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{
-    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED,
+    Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, Unasked,
 };
 use crate::link::{LinkEvent, Recording};
 use crate::rig::check::Rig;
@@ -291,7 +291,9 @@ fn in_a_race(finding: &Mismatch, facts: &AttemptFacts<'_>) -> bool {
     let mut races = of_scenario.flat_map(|(_, comparison)| &comparison.unasked);
     match &finding.difference {
         Some(found) => {
-            races.any(|race| race.ring == found.ring && found.at.is_none_or(|at| at >= race.at))
+            let within =
+                |race: &Unasked, at| at >= race.at && race.until.is_none_or(|end| at < end);
+            races.any(|race| race.ring == found.ring && found.at.is_none_or(|at| within(race, at)))
         }
         None => races.next().is_some(),
     }

@@ -1,6 +1,6 @@
-//! Verdicts of attempts on a port whose bytes come late or early.
+//! Verdicts of attempts on a port whose bytes come late or early, or unasked.
 
-use super::tests::{READ, judged_early, judged_on, link, plan};
+use super::tests::{READ, judged, judged_early, judged_on, link, plan};
 use crate::buses::SimulatedLink;
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};
@@ -203,4 +203,41 @@ fn zeros_of_the_bench_excuse_no_wrong_byte() {
     };
     judged("", Passed);
     judged("drive 2 deviates process-data-high-byte-early\n", Failed);
+}
+
+/// ND21 9.8, 9.9, 14.10.2, 14.11.14: all drives that monitor have missed a master that was silent for 20 ms, and behind the check sequence
+/// that ends the race of their clocks what they hold is compared again.
+#[test]
+fn the_code_of_a_time_out_is_judged() {
+    let verdict = |ring: &str, monitoring: &str, silence: &str, between: &str| {
+        let errors =
+            |k: u8| format!("delete-error {k}\nuntil drive {k} errorcode = 0000 within 1s\n");
+        let codes = |k: u8| {
+            let address = 0xFD + k;
+            format!("> 88 {address:02X} C0 82 FD 3F 88 {address:02X} C0 83 FD 40\n")
+        };
+        let all = |text: &dyn Fn(u8) -> String| (0..3).map(text).collect::<String>();
+        let scenario = format!(
+            "drive {monitoring} memory Flags2 = 04\n{}wait {silence}\n{between}> 00*17 FF 44 72 4C 41\n{}> 80*2\n",
+            all(&errors),
+            all(&codes)
+        );
+        judged(ring, "", &scenario).verdict
+    };
+    let wrong = "drive 1 deviates reports-time-out-as-sync";
+    assert_eq!(verdict(wrong, "0..last", "80ms", ""), Failed);
+    assert_eq!(verdict(wrong, "0..last", "80ms", "> 80*4\n"), Failed);
+    let late = "drive 1 property time-out = 20ms";
+    for right in ["", late, "drive 0 property time-out = 15ms"] {
+        assert_eq!(verdict(right, "0..last", "80ms", ""), Passed, "{right}");
+    }
+    // What a drive in normal mode would have taken, a drive that does not say whether it monitors, and a shorter silence.
+    for (monitoring, silence, between) in [
+        ("0..last", "80ms", "> 88 FE C0 13 FE D1\n"),
+        ("0", "80ms", ""),
+        ("0..last", "21ms", ""),
+    ] {
+        let verdict = verdict(wrong, monitoring, silence, between);
+        assert_ne!(verdict, Failed, "{monitoring}, {silence}, {between}");
+    }
 }

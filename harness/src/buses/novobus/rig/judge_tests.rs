@@ -16,7 +16,7 @@ use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
-fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
+pub(super) fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
     judged_with(ring, rig, scenario, &|_| {})
 }
 
@@ -243,10 +243,12 @@ fn cells_that_process_data_have_written_are_known() {
 #[test]
 fn a_race_excuses_nothing_elsewhere() {
     let scenario = format!("{SET}{READ}< 88 01 C0 13 77 xx\n");
-    let race = |ring: usize| Unasked {
+    let ended = |ring: usize, until: Option<Instant>| Unasked {
         ring,
         at: Instant::START,
+        until,
     };
+    let race = |ring: usize| ended(ring, None);
     let verdict =
         |change: &dyn Fn(&mut [Comparison])| judged_with("", "", &scenario, change).verdict;
     assert_eq!(verdict(&|_| {}), Failed);
@@ -256,6 +258,12 @@ fn a_race_excuses_nothing_elsewhere() {
     };
     assert_eq!(verdict(&of_all(1)), Failed);
     assert_eq!(verdict(&of_all(0)), Inconclusive);
+    // The bytes behind a check sequence that ended it are compared again.
+    let over = |all: &mut [Comparison]| {
+        let end = |own: &mut Comparison| own.unasked.push(ended(0, Some(Instant::START)));
+        all.iter_mut().for_each(end);
+    };
+    assert_eq!(verdict(&over), Failed);
 }
 
 /// ND21 9.8: a byte that is lost at the very end of a conversation is noticed although no line asks for it.

@@ -44,7 +44,8 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
             match compare(&all, facts) {
                 // It moves the model's bytes so that they seem to be late, and explains nothing.
                 Ok(comparisons)
-                    if silence(&comparisons).is_some_and(|own| !own.is_behind(&first)) => {}
+                    if silence(&comparisons).is_some_and(|own| !own.is_behind(&first))
+                        || compared(&comparisons) < first.compared => {}
                 Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
                     let has_steps = |own: &Conversation| own.has_steps();
@@ -76,6 +77,8 @@ struct Place {
     conversation: usize,
     /// How; `None` where the choice makes no ring.
     divergence: Option<Divergence>,
+    /// How many bytes were compared up to there. What ends its comparison before explains nothing (ND21 9.9).
+    compared: u64,
 }
 
 impl Place {
@@ -86,12 +89,18 @@ impl Place {
     }
 }
 
+/// How many bytes were compared.
+fn compared(comparisons: &[Comparison]) -> u64 {
+    comparisons.iter().map(|own| own.compared).sum()
+}
+
 /// Where a silence of the bench has ended the comparison.
 fn silence(comparisons: &[Comparison]) -> Option<Place> {
     let last = comparisons.last().filter(|own| own.silenced)?;
     Some(Place {
         conversation: comparisons.len(),
         divergence: last.divergence.clone(),
+        compared: compared(comparisons),
     })
 }
 
@@ -156,6 +165,7 @@ fn compare(header: &Header, facts: &AttemptFacts<'_>) -> Result<Vec<Comparison>,
         let nowhere = Place {
             conversation: 0,
             divergence: None,
+            compared: 0,
         };
         return Err((nowhere, false));
     };
@@ -169,6 +179,7 @@ fn compare(header: &Header, facts: &AttemptFacts<'_>) -> Result<Vec<Comparison>,
             Place {
                 conversation,
                 divergence,
+                compared: compared(&comparisons),
             },
             twin.monitors(),
         )),

@@ -5,7 +5,7 @@ use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::places::{answered, collapsed, heard, known_places, what_of};
 use super::rows::{Rows, answer_of};
-use super::unasked::Sent;
+use super::unasked::{Sent, behind_a_race};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
 use harness_proto::nd21::{own, ram};
@@ -17,7 +17,7 @@ use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
 /// How much later than its model a drive may detect a time-out: after 20 ms instead of 10 (ND21 9.9).
-const LATEST_TIME_OUT: Span = Span::from_millis(10);
+const TIME_OUT_RANGE: Span = Span::from_millis(10);
 
 /// What is compared, ring by ring.
 pub(crate) struct Comparer<'a> {
@@ -37,6 +37,17 @@ impl Comparer<'_> {
         &mut self,
         ring: usize,
         size: RingSize,
+        conversation: &Conversation,
+        answer: &TwinBytes,
+    ) {
+        self.ring_from(0, (ring, size), conversation, answer);
+    }
+
+    /// The same of the last part of a conversation; `before` is the number of bytes received in front of it.
+    fn ring_from(
+        &mut self,
+        before: usize,
+        (ring, size): (usize, RingSize),
         conversation: &Conversation,
         answer: &TwinBytes,
     ) {
@@ -106,17 +117,21 @@ impl Comparer<'_> {
             let mut index = index;
             if let Some(race) = race {
                 let at = received.get(index).or(expected.get(index));
-                let at = at.map(|(at, _)| Unasked { ring, at: *at });
-                self.comparison.unasked.extend(at);
+                self.comparison.unasked.extend(at.map(|(at, _)| Unasked {
+                    ring,
+                    at: *at,
+                    until: None,
+                }));
                 if let (None, Some((place, fault))) = (&what, &race.fault) {
                     (index, what) = (*place, Some(*fault));
                 }
             }
             let Some(what) = what else {
-                match race {
-                    Some(_) => return,
-                    None => continue,
+                if race.is_none() {
+                    continue;
                 }
+                self.behind_a_race(before, (ring, size), conversation, answer);
+                return;
             };
             let role = rows.role(index);
             let came = received.get(index).copied();
@@ -139,7 +154,7 @@ impl Comparer<'_> {
             };
             let found = Divergence {
                 ring,
-                byte: index + 1,
+                byte: before + index + 1,
                 what,
                 expected: due,
                 received: came,
@@ -148,7 +163,7 @@ impl Comparer<'_> {
                 drive,
             };
             let early = if race.is_some() {
-                LATEST_TIME_OUT
+                TIME_OUT_RANGE
             } else {
                 Span::ZERO
             };
@@ -166,6 +181,28 @@ impl Comparer<'_> {
                 self.comparison.divergence = Some(found);
             }
             return;
+        }
+    }
+
+    /// Compares what comes behind a check sequence that ends a race of clocks, if one does.
+    fn behind_a_race(
+        &mut self,
+        before: usize,
+        (ring, size): (usize, RingSize),
+        conversation: &Conversation,
+        answer: &TwinBytes,
+    ) {
+        let known = |drive| self.knowledge.monitors(ring, drive).is_some();
+        if !(0..size.drives()).all(known) {
+            return;
+        }
+        let tolerance = self.exactness.tolerance;
+        let rest = behind_a_race(conversation, (ring, size), answer, tolerance);
+        if let Some((conversation, answer, left)) = rest {
+            if let Some(race) = self.comparison.unasked.last_mut() {
+                race.until = conversation.received.first().map(|(_, at, _)| *at);
+            }
+            self.ring_from(before + left, (ring, size), &conversation, &answer);
         }
     }
 

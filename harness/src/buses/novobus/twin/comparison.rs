@@ -188,6 +188,16 @@ pub struct Unasked {
     pub ring: usize,
     /// When it was received, or was due.
     pub at: Instant,
+    /// When the first byte came behind a check sequence with which the bytes are compared again.
+    pub until: Option<Instant>,
+}
+
+impl Comparison {
+    /// The rings of which no model knows the state behind the conversation.
+    pub(crate) fn open_races(&self) -> impl Iterator<Item = usize> + '_ {
+        let open = self.unasked.iter().filter(|race| race.until.is_none());
+        open.map(|race| race.ring)
+    }
 }
 
 /// The result of a comparison.
@@ -211,9 +221,9 @@ pub struct Comparison {
     /// bytes (ND21 9.9).
     pub silenced: bool,
     /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: only properties that
-    /// hold for every order are compared.
+    /// hold for every order are compared, up to a check sequence that ends it.
     pub unasked: Vec<Unasked>,
-    /// Whether a ring was left out: an earlier conversation ended in such a race.
+    /// Whether a ring was left out: an earlier conversation left such a race open.
     pub left_out: bool,
     /// The first byte that differs only in its time.
     pub untimely: Option<Divergence>,

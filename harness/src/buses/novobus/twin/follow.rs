@@ -262,8 +262,8 @@ impl Twin {
     }
 
     /// Plays conversations one after another. In real time no model knows the state of a ring after drives have sent unasked bytes (9.9),
-    /// because these race with the master's bytes. The ring is not compared any more after that conversation, and the second value says that
-    /// another twin is needed.
+    /// because these race with the master's bytes. Unless a check sequence has ended the race, the ring is not compared any more after
+    /// that conversation, and the second value says that another twin is needed.
     pub fn follow_all(
         &mut self,
         conversations: &[Conversation],
@@ -277,7 +277,7 @@ impl Twin {
                 break;
             }
             let comparison = self.follow_rings(conversation, exactness, &left_out);
-            left_out.extend(comparison.unasked.iter().map(|unasked| unasked.ring));
+            left_out.extend(comparison.open_races());
             comparisons.push(comparison);
         }
         let diverged = comparisons.iter().any(|c| c.divergence.is_some());
@@ -293,7 +293,7 @@ impl Twin {
         let mut comparisons = Vec::new();
         for conversation in conversations {
             let comparison = self.follow(conversation, exactness);
-            let last = comparison.divergence.is_some() || !comparison.unasked.is_empty();
+            let last = comparison.divergence.is_some() || comparison.open_races().next().is_some();
             comparisons.push(comparison);
             if last {
                 break;

@@ -216,6 +216,16 @@ impl Knowledge {
         (0..size.drives()).any(|drive| !self.trusting.contains(&(ring, drive)))
     }
 
+    /// Whether a drive monitors time-outs, where that is known.
+    pub(crate) fn monitors(&self, ring: usize, drive: u8) -> Option<bool> {
+        if self.trusting.contains(&(ring, drive)) {
+            return Some(false);
+        }
+        let own = self.cells.get(&(ring, drive, ram::FLAGS2))?;
+        let written = own.written & flags2::MONITORING != 0;
+        written.then_some(own.value & flags2::MONITORING != 0)
+    }
+
     /// The master has written to a byte.
     pub(crate) fn write(&mut self, place: CellByte, write: Write) {
         let (ring, drive, address) = place;

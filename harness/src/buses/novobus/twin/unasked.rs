@@ -7,12 +7,17 @@
 //! same holds for drives of which it is not known whether they monitor: it is a setting (14.3.6).
 
 use super::comparison::Symptom;
-use super::follow::TwinBytes;
+use super::follow::{Conversation, Done, TwinBytes};
+use super::places::answered;
 use crate::link::HARMLESS;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
+
+/// How long behind the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
+const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
 /// A byte and when it came.
 type Heard = (Instant, Received);
@@ -175,6 +180,65 @@ impl Sent<'_> {
             fault: here.map(|what| (first, what)).or_else(foreign),
         })
     }
+}
+
+/// What was sent and received behind a check sequence that ends a race (ND21 9.8), what the twin received there, and how many bytes came
+/// before. `None` where it is not certain that the drives are as their models again: the master has sent something else than zeros and SYNCO
+/// in front of it, the sequence or a byte behind it is not in its place, or a drive that monitors may not have missed its master.
+pub(super) fn behind_a_race(
+    conversation: &Conversation,
+    (ring, size): (usize, RingSize),
+    answer: &TwinBytes,
+    tolerance: Span,
+) -> Option<(Conversation, TwinBytes, usize)> {
+    let fault = |(_, done): &(usize, Done)| matches!(done, Done::Fault(..));
+    let (due, _) = answer.bytes[answer.unasked?];
+    let (sent, starts) = (conversation.sent_in(ring), conversation.sent_at(ring));
+    let last = starts
+        .partition_point(|start| *start < due)
+        .checked_sub(1)?;
+    let silence = starts.get(last + 1)?.since(starts[last]);
+    // Nobody has sent a zero before the last of them has detected the time-out.
+    let unasked = due.since(starts[last]) + tolerance;
+    let all_missed = silence >= LATEST_TIME_OUT + tolerance && unasked >= LATEST_TIME_OUT;
+    if !all_missed || conversation.done.iter().any(fault) {
+        return None;
+    }
+    let behind: Vec<u8> = sent[last + 1..].iter().map(|(byte, _)| *byte).collect();
+    let place = behind
+        .windows(SEQUENCE.len())
+        .position(|own| own == SEQUENCE)?;
+    if !behind[..place].iter().all(|byte| [0, SYNCO].contains(byte)) {
+        return None;
+    }
+    let end = last + 1 + place + SEQUENCE.len();
+    let answered = answered(size, &sent[end..]).0.len();
+    // Each byte behind the sequence has come back, and the sequence in front of them.
+    let received = conversation.received_in(ring);
+    let behind_the_sequence = |heard: &[Heard]| {
+        let from = heard.len().checked_sub(answered)?;
+        let values: Vec<_> = heard[..from].iter().map(|(_, byte)| *byte).collect();
+        values
+            .ends_with(&SEQUENCE.map(Received::good))
+            .then_some(from)
+    };
+    let left = behind_the_sequence(&received)?;
+    let rest = TwinBytes {
+        bytes: answer.bytes[behind_the_sequence(&answer.bytes)?..].to_vec(),
+        unasked: None,
+    };
+    let mut places = 0..;
+    let done = conversation.done.iter().filter(|(at, done)| match done {
+        Done::Sent(..) => *at == ring && places.next() >= Some(end),
+        _ => true,
+    });
+    let received = received[left..].iter().map(|(at, byte)| (ring, *at, *byte));
+    let conversation = Conversation {
+        done: done.copied().collect(),
+        received: received.collect(),
+        end: conversation.end,
+    };
+    Some((conversation, rest, left))
 }
 
 /// Whether a byte came so much later than in the model that the bench may have left the line silent for longer than it knows.
