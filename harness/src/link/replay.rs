@@ -329,14 +329,15 @@ impl Line for Replay {
         if self.trouble.is_some() {
             return false;
         }
-        // The next byte that comes, behind those that have come and are not fetched.
-        let mut bytes = self.events.iter().map_while(|event| match event {
-            LinkEvent::Received(_, at, _) => Some(*at),
+        // The next byte that comes, behind those that have come and are not fetched; or the time of the next look at an inner link.
+        let mut next = self.events.iter().map_while(|event| match event {
+            LinkEvent::Received(_, at, _) => Some((*at, false)),
+            LinkEvent::Tapped(_, _, at, _) => Some((*at, true)),
             _ => None,
         });
         let now = self.now;
-        let next = bytes.find(|at| *at > now);
-        self.now = next.map_or(until, |at| at.min(until)).max(now);
+        let next = next.find(|(at, is_look)| *is_look || *at > now);
+        self.now = next.map_or(until, |(at, _)| at.min(until)).max(now);
         !self.events.is_empty()
     }
 
@@ -587,5 +588,26 @@ mod tests {
             trouble.contains("something else than what is sent"),
             "{trouble}"
         );
+    }
+
+    /// Where a wait ended without a byte, the caller looked at an inner link: so it does again, at the same times.
+    #[test]
+    fn a_wait_ends_at_a_look_at_an_inner_link() {
+        let byte = || Received::good(0x80);
+        let events = vec![
+            LinkEvent::Begin(Instant::START),
+            LinkEvent::Tapped(0, 1, Instant::START, vec![byte()]),
+            LinkEvent::Tapped(0, 1, ms(3), Vec::new()),
+            LinkEvent::Received(0, ms(4), Heard::Octet(byte())),
+        ];
+        let mut replay = Replay::new(events, Rate::default(), Span::ZERO, vec![1], Vec::new());
+        replay.begin();
+        assert_eq!(replay.tapped(0, 1), Some(vec![byte()]));
+        replay.wait(ms(10));
+        assert_eq!(replay.now(), ms(3));
+        assert_eq!(replay.tapped(0, 1), Some(vec![byte()]));
+        replay.wait(ms(10));
+        assert_eq!(replay.receive_octet(0), Some((ms(4), byte())));
+        assert_eq!((replay.trouble(), replay.left()), (None, None));
     }
 }

@@ -8,7 +8,8 @@ use crate::blind::Blind;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
 use harness::qualify::deviating_masters;
-use harness::rig::{Run, Session, UseOptions, parse};
+use harness::rig::{PlayedScenario, Run, Session, UseOptions, parse};
+use harness::scenario::plan::Plan;
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
@@ -281,6 +282,55 @@ fn every_wrong_master_is_named() {
     }
 }
 
+/// Plays on a simulated rig of three drives with this setup and these limits.
+fn on_a_rig(setup: &str, limits: &str, plans: &[Plan]) -> Vec<PlayedScenario> {
+    let text = format!(
+        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [{setup}]\n[limits]\n{limits}"
+    );
+    let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
+    let rig = parse(&source.expect("a text")).expect("a rig");
+    let options = UseOptions {
+        allow_motion: !limits.is_empty(),
+        ..UseOptions::default()
+    };
+    let mut session = Session::open(&rig, &options).expect("a rig in use");
+    let mut on_rig = Run::new(&mut session).expect("a twin");
+    let played = plans
+        .iter()
+        .map(|plan| on_rig.play(plan, None).expect("a healthy rig"));
+    let played = played.collect();
+    let _end = session.close();
+    played
+}
+
+/// ND21 9.9, 14.10.2: drives that send zeros without end keep no bench busy, and what they do is not its own master's fault.
+#[test]
+fn drives_that_send_without_end_are_to_blame() {
+    let limits: String = ["motion", "reset", "eeprom", "outputs", "monitoring"]
+        .map(|what| format!("allow_{what} = true\n"))
+        .concat();
+    for (deviation, name) in [
+        ("answers-late", "9.9-master-silent"),
+        ("time-out-always", "9.9-driver-silence"),
+    ] {
+        let scenarios = scenarios();
+        let entry = scenarios.iter().find(|s| s.short_name() == name);
+        let plan = entry.and_then(|s| s.plan.clone()).expect("a plan");
+        let setup = format!("\"drive 1 deviates {deviation}\"");
+        let played = on_a_rig(&setup, &limits, &[plan]).remove(0);
+        assert_eq!(
+            played.outcome.verdict,
+            Verdict::Failed,
+            "{:#?}",
+            played.outcome
+        );
+        for trace in played.attempts.iter().flat_map(|own| &own.traces) {
+            let carried = trace.channels.iter().map(|own| own.octets().len());
+            assert!(carried.sum::<usize>() < 100_000, "{name}");
+        }
+    }
+}
+
 /// ND21 9.8: what breaks a check sequence off is tried on a rig that allows nothing, and shows a wrong drive wherever it stands: the drives in front
 /// of it count the bytes up (9.7).
 #[test]
@@ -291,20 +341,8 @@ fn a_broken_sequence_is_tried_with_every_drive() {
     let plans: Vec<_> = plans.map(|s| s.plan.clone().expect("a plan")).collect();
     assert_eq!(plans.len(), 2);
     let judged = |setup: &str| -> Vec<Verdict> {
-        let text = format!(
-            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [{setup}]\n"
-        );
-        let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
-        let rig = parse(&source.expect("a text")).expect("a rig");
-        let mut session = Session::open(&rig, &UseOptions::default()).expect("a rig in use");
-        let mut on_rig = Run::new(&mut session).expect("a twin");
-        let played = plans.iter().map(|plan| {
-            let played = on_rig.play(plan, None).expect("a healthy rig");
-            played.outcome.verdict
-        });
-        let played = played.collect();
-        let _end = session.close();
-        played
+        let played = on_a_rig(setup, "", &plans);
+        played.iter().map(|own| own.outcome.verdict).collect()
     };
     assert_eq!(judged(""), [Verdict::Passed; 2]);
     for drive in 0..3 {

@@ -167,8 +167,9 @@ impl<D: Device> RingNode<D> {
                     if at > until {
                         return;
                     }
-                    // Only a device that delays its answers sends here.
-                    self.act(at, true, outbound, inbound.arrived());
+                    // Only a device that delays its answers sends here: in the error mode its own zeros too (ND21 9.9).
+                    let solicited = !self.device.in_error();
+                    self.act(at, solicited, outbound, inbound.arrived());
                     continue;
                 }
                 Some(Deadline::LineFree(from))

@@ -2,7 +2,7 @@
 
 use super::outcome::Stop;
 use super::player::Runner;
-use crate::link::Trouble;
+use crate::link::{Link, Trouble};
 use crate::scenario::language::Language;
 use crate::scenario::plan::MAX_CARRIED;
 use harness_proto::time::Span;
@@ -77,10 +77,13 @@ impl<L: Language> Runner<'_, L> {
             .or_else(|| trouble().map(Halt::Trouble));
     }
 
-    /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it.
+    /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it. A drive that never stops
+    /// sending must not fill the record.
     fn come_home(&mut self) {
         let end = self.link.now() + L::ROUND;
-        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
+        let more =
+            |link: &dyn Link| link.busy() && link.now() < end && link.carried() <= MAX_CARRIED;
+        while more(self.link) && self.link.wait(end) {}
         self.fetch();
     }
 
