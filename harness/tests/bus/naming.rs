@@ -370,6 +370,35 @@ fn what_is_right_refutes_a_name() {
     assert!(names.contains(&"ram-bit-stuck-at-0"), "{names:?}");
 }
 
+/// ND21 10.3: a drive that takes only the mask FF for 7F does not add masks to bytes: with all others before it is right.
+#[test]
+fn what_is_right_before_refutes_a_name() {
+    let lines = [STANDS.to_owned()];
+    let link = twin(&lines).expect("a ring").into_link();
+    let mut all = played_in_time(&named_plan("10.3-every-mask-or"), &link);
+    // The answer to the last command, of the last drive: FF, and its checking byte.
+    let received = &mut all.last_mut().expect("a conversation").received;
+    let [.., (_, _, data), (_, _, sum)] = &mut received[..] else {
+        panic!("no answer");
+    };
+    assert_eq!(data.byte, 0xFF);
+    (data.byte, sum.byte) = (0x7F, sum.byte.wrapping_add(0x80));
+    let mut play = Play::default();
+    let _sighting = play.judge(all, link.byte_time(), twin(&lines).expect("a ring"));
+    assert_eq!((play.differing.len(), play.alike.len()), (1, 0));
+    let seen = RingSeen {
+        drives: DRIVES,
+        suspects: &[],
+        differing: &play.differing,
+        alike: &play.alike,
+        exactness: THROUGH_A_PORT,
+    };
+    let twin = |header: &Header| twin(&[&lines[..], &header.lines()].concat());
+    let named = name(&seen, &twin);
+    let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
+    assert!(!names.contains(&"or-carries"), "{names:?}");
+}
+
 /// ND21 14.10.5: a thorough qualification writes each cell of an EEPROM and leaves what was there.
 #[test]
 fn a_march_over_an_eeprom_leaves_what_was_there() {

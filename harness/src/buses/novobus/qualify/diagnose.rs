@@ -177,10 +177,10 @@ fn name_among<E>(
             break;
         }
         let right = twin(&manual).map(|twin| fit(twin, attempt, seen.exactness));
-        // What is not compared up to the byte that differs explains nothing.
+        // What is not compared up to the byte that differs explains nothing, and neither does a drive that is right where this one is wrong.
         let better = |own: &Fit| match right {
             Ok(Ok(right)) => own.timely && !right.timely,
-            Ok(Err(differs)) => own.compared >= differs,
+            Ok(Err(differs)) => own.compared >= differs && own.against <= MOST_AGAINST,
             Err(_) => true,
         };
         if matches!(right, Ok(Ok(right)) if right.timely) {
