@@ -322,6 +322,7 @@ const RUBBISH: &[(&str, &str)] = &[
         "9.8-power-cycle",
         "goes on without a recovery behind a drive that was switched on",
     ),
+    ("9.8-zero-in-a-sequence", "goes on behind too few zeros"),
     (
         "9.8-zeros-before-the-sequence",
         "goes on behind too few zeros",
