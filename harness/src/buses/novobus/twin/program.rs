@@ -101,6 +101,10 @@ impl Program {
         let is_zero = self.confirmed && (wanted, value) == (0, 0);
         match cell {
             ram::ERRORCODE => {
+                // There is no error in the drive, and one of the bus in its model.
+                if self.confirmed && (wanted, value) == (OF_THE_BUS, 0) {
+                    return Some(false);
+                }
                 self.zeros |= if is_zero { HIGH } else { 0 };
                 if self.zeros != HIGH | LOW {
                     return None;
@@ -207,6 +211,8 @@ mod tests {
         let low = ram::ERRORCODE + 1;
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), None);
         drive.write(ram::ERRORCODE, Write::Set(CONFIRM_ERROR));
+        // A drive that does not delete its error is none that has deleted it.
+        assert_eq!(drive.clone().read(ram::ERRORCODE, 0x05, 0x00), Some(false));
         assert_eq!(drive.read(low, 0, 0), None);
         assert_eq!(drive.read(ram::ERRORCODE, 0, 0), Some(true));
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), Some(true));
