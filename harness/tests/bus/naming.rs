@@ -342,6 +342,20 @@ fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
     pinned.map(|own| (own.drive, own.section)).collect()
 }
 
+/// The deviations that explain what was played on a ring whose right drives have these lines.
+fn names_of(play: &Play, lines: &[String]) -> Vec<&'static str> {
+    let seen = RingSeen {
+        drives: DRIVES,
+        suspects: &[],
+        differing: &play.differing,
+        alike: &play.alike,
+        exactness: THROUGH_A_PORT,
+    };
+    let twin = |header: &Header| twin(&[lines, &header.lines()].concat());
+    let named = name(&seen, &twin);
+    named.iter().map(|own| own.deviation.name).collect()
+}
+
 /// A bit that is stuck at 0 is as in a drive that writes nothing, where nothing else is looked at; other cells that are right refute it.
 #[test]
 fn what_is_right_refutes_a_name() {
@@ -356,16 +370,7 @@ fn what_is_right_refutes_a_name() {
         let _sighting = play.judge(all, link.byte_time(), twin(&wrong[..1]).expect("a ring"));
     }
     assert_eq!((play.differing.len(), play.alike.len()), (1, 1));
-    let seen = RingSeen {
-        drives: DRIVES,
-        suspects: &[],
-        differing: &play.differing,
-        alike: &play.alike,
-        exactness: THROUGH_A_PORT,
-    };
-    let twin = |header: &Header| twin(&[&wrong[..1], &header.lines()].concat());
-    let named = name(&seen, &twin);
-    let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
+    let names = names_of(&play, &wrong[..1]);
     assert!(!names.contains(&"writes-ignored"), "{names:?}");
     assert!(names.contains(&"ram-bit-stuck-at-0"), "{names:?}");
 }
@@ -386,16 +391,7 @@ fn what_is_right_before_refutes_a_name() {
     let mut play = Play::default();
     let _sighting = play.judge(all, link.byte_time(), twin(&lines).expect("a ring"));
     assert_eq!((play.differing.len(), play.alike.len()), (1, 0));
-    let seen = RingSeen {
-        drives: DRIVES,
-        suspects: &[],
-        differing: &play.differing,
-        alike: &play.alike,
-        exactness: THROUGH_A_PORT,
-    };
-    let twin = |header: &Header| twin(&[&lines[..], &header.lines()].concat());
-    let named = name(&seen, &twin);
-    let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
+    let names = names_of(&play, &lines);
     assert!(!names.contains(&"or-carries"), "{names:?}");
 }
 

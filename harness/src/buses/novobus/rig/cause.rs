@@ -150,8 +150,8 @@ pub(crate) fn cause(
     if let (&Unhealthy::Broken(drive), _) | (_, [_, Some(drive)]) = (ill, spelt) {
         return LikelyCause::LinkInFront(drive);
     }
-    if let Some(drive) = in_error_mode(&first, drives).filter(|_| first == second) {
-        return drive;
+    if let Some(cause) = in_error_mode(&first, drives).filter(|_| first == second) {
+        return cause;
     }
     if clean(&first) && clean(&second) {
         if let RingPace::Late(_) = pace {

@@ -198,7 +198,7 @@ pub(super) fn behind_a_race(
         .partition_point(|start| *start < due)
         .checked_sub(1)?;
     let silence = starts.get(last + 1)?.since(starts[last]);
-    // Nobody has sent a zero before the last of them has detected the time-out.
+    // No drive sends a zero until every drive has detected the time-out.
     let unasked = due.since(starts[last]) + tolerance;
     let all_missed = silence >= LATEST_TIME_OUT + tolerance && unasked >= LATEST_TIME_OUT;
     if !all_missed || conversation.done.iter().any(fault) {
