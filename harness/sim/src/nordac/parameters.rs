@@ -10,7 +10,7 @@ static PLACES: LazyLock<Places> = LazyLock::new(Places::new);
 
 /// The values of one parameter: all elements of set 1, of set 2, and so on.
 #[derive(Clone, Copy, Default)]
-struct Place {
+struct Extent {
     first: u16,
     /// Number of elements; 0 where no parameter has the number.
     elements: u16,
@@ -19,16 +19,16 @@ struct Place {
 
 /// The layout of the values.
 struct Places {
-    of: Vec<Place>,
+    of: Vec<Extent>,
     count: usize,
 }
 
 impl Places {
     fn new() -> Self {
-        let mut of = vec![Place::default(); usize::from(Pkw::LAST_NUMBER) + 1];
+        let mut of = vec![Extent::default(); usize::from(Pkw::LAST_NUMBER) + 1];
         let mut count = 0;
         for parameter in &PARAMETERS {
-            let place = Place {
+            let place = Extent {
                 first: count,
                 elements: parameter.count.into(),
                 sets: parameter.sets(),
@@ -43,13 +43,13 @@ impl Places {
     }
 
     /// The values of a number; none where no parameter has it.
-    fn of(number: u16) -> Place {
+    fn of(number: u16) -> Extent {
         let place = PLACES.of.get(usize::from(number));
         place.copied().unwrap_or_default()
     }
 }
 
-impl Place {
+impl Extent {
     fn at(self, index: Index) -> Option<usize> {
         let within = index.element < self.elements && index.set < self.sets;
         within.then(|| {

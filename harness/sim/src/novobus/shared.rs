@@ -22,14 +22,14 @@ use std::hash::{BuildHasher, BuildHasherDefault, Hash, Hasher};
 
 /// A place of the ring: the link to it and the drive there, or the master's receiver.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Place {
+struct RingPlace {
     inbound: Link,
     node: Option<RingNode<PlainDrive>>,
     /// When the drive's transmitter can start its next byte.
     line_free: Instant,
 }
 
-impl Place {
+impl RingPlace {
     /// What becomes of the place, and what it sends on, up to and including `until`. `sent` is what the place before it sends; the
     /// master's receiver sends on what it hears.
     fn take(&mut self, sent: &Carried, until: Instant) -> Carried {
@@ -280,7 +280,7 @@ pub struct MetSoFar {
 pub struct SharedRing {
     byte_time: Span,
     /// Places without the bytes on their links.
-    places: Met<Place>,
+    places: Met<RingPlace>,
     under_way: Met<Vec<UnderWay>>,
     streams: Met<Carried>,
     /// What a place makes of a stream up to a time.
@@ -315,7 +315,7 @@ impl SharedRing {
                 Some(_) => return None,
             };
             let outbound = links.get(place + 1);
-            let place = Place {
+            let place = RingPlace {
                 inbound,
                 node,
                 line_free: outbound.map_or(Instant::START, Link::line_free),
@@ -326,7 +326,7 @@ impl SharedRing {
         Some((own, SharedState { places, now }))
     }
 
-    fn met(&mut self, mut place: Place) -> PlaceState {
+    fn met(&mut self, mut place: RingPlace) -> PlaceState {
         let under_way = place.inbound.take_under_way();
         PlaceState {
             under_way: self.under_way.number(under_way),
@@ -334,7 +334,7 @@ impl SharedRing {
         }
     }
 
-    fn place(&self, state: PlaceState) -> Place {
+    fn place(&self, state: PlaceState) -> RingPlace {
         let mut place = self.places.get(state.place).clone();
         let under_way = self.under_way.get(state.under_way);
         place.inbound.put_under_way(under_way);
@@ -352,7 +352,7 @@ impl SharedRing {
         became
     }
 
-    fn work(&mut self, mut place: Place, stream: SentStream, until: Instant) -> Became {
+    fn work(&mut self, mut place: RingPlace, stream: SentStream, until: Instant) -> Became {
         let sent = place.take(self.streams.get(stream.0), until);
         Became {
             place: self.met(place),

@@ -14,7 +14,7 @@ use harness_proto::time::Instant;
 
 /// What a task is about.
 #[derive(Clone, Copy)]
-struct Place {
+struct TaskTarget {
     parameter: &'static Parameter,
     index: Index,
 }
@@ -51,7 +51,7 @@ impl Inverter {
     }
 
     /// The parameter and the index of a task; `None` for one that needs no index: no task, number of elements.
-    fn place(&self, task: Pkw) -> Result<Option<Place>, PkwError> {
+    fn place(&self, task: Pkw) -> Result<Option<TaskTarget>, PkwError> {
         let kind = task.task();
         if kind == Task::None {
             return Ok(None);
@@ -77,7 +77,7 @@ impl Inverter {
             return Ok(None);
         }
         let index = self.index(task, parameter)?;
-        Ok(Some(Place { parameter, index }))
+        Ok(Some(TaskTarget { parameter, index }))
     }
 
     fn known(&self, number: u16) -> Result<&'static Parameter, PkwError> {
@@ -127,8 +127,8 @@ impl Inverter {
     }
 
     /// The checks behind the index; gives the value that a change task is to store.
-    fn check(&self, task: Pkw, place: Place, ppo: PpoType) -> Result<Option<i64>, PkwError> {
-        let Place { parameter, .. } = place;
+    fn check(&self, task: Pkw, place: TaskTarget, ppo: PpoType) -> Result<Option<i64>, PkwError> {
+        let TaskTarget { parameter, .. } = place;
         let (kind, long) = (task.task(), parameter.has(Flag::Long));
         let changes = kind.is_change();
         if changes && !self.is_writable(parameter) {
@@ -184,8 +184,8 @@ impl Inverter {
         }
     }
 
-    fn is_within_limits(&self, place: Place, value: i64) -> bool {
-        let Place { parameter, index } = place;
+    fn is_within_limits(&self, place: TaskTarget, value: i64) -> bool {
+        let TaskTarget { parameter, index } = place;
         let limit = |number| i64::from(self.parameters.value(number, index.set));
         let least = match (parameter.number, self.properties.address_range) {
             (1624, AddressRange::From2) => 2,
@@ -195,8 +195,8 @@ impl Inverter {
     }
 
     /// The value, in the form that the task asks for.
-    fn value_of(&self, at: Instant, task: Pkw, place: Place) -> Answer {
-        let Place { parameter, index } = place;
+    fn value_of(&self, at: Instant, task: Pkw, place: TaskTarget) -> Answer {
+        let TaskTarget { parameter, index } = place;
         let raw = parameter
             .raw_of(self.shown(at, parameter, index))
             .unwrap_or(0);
@@ -219,8 +219,8 @@ impl Inverter {
     }
 
     /// Stores a value, and does what it demands.
-    fn change(&mut self, place: Place, value: i64) {
-        let Place { parameter, index } = place;
+    fn change(&mut self, place: TaskTarget, value: i64) {
+        let TaskTarget { parameter, index } = place;
         let value = i32::try_from(value).unwrap_or(i32::MAX);
         let before = self.parameters.get(parameter, index);
         let loads = match (parameter.number, self.properties.load_default_value) {

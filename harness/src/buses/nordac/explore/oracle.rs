@@ -2,7 +2,7 @@
 
 use super::hex;
 use super::play::{Done, TelegramsSeen};
-use crate::buses::nordac::judge::{Place, Symptom};
+use crate::buses::nordac::judge::{ReplySubject, Symptom};
 use crate::buses::nordac::report::Said;
 use crate::buses::nordac::simulate::Setup;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
@@ -119,9 +119,9 @@ pub(super) fn difference(
             let slaves = &setup.slaves;
             let own = slaves.iter().find(|own| Some(own.address) == about_it.from);
             let ppo = own.map(|own| own.ppo).unwrap_or_default();
-            Place::of_data(request.as_ref(), ppo, &a, &b)
+            ReplySubject::of_data(request.as_ref(), ppo, &a, &b)
         }
-        _ => Place::of(request.as_ref()),
+        _ => ReplySubject::of(request.as_ref()),
     };
     let said = |own: Option<&Said>| {
         own.map_or("no telegram".to_owned(), |own| {

@@ -2,7 +2,7 @@
 
 use super::doubt::Sender;
 use super::follower::{Follower, Record, Way};
-use super::symptom::Place;
+use super::symptom::ReplySubject;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
 use crate::buses::nordac::report::{Said, TelegramRun, runs};
 use harness_proto::decode::Decoded;
@@ -233,7 +233,7 @@ impl Judge {
             }
             return;
         }
-        let name = Place::of(Some(&Telegram::Pdu(pdu))).part;
+        let name = ReplySubject::of(Some(&Telegram::Pdu(pdu))).part;
         let sets_up = matches!(
             Service::of(pdu.dsap()),
             Some(Service::SetPrm | Service::ChkCfg)
@@ -325,7 +325,7 @@ impl Judge {
             self.breach((earlier, address), (Missing, "EN 1"), (&what, about));
         }
         if let Some((what, section, why)) = found {
-            let place = Place::of(Some(&Telegram::Pdu(request))).part;
+            let place = ReplySubject::of(Some(&Telegram::Pdu(request))).part;
             let about = format!("{place}: {why}");
             self.breach((number, from), (what, section), (&place, about));
         }

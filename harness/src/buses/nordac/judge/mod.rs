@@ -15,4 +15,4 @@ mod tests;
 
 pub(in crate::buses::nordac) use line::judge_runs;
 pub use line::{Breach, JudgedSlaves, judge};
-pub use symptom::{Place, Symptom};
+pub use symptom::{ReplySubject, Symptom};

@@ -47,14 +47,14 @@ impl Symptom {
 
 /// What a reply is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct ReplySubject {
     /// The service, and the part of its data.
     pub part: String,
     /// The section that says most about it.
     pub section: &'static str,
 }
 
-impl Place {
+impl ReplySubject {
     /// The service of a request.
     #[must_use]
     pub fn of(request: Option<&Telegram>) -> Self {

@@ -109,8 +109,8 @@ fn slave_line(
         Err(problem) => return Some(Err(problem)),
     };
     let what = match line {
-        slave::Line::Setup(setup) => setup,
-        slave::Line::Outside(_) => return None,
+        slave::SlaveLine::Setup(setup) => setup,
+        slave::SlaveLine::Outside(_) => return None,
     };
     if begun {
         let problem = behind_the_first(word.span, "slave");

@@ -72,7 +72,7 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
 
 /// Where an attempt first differs from a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Place {
+struct FirstDifference {
     /// In which conversation, counted from 1; 0 where the choice makes no ring.
     conversation: usize,
     /// How; `None` where the choice makes no ring.
@@ -81,7 +81,7 @@ struct Place {
     compared: u64,
 }
 
-impl Place {
+impl FirstDifference {
     fn is_behind(&self, other: &Self) -> bool {
         let byte = |own: &Self| own.divergence.as_ref().map(|own| own.byte);
         let place = |own: &Self| (own.conversation, byte(own));
@@ -95,9 +95,9 @@ fn compared(comparisons: &[Comparison]) -> u64 {
 }
 
 /// Where a silence of the bench has ended the comparison.
-fn silence(comparisons: &[Comparison]) -> Option<Place> {
+fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
     let last = comparisons.last().filter(|own| own.silenced)?;
-    Some(Place {
+    Some(FirstDifference {
         conversation: comparisons.len(),
         divergence: last.divergence.clone(),
         compared: compared(comparisons),
@@ -107,7 +107,7 @@ fn silence(comparisons: &[Comparison]) -> Option<Place> {
 /// What is tried behind `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
 fn candidates<'c>(
     open: &'c [Choice],
-    first: &Place,
+    first: &FirstDifference,
     header: &Header,
     facts: &AttemptFacts<'_>,
 ) -> Vec<(&'c Choice, String, Header)> {
@@ -159,10 +159,13 @@ fn choices(rig: &Rig) -> Vec<Choice> {
 ///
 /// # Errors
 /// Where it first differs, and whether one of the drives monitors time-outs.
-fn compare(header: &Header, facts: &AttemptFacts<'_>) -> Result<Vec<Comparison>, (Place, bool)> {
+fn compare(
+    header: &Header,
+    facts: &AttemptFacts<'_>,
+) -> Result<Vec<Comparison>, (FirstDifference, bool)> {
     (facts.alive)();
     let Ok(mut twin) = twin(facts.rig, &known(facts.rig).and(header)) else {
-        let nowhere = Place {
+        let nowhere = FirstDifference {
             conversation: 0,
             divergence: None,
             compared: 0,
@@ -176,7 +179,7 @@ fn compare(header: &Header, facts: &AttemptFacts<'_>) -> Result<Vec<Comparison>,
     match last.and_then(|own| own.divergence.clone()) {
         None => Ok(comparisons),
         divergence => Err((
-            Place {
+            FirstDifference {
                 conversation,
                 divergence,
                 compared: compared(&comparisons),

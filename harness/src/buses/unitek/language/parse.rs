@@ -188,7 +188,7 @@ fn check(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     Ok(FrameStep::Register(drive, register, expect))
 }
 
-impl drive::Line {
+impl drive::DriveLine {
     /// The header line that it is; `None` if it is a step.
     fn into_setup(self, begun: bool) -> Option<SetupKind> {
         match self {

@@ -12,7 +12,7 @@ use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
 use harness_sim::nordac::deviation::{Deviation, deviations};
 
 /// What a line about a slave is.
-pub(super) enum Line {
+pub(super) enum SlaveLine {
     /// A header line.
     Setup(SetupKind),
     /// A step.
@@ -43,34 +43,34 @@ const WORDS: [(&str, Word); 8] = [
 ];
 
 /// Reads what stands behind `slave`.
-pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem> {
+pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Problem> {
     let slave = expression::sum(scanner)?;
     let before = scanner.clone();
     if scanner.at_end() {
-        return Ok((slave, Line::Setup(there(scanner)?)));
+        return Ok((slave, SlaveLine::Setup(there(scanner)?)));
     }
     let line = match named(scanner, &WORDS, "what the line says of the slave")? {
         Word::Ppo | Word::Posicon => {
             *scanner = before;
-            Line::Setup(there(scanner)?)
+            SlaveLine::Setup(there(scanner)?)
         }
-        Word::Property => Line::Setup(property(scanner)?),
+        Word::Property => SlaveLine::Setup(property(scanner)?),
         Word::Parameter => {
             let (name, value) = value::assigned(scanner)?;
-            Line::Setup(SetupKind::Parameter(name, value))
+            SlaveLine::Setup(SetupKind::Parameter(name, value))
         }
         Word::Deviates => {
             let names: Vec<(&str, &'static Deviation)> =
                 deviations().map(|own| (own.name, own)).collect();
             let line = "`slave 8 deviates NAME`";
-            Line::Setup(SetupKind::Deviates(deviation(
+            SlaveLine::Setup(SetupKind::Deviates(deviation(
                 scanner, &names, "a slave", line,
             )?))
         }
         Word::Link => {
             let ends = [("lost", false), ("found", true)];
             let found = named(scanner, &ends, "what becomes of the link")?;
-            Line::Outside(Outside::Link(found))
+            SlaveLine::Outside(Outside::Link(found))
         }
         Word::Fault => {
             let digit = scanner
@@ -79,9 +79,9 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
             let number = digit.then(|| expression::sum(scanner)).transpose()?;
             let levels = [("on", true), ("off", false)];
             let on = named(scanner, &levels, "whether the cause is there")?;
-            Line::Outside(Outside::Fault { number, on })
+            SlaveLine::Outside(Outside::Fault { number, on })
         }
-        Word::Restart => Line::Outside(Outside::Restart),
+        Word::Restart => SlaveLine::Outside(Outside::Restart),
     };
     Ok((slave, line))
 }
@@ -91,9 +91,9 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
     let before = scanner.clone();
     let (slave, line) = line(scanner)?;
     match line {
-        Line::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
+        SlaveLine::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
         // A time stands in front of it.
-        Line::Setup(_) => {
+        SlaveLine::Setup(_) => {
             *scanner = before;
             Err(scanner.unexpected("a slave and what happens to it (link, fault, restart)"))
         }

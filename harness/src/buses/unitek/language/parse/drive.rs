@@ -13,7 +13,7 @@ use harness_sim::unitek::deviation::{Deviation, deviations};
 use harness_sim::unitek::{Control, Inputs};
 
 /// What a line about a drive is.
-pub(super) enum Line {
+pub(super) enum DriveLine {
     /// A header line.
     Setup(SetupKind),
     /// A header line or a step.
@@ -62,45 +62,45 @@ pub(in super::super) fn mode_word(mode: Control) -> &'static str {
 }
 
 /// Reads what stands behind `drive`.
-pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem> {
+pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, DriveLine), Problem> {
     let drive = expression::sum(scanner)?;
     if scanner.at_end() {
         let there = SetupKind::There { rx: None, tx: None };
-        return Ok((drive, Line::Setup(there)));
+        return Ok((drive, DriveLine::Setup(there)));
     }
     let before = scanner.clone();
     let line = match named(scanner, &WORDS, "what the line says of the drive")? {
         Word::Rx | Word::Tx => {
             *scanner = before;
-            Line::Setup(identifiers(scanner)?)
+            DriveLine::Setup(identifiers(scanner)?)
         }
         Word::Profile => {
             let names = PROFILES.map(|name| (name, name));
-            Line::Setup(SetupKind::Profile(named(scanner, &names, "a profile")?))
+            DriveLine::Setup(SetupKind::Profile(named(scanner, &names, "a profile")?))
         }
-        Word::Property => Line::Setup(property(scanner)?),
-        Word::Mode => Line::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
+        Word::Property => DriveLine::Setup(property(scanner)?),
+        Word::Mode => DriveLine::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
         Word::Deviates => {
             let names: Vec<(&str, &'static Deviation)> =
                 deviations().map(|own| (own.name, own)).collect();
             let own = deviation(scanner, &names, "a drive", "`drive 1 deviates NAME`")?;
-            Line::Setup(SetupKind::Deviates(own))
+            DriveLine::Setup(SetupKind::Deviates(own))
         }
         Word::Register => {
             let register = value::register(scanner)?;
             equals(scanner)?;
             let value = value::value(scanner, register.unit())?;
-            Line::Outside(Outside::Register(register, value))
+            DriveLine::Outside(Outside::Register(register, value))
         }
         Word::Input => {
             let names = Inputs::SWITCHES.map(|name| (name, name));
             let input = named(scanner, &names, "an input")?;
             let levels = [("high", true), ("low", false)];
             let level = named(scanner, &levels, "a level")?;
-            Line::Outside(Outside::Input(input, level))
+            DriveLine::Outside(Outside::Input(input, level))
         }
-        Word::Force => Line::Outside(force(scanner)?),
-        Word::Restart => Line::Restart,
+        Word::Force => DriveLine::Outside(force(scanner)?),
+        Word::Restart => DriveLine::Restart,
     };
     Ok((drive, line))
 }
@@ -110,10 +110,10 @@ pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<FrameStep, Problem> {
     let before = scanner.clone();
     let (drive, line) = line(scanner)?;
     match line {
-        Line::Outside(outside) => Ok(FrameStep::Outside(drive, outside)),
-        Line::Restart => Ok(FrameStep::Outside(drive, Outside::Restart)),
+        DriveLine::Outside(outside) => Ok(FrameStep::Outside(drive, outside)),
+        DriveLine::Restart => Ok(FrameStep::Outside(drive, Outside::Restart)),
         // A time stands in front of it.
-        Line::Setup(_) => {
+        DriveLine::Setup(_) => {
             *scanner = before;
             Err(scanner
                 .unexpected("a drive and what happens to it (input, force, register, restart)"))
