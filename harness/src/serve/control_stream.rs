@@ -75,10 +75,28 @@ impl ControlStream {
         host: &mut dyn ServeHost,
         answer: &mut dyn FnMut(&str) -> Option<ControlAnswer>,
     ) -> io::Result<()> {
-        if let Source::Tcp(tcp) = &mut self.source {
-            // A second client is turned away here too.
-            let _visitors = tcp.accept();
+        let visitors = match &self.source {
+            Source::Tcp(tcp) => tcp.accept(),
+            Source::Standard | Source::Ended => Vec::new(),
+        };
+        self.listen(host, answer)?;
+        // Who closes a connection and opens the next one has gone before it comes. A second client is turned away.
+        if let Source::Tcp(tcp) = &mut self.source
+            && !tcp.taken()
+            && let Some((client, _)) = visitors.into_iter().next()
+        {
+            tcp.seat(client);
+            self.listen(host, answer)?;
         }
+        self.pass_on();
+        Ok(())
+    }
+
+    fn listen(
+        &mut self,
+        host: &mut dyn ServeHost,
+        answer: &mut dyn FnMut(&str) -> Option<ControlAnswer>,
+    ) -> io::Result<()> {
         let mut buffer = [0; CHUNK];
         while self.answers.len() < UNREAD {
             let read = match &mut self.source {
@@ -118,7 +136,6 @@ impl ControlStream {
                 break;
             }
         }
-        self.pass_on();
         Ok(())
     }
 

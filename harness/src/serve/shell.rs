@@ -6,7 +6,7 @@ use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
 use super::served::ServedBus;
 use super::stage::Stage;
-use super::tcp::{Tcp, Visitor};
+use super::tcp::Tcp;
 use crate::counted::counted;
 use crate::listen::ListenError;
 use crate::port::wake_on_time;
@@ -369,10 +369,17 @@ impl Shell<'_> {
             Seat::Tcp(tcp) => tcp.accept(),
             Seat::Pty(_) | Seat::Nowhere => Vec::new(),
         };
-        for visitor in visitors {
-            match visitor {
-                Visitor::Came(address) => self.come(seat, &format!("client {address} came")),
-                Visitor::TurnedAway(address) => self.say(
+        for (client, address) in visitors {
+            // Who closes a connection and opens the next one has gone before it comes.
+            if let Err(error) = self.hear(seat) {
+                self.fail(seat, &error);
+            }
+            match &mut self.ends[seat] {
+                Seat::Tcp(tcp) if !tcp.taken() => {
+                    tcp.seat(client);
+                    self.come(seat, &format!("client {address} came"));
+                }
+                _ => self.say(
                     seat,
                     &format!("client {address} was turned away: another one is there"),
                 ),

@@ -60,14 +60,6 @@ pub(super) struct Tcp {
     client: Option<Client>,
 }
 
-/// A new connection.
-pub(super) enum Visitor {
-    /// It has become the client.
-    Came(SocketAddr),
-    /// There is a client already; the connection has been closed.
-    TurnedAway(SocketAddr),
-}
-
 impl Tcp {
     /// Listens at an address of this machine's own, unless another one is allowed.
     pub(super) fn listen(text: &str, allow_remote: bool) -> Result<Self, ListenError> {
@@ -85,18 +77,14 @@ impl Tcp {
         self.client.is_some()
     }
 
-    /// Accepts waiting connections.
-    pub(super) fn accept(&mut self) -> Vec<Visitor> {
-        let mut visitors = Vec::new();
-        for (client, address) in self.listener.accept() {
-            if self.client.is_some() {
-                visitors.push(Visitor::TurnedAway(address));
-            } else {
-                self.client = Some(client);
-                visitors.push(Visitor::Came(address));
-            }
-        }
-        visitors
+    /// Accepts waiting connections: who comes, and from where.
+    pub(super) fn accept(&self) -> Vec<(Client, SocketAddr)> {
+        self.listener.accept().collect()
+    }
+
+    /// Takes the client in. There is none.
+    pub(super) fn seat(&mut self, client: Client) {
+        self.client = Some(client);
     }
 
     /// Reads of the client; 0 bytes where it has gone. The second value says how long ago the last of them arrived.

@@ -147,6 +147,36 @@ fn one_client_after_another_and_a_second_one_turned_away() {
     assert_eq!(sim.code(), Some(130));
 }
 
+/// A client that closes its connection and opens the next one at once is served, however late the program notices the first end.
+#[test]
+fn the_next_client_comes_when_the_last_one_has_gone() {
+    let mut sim = Sim::start(&[
+        "--rig",
+        "sim:3",
+        "--tcp",
+        "127.0.0.1:0",
+        "--control",
+        "127.0.0.1:0",
+    ]);
+    let addresses = [sim.address(), sim.address()];
+    let ask = |place: usize, stream: &mut TcpStream| match place {
+        0 => assert_eq!(read_byte(stream), ANSWER),
+        _ => {
+            stream.write_all(b"status\n").expect("sent");
+            assert_ne!(stream.read(&mut [0]).expect("an answer"), 0);
+        }
+    };
+    for (place, address) in addresses.iter().enumerate() {
+        let mut first = connect(address);
+        ask(place, &mut first);
+        sim.signal("-STOP");
+        drop(first);
+        let mut next = connect(address);
+        sim.signal("-CONT");
+        ask(place, &mut next);
+    }
+}
+
 #[test]
 fn two_rings_at_free_pace() {
     let arguments = ["--rig", "sim:3,2", "--tcp", "127.0.0.1:0", "--tcp"];
