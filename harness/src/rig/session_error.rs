@@ -86,6 +86,16 @@ pub enum SessionError {
     },
 }
 
+impl SessionError {
+    /// The same of a rig that is not healthy, with its likely cause.
+    pub(crate) fn because(mut self, likely: LikelyCause) -> Self {
+        if let Self::Ill { cause, .. } = &mut self {
+            *cause = Some(likely);
+        }
+        self
+    }
+}
+
 fn likely(cause: Option<&LikelyCause>) -> String {
     cause.map_or(String::new(), |cause| format!(". Likely cause: {cause}"))
 }

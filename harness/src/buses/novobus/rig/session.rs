@@ -21,7 +21,11 @@ use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How often a port that the bench itself has just closed is tried again, and the pause in front of it.
+const PORT_TRIES: usize = 5;
+const PORT_PAUSE: Duration = Duration::from_millis(200);
 
 /// How long a rig must be silent before anything is sent.
 const LISTEN: Span = Span::from_millis(40);
@@ -56,7 +60,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
     pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
-        let (error, opens) = match Self::open_as_stated(rig, options) {
+        match Self::open_as_stated(rig, options) {
             Ok(mut session) => {
                 if !session.lacks_marks() {
                     return Ok(session);
@@ -64,41 +68,60 @@ impl Session {
                 let bytes = "a net byte FF comes back damaged".to_owned();
                 let error = session.ill(0, Unhealthy::Foreign { bytes });
                 let _end = session.release();
-                (error, true)
+                Self::with_damaged_ff(rig, options, error)
             }
-            Err(error @ SessionError::Ill { .. }) => (error, false),
-            Err(other) => return Err(other),
-        };
-        match (error, Self::cause_by_neighbour(rig, options)) {
-            (SessionError::Ill { rig, ring, ill, .. }, cause @ Some(_)) => Err(SessionError::Ill {
-                rig,
-                ring,
-                ill,
-                cause,
-            }),
-            // The marks are right, and a drive is wrong.
-            (_, None) if opens => Self::open_as_stated(rig, options),
-            (error, _) => Err(error),
+            Err(error @ SessionError::Ill { .. }) => {
+                let mut neighbours = cause::neighbours(rig).into_iter();
+                match neighbours.find(|(_, other)| Self::opens(other, options) == Some(true)) {
+                    Some((cause, _)) => Err(error.because(cause)),
+                    None => Err(error),
+                }
+            }
+            Err(other) => Err(other),
         }
     }
 
-    /// The cause that a rig file with one other setting proves by opening the ring.
-    fn cause_by_neighbour(rig: &Rig, options: &UseOptions) -> Option<LikelyCause> {
+    /// Takes a rig behind which a net byte FF came back damaged: its file is wrong about in-band marks, or a drive is wrong. A drive is only
+    /// where the other setting was tried and does not open the ring. The server of the port may need a moment to notice that it is free.
+    fn with_damaged_ff(
+        rig: &Rig,
+        options: &UseOptions,
+        error: SessionError,
+    ) -> Result<Self, SessionError> {
+        let Some((cause, other)) = cause::neighbours(rig).into_iter().next() else {
+            let right = ErrorMarks::None;
+            return Err(error.because(LikelyCause::Marks { right }));
+        };
+        for _ in 0..PORT_TRIES {
+            match Self::opens(&other, options) {
+                Some(false) => return Self::open_as_stated(rig, options),
+                Some(true) => break,
+                None => std::thread::sleep(PORT_PAUSE),
+            }
+        }
+        Err(error.because(cause))
+    }
+
+    /// Whether a ring opens as this file says; `None` where the port itself is in the way. Nothing more is tried after an interruption.
+    fn opens(other: &Rig, options: &UseOptions) -> Option<bool> {
         let plain = UseOptions {
             ill_as_well: false,
             allow_motion: false,
             ..options.clone()
         };
-        let mut neighbours = cause::neighbours(rig).into_iter();
-        let opens = |other: &Rig| {
-            !options.interrupt.load(Ordering::Relaxed)
-                && Self::open_as_stated(other, &plain)
-                    .map(Self::release)
-                    .is_ok()
-        };
-        neighbours
-            .find(|(_, other)| opens(other))
-            .map(|(cause, _)| cause)
+        if options.interrupt.load(Ordering::Relaxed) {
+            return Some(false);
+        }
+        match Self::open_as_stated(other, &plain).map(Self::release) {
+            Ok(_) => Some(true),
+            Err(SessionError::Ill { ill, .. }) => match ill {
+                // Its drives have answered.
+                Unhealthy::Slow { .. } | Unhealthy::Late { .. } => Some(true),
+                Unhealthy::Trouble(_) => None,
+                _ => Some(false),
+            },
+            Err(_) => None,
+        }
     }
 
     /// Takes a rig as its file describes it.
