@@ -166,9 +166,9 @@ impl Play {
         let (conversations, _) = as_they_are().compared(played, THROUGH_A_PORT);
         let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
         let mut found = comparisons.iter().enumerate();
-        let found = found.find_map(|(at, own)| Some((at, own.divergence.as_ref()?)));
+        let found = found.find(|(_, own)| own.divergence.is_some());
         let sighting =
-            found.and_then(|(at, own)| Sighting::of(&conversations, at, own, DRIVES, byte_time));
+            found.and_then(|found| Sighting::of(&conversations, found, DRIVES, byte_time));
         let differs = found.is_some();
         match differs {
             true => self.differing.push(conversations),

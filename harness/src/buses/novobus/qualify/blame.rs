@@ -8,7 +8,7 @@ use super::diagnose::{Named, Whose, proven};
 use super::exchange::{Sent, begin};
 use super::pinned::Pinned;
 use crate::buses::novobus::calm::calm;
-use crate::buses::novobus::twin::{Conversation, Divergence, Symptom};
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Symptom};
 use crate::library::Entry;
 use crate::scenario::source::Source;
 use harness_proto::line::Received;
@@ -68,11 +68,11 @@ impl Sighting {
     #[must_use]
     pub fn of(
         attempt: &[Conversation],
-        place: usize,
-        found: &Divergence,
+        (place, compared): (usize, &Comparison),
         drives: u8,
         byte_time: Span,
     ) -> Option<Self> {
+        let found = compared.divergence.as_ref()?;
         // The computer may cause a missing or late byte, but not another value.
         let values = found.expected.zip(found.received);
         let alike = |((_, due), (_, came)): ((_, Received), (_, Received))| due.byte == came.byte;
@@ -89,10 +89,15 @@ impl Sighting {
         };
         let sent = Sent::of(attempt, place, drives, byte_time)?;
         let all = sent.roles.iter().zip(&sent.bytes).enumerate().skip(before);
-        let mut answered =
-            all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
-        let (index, _) = answered.nth(found.byte.checked_sub(1)?)?;
+        let answered = all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
+        let answered: Vec<usize> = answered.map(|(index, _)| index).collect();
         let received = &attempt[place].received;
+        // Bytes that nobody asked for answer none that was sent. Behind a check sequence that ends them every byte has come back.
+        let unasked = match compared.is_behind_a_race(found) {
+            true => received.len().checked_sub(answered.len())?,
+            false => 0,
+        };
+        let index = *answered.get((found.byte - 1).checked_sub(unasked)?)?;
         let came = |at: usize| {
             let place = (found.byte - 1 + at).checked_sub(index)?;
             received.get(place).map(|own| own.2.byte)

@@ -173,10 +173,9 @@ impl Findings {
     /// Where an attempt differed.
     fn sighting(&self, attempt: &Attempt) -> Option<Sighting> {
         let mut comparisons = attempt.comparisons.iter().enumerate();
-        let found = comparisons.find_map(|(at, own)| Some((at, own.divergence.as_ref()?)));
-        let (at, divergence) = found.filter(|_| attempt.outcome.verdict == Verdict::Failed)?;
-        let conversations = &attempt.conversations;
-        Sighting::of(conversations, at, divergence, self.drives, self.byte_time)
+        let found = comparisons.find(|(_, own)| own.divergence.is_some());
+        let found = found.filter(|_| attempt.outcome.verdict == Verdict::Failed)?;
+        Sighting::of(&attempt.conversations, found, self.drives, self.byte_time)
     }
 
     /// Where attempts differed, each with the name of its scenario.

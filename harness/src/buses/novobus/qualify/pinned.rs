@@ -285,7 +285,7 @@ fn steps(drives: u8, byte: u8) -> Vec<usize> {
 }
 
 /// Reads a cell that is different in each drive, by a short address after an address byte: each drive answers when the sum that it kept has
-/// become 0.
+/// become 0. A SYNCO behind each telegram changes no sum (9.2).
 const READ: [u8; 4] = [0xC0, MARK.to_be_bytes()[1], MARK.to_be_bytes()[0], 0];
 
 /// The command byte of WriteByte (10.2).
@@ -310,7 +310,7 @@ fn kept(drives: u8, byte: u8) -> Option<String> {
     let sum = command.wrapping_add(low).wrapping_add(high);
     text.push_str(&format!("> 82 {byte:02X} C0\n"));
     text.push_str(&format!(
-        "> [E8 {command:02X} {low:02X} {high:02X} {sum:02X}]*{}\n> {SYNCO:02X}*{}\nrecover\n",
+        "> [E8 {command:02X} {low:02X} {high:02X} {sum:02X} {SYNCO:02X}]*{}\n> {SYNCO:02X}*{}\nrecover\n",
         most + 1,
         drives
     ));
@@ -339,7 +339,7 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
     let asked = asked.position(|own| own.iter().map(|own| own.0).eq(sent))?;
     let came: Vec<u8> = pairs[asked..].iter().map(|(_, came)| *came).collect();
     let steps = steps(drives, byte);
-    let data = |step: usize| came.get(3 + 5 * (step - 1)..).and_then(|own| own.get(..5));
+    let data = |step: usize| came.get(3 + 6 * (step - 1)..).and_then(|own| own.get(..5));
     // Where two drives answer at once, one of them refuses what the other has sent.
     let answers =
         |drive: u8, step: usize| data(step).is_some_and(|own| own[3] == drive + 1 || own[4] == 0);

@@ -1,7 +1,8 @@
 //! Verdicts of attempts on a port whose bytes come late or early, or unasked.
 
-use super::tests::{READ, judged, judged_early, judged_on, link, plan};
+use super::tests::{READ, judged_early, judged_on, judged_with, link, plan};
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::qualify::{Meant, Sighting};
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};
 use crate::rig::run::Way;
@@ -10,6 +11,7 @@ use crate::scenario::verdict::Verdict::{Failed, Inconclusive, Marginal, Passed};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
+use std::cell::Cell;
 use std::collections::VecDeque;
 
 /// A port whose bytes come late from the tenth on: the link gives them up before, as one behind a computer that stands still.
@@ -141,7 +143,7 @@ fn late_bytes_fail_no_drive() {
             came: 0,
             free: Instant::START,
         };
-        judged_on(&mut link, "", (&plan, &way), &|_| {})
+        judged_on(&mut link, "", (&plan, &way), &|_, _| {})
     };
     let asked = format!("{READ}< 88 01 C0 13 xx xx\n{READ}< 88 01 C0 13 xx xx\n");
     // A line waits longer for its bytes than a recovery does.
@@ -174,7 +176,7 @@ fn a_choice_that_moves_the_model_excuses_no_wrong_byte() {
         };
         let ring = format!("drive 0..last property self-test-time = 0ms\n{wrong}");
         let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_| {}, early);
+        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_, _| {}, early);
         assert_eq!(outcome.verdict, expected, "{outcome:#?}");
     };
     judged("", Passed);
@@ -198,7 +200,7 @@ fn zeros_of_the_bench_excuse_no_wrong_byte() {
             anew: true,
         };
         let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_| {}, early);
+        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_, _| {}, early);
         assert_eq!(outcome.verdict, expected, "{outcome:#?}");
     };
     judged("", Passed);
@@ -209,7 +211,7 @@ fn zeros_of_the_bench_excuse_no_wrong_byte() {
 /// that ends the race of their clocks what they hold is compared again.
 #[test]
 fn the_code_of_a_time_out_is_judged() {
-    let verdict = |ring: &str, monitoring: &str, silence: &str, between: &str| {
+    let outcome = |ring: &str, monitoring: &str, silence: &str, between: &str| {
         let errors =
             |k: u8| format!("delete-error {k}\nuntil drive {k} errorcode = 0000 within 1s\n");
         let codes = |k: u8| {
@@ -222,10 +224,21 @@ fn the_code_of_a_time_out_is_judged() {
             all(&errors),
             all(&codes)
         );
-        judged(ring, "", &scenario).verdict
+        let (meant, byte_time) = (Cell::new(None), link("").byte_time());
+        let outcome = judged_with(ring, "", &scenario, &|conversations, comparisons| {
+            let mut all = comparisons.iter().enumerate();
+            let found = all.find(|(_, own)| own.divergence.is_some());
+            let sighting = found.and_then(|own| Sighting::of(conversations, own, 3, byte_time));
+            meant.set(sighting.map(|own| own.meant));
+        });
+        (outcome.verdict, meant.get())
+    };
+    let verdict = |ring: &str, monitoring: &str, silence: &str, between: &str| {
+        outcome(ring, monitoring, silence, between).0
     };
     let wrong = "drive 1 deviates reports-time-out-as-sync";
-    assert_eq!(verdict(wrong, "0..last", "80ms", ""), Failed);
+    let of_drive_1 = (Failed, Some(Meant::Own(1)));
+    assert_eq!(outcome(wrong, "0..last", "80ms", ""), of_drive_1);
     assert_eq!(verdict(wrong, "0..last", "80ms", "> 80*4\n"), Failed);
     let late = "drive 1 property time-out = 20ms";
     for right in ["", late, "drive 0 property time-out = 15ms"] {

@@ -17,16 +17,14 @@ use std::collections::BTreeSet;
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
 pub(super) fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
-    judged_with(ring, rig, scenario, &|_| {})
+    judged_with(ring, rig, scenario, &|_, _| {})
 }
 
+/// Looks at what was played, and edits the comparisons of it with the twin.
+type Change<'a> = &'a dyn Fn(&[Conversation], &mut [Comparison]);
+
 /// The same, but `change` edits the comparisons with the twin first.
-fn judged_with(
-    ring: &str,
-    rig: &str,
-    scenario: &str,
-    change: &dyn Fn(&mut [Comparison]),
-) -> Outcome {
+pub(super) fn judged_with(ring: &str, rig: &str, scenario: &str, change: Change<'_>) -> Outcome {
     let plan = plan(format!("title x\nring 3\n{scenario}"));
     let way = Way {
         rings: plan.rings.clone(),
@@ -65,7 +63,7 @@ pub(super) fn judged_on(
     link: &mut dyn Link,
     rig: &str,
     (plan, way): (&Plan, &Way),
-    change: &dyn Fn(&mut [Comparison]),
+    change: Change<'_>,
 ) -> Outcome {
     judged_early(link, rig, (plan, way), change, Span::ZERO)
 }
@@ -75,7 +73,7 @@ pub(super) fn judged_early(
     link: &mut dyn Link,
     rig: &str,
     (plan, way): (&Plan, &Way),
-    change: &dyn Fn(&mut [Comparison]),
+    change: Change<'_>,
     early: Span,
 ) -> Outcome {
     let drives = way.rings[0].drives();
@@ -100,7 +98,7 @@ pub(super) fn judged_early(
     }
     let mut twin = twin(&rig, &known(&rig)).expect("a twin");
     let (mut comparisons, _) = twin.follow_all(&conversations, exactness);
-    change(&mut comparisons);
+    change(&conversations, &mut comparisons);
     let facts = AttemptFacts {
         rig: &rig,
         plan,
@@ -249,17 +247,18 @@ fn a_race_excuses_nothing_elsewhere() {
         until,
     };
     let race = |ring: usize| ended(ring, None);
-    let verdict =
-        |change: &dyn Fn(&mut [Comparison])| judged_with("", "", &scenario, change).verdict;
-    assert_eq!(verdict(&|_| {}), Failed);
-    assert_eq!(verdict(&|all| all[0].unasked.push(race(0))), Failed);
+    let verdict = |change: Change<'_>| judged_with("", "", &scenario, change).verdict;
+    assert_eq!(verdict(&|_, _| {}), Failed);
+    assert_eq!(verdict(&|_, all| all[0].unasked.push(race(0))), Failed);
     let of_all = |ring: usize| {
-        move |all: &mut [Comparison]| all.iter_mut().for_each(|own| own.unasked.push(race(ring)))
+        move |_: &[Conversation], all: &mut [Comparison]| {
+            all.iter_mut().for_each(|own| own.unasked.push(race(ring)))
+        }
     };
     assert_eq!(verdict(&of_all(1)), Failed);
     assert_eq!(verdict(&of_all(0)), Inconclusive);
     // The bytes behind a check sequence that ended it are compared again.
-    let over = |all: &mut [Comparison]| {
+    let over = |_: &[Conversation], all: &mut [Comparison]| {
         let end = |own: &mut Comparison| own.unasked.push(ended(0, Some(Instant::START)));
         all.iter_mut().for_each(end);
     };
@@ -320,7 +319,7 @@ fn a_choice_that_shows_before_the_scenario_leaves_it_judged() {
             attempts: None,
             anew: true,
         };
-        let outcome = judged_on(&mut link(ring), "", (&plan, &way), &|_| {});
+        let outcome = judged_on(&mut link(ring), "", (&plan, &way), &|_, _| {});
         assert_eq!(outcome.verdict, expected, "{scenario}: {outcome:#?}");
         outcome.remarks.join("\n")
     };
@@ -411,7 +410,7 @@ fn a_refused_read_says_nothing_of_a_cell() {
             attempts: None,
             anew: false,
         };
-        judged_on(&mut link(ring), "", (&plan, &way), &|_| {}).verdict
+        judged_on(&mut link(ring), "", (&plan, &way), &|_, _| {}).verdict
     };
     let contents = "drive 0..last memory FF7D = 40 50 60\ndrive 0..last memory 2F00 = 5A";
     let refused = "read-byte 1 FF7D\n> 8C FE C7 7D FF 31 32 A6 80*40\nrecover\nread-byte 1 FF7D\n";
@@ -435,7 +434,7 @@ fn silent_self_tests_accuse_no_drive() {
         attempts: None,
         anew: true,
     };
-    let outcome = judged_on(&mut ring, "", (&plan, &way), &|_| {});
+    let outcome = judged_on(&mut ring, "", (&plan, &way), &|_, _| {});
     let remarks = outcome.remarks.join("\n");
     assert_eq!(outcome.verdict, Passed, "{remarks}");
     assert!(remarks.contains("self-test-bus = silent"), "{remarks}");
@@ -522,7 +521,7 @@ fn no_right_drive_is_accused() {
                 break;
             }
             played += 1;
-            let outcome = judged_on(&mut link, "", (&plan, &way), &|_| {});
+            let outcome = judged_on(&mut link, "", (&plan, &way), &|_, _| {});
             let row = OPEN
                 .iter()
                 .find(|(own, _)| name.ends_with(&format!("/{own}.scn")));

@@ -207,7 +207,8 @@ impl Comparer<'_> {
     }
 
     /// The drive whose answers contain every differing byte from `first` on, in a ring that returns one byte for each byte sent. A single
-    /// differing byte proves nothing, because a drive that damages forwarded bytes does not correct the checking byte of the answer.
+    /// differing byte proves something only where the checking byte of its answer agrees with it: a drive that damages forwarded bytes does
+    /// not correct that.
     fn culprit(&mut self, rows: &Rows<'_>, first: usize) -> Option<u8> {
         let answering = |index: usize| match rows.role(index) {
             Role::Data { drive, .. } | Role::Check { drive, .. } | Role::ProcessData { drive } => {
@@ -223,7 +224,9 @@ impl Comparer<'_> {
             .collect();
         self.comparison = before;
         let own = |index: &usize| answering(*index) == Some(drive);
-        (!differing.is_empty() && differing.iter().all(own)).then_some(drive)
+        let several = !differing.is_empty() && differing.iter().all(own);
+        let sums_up = || differing.is_empty() && rows.is_summed_up(first, drive);
+        (several || sums_up()).then_some(drive)
     }
 
     /// What differs at one place, apart from the time.

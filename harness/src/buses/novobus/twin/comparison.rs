@@ -198,6 +198,16 @@ impl Comparison {
         let open = self.unasked.iter().filter(|race| race.until.is_none());
         open.map(|race| race.ring)
     }
+
+    /// Whether a difference comes behind a check sequence that ends such a race.
+    pub(crate) fn is_behind_a_race(&self, found: &Divergence) -> bool {
+        let at = found.received.map(|(at, _)| at);
+        let ended = |race: &&Unasked| race.ring == found.ring && race.until.is_some();
+        self.unasked
+            .iter()
+            .filter(ended)
+            .any(|race| at >= race.until)
+    }
 }
 
 /// The result of a comparison.

@@ -4,6 +4,7 @@ use super::comparison::Symptom;
 use crate::buses::novobus::calm::calm;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::Role;
 use harness_proto::novobus::sync::SYNCO;
@@ -62,6 +63,34 @@ impl Rows<'_> {
         let sync_before = |back: usize| index.checked_sub(back).map(|before| self.role(before));
         let own = Some(self.role(index));
         sync_before(1) == own && sync_before(2) != own
+    }
+
+    /// Whether the checking byte of the answer in which a byte stands agrees with all of it, and is not the model's: the drive itself has sent
+    /// that byte, and no other one has damaged it on its way.
+    pub(super) fn is_summed_up(&self, data: usize, drive: u8) -> bool {
+        let of_drive = |place: usize| match self.role(place) {
+            Role::Check {
+                drive: Some(own),
+                length,
+                ..
+            } if own == drive => Some((place, length)),
+            _ => None,
+        };
+        let Some((check, length)) = (data..self.known).find_map(of_drive) else {
+            return false;
+        };
+        let value = |heard: &[(Instant, Received)], place: usize| {
+            heard.get(place).map(|(_, byte)| byte.byte)
+        };
+        let answer: Vec<usize> = answer_of(&self.roles[..check], drive, length)
+            .map(|(place, _)| place)
+            .collect();
+        let bytes = answer
+            .iter()
+            .filter_map(|place| value(self.received, *place));
+        let sum = bytes.fold(Checksum::EMPTY, Checksum::with).minus();
+        let came = value(self.received, check);
+        answer.contains(&data) && came == Some(sum) && came != value(self.expected, check)
     }
 
     /// The command whose checking byte the master sent at `index`, if that byte is right.

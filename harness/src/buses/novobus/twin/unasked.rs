@@ -19,6 +19,14 @@ use harness_proto::time::{Instant, Span};
 /// How long behind the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
 const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
+/// How long a drive that monitors hears nothing at least before it detects a time-out: 10 ms (ND21 9.9), and 8 ms where a rig says that its
+/// drives are wrong. A byte comes back more than half a millisecond later than a drive hears it.
+const EARLIEST_TIME_OUT: Span = Span::from_micros(8_500);
+
+/// How long in front of unasked bytes the silence may have begun that they come from: it lasts 20 ms at most, and a drive waits for 10 ms
+/// more. Twice as long is certain.
+const BEFORE_ZEROS: Span = Span::from_millis(60);
+
 /// A byte and when it came.
 type Heard = (Instant, Received);
 
@@ -66,11 +74,31 @@ impl Sent<'_> {
         (expected, received, right): (&[Heard], &[Heard], usize),
         (may, does): (bool, bool),
     ) -> Option<Instant> {
+        if self.nothing_was_missed(expected, received, right) {
+            return None;
+        }
         let missed = may.then(|| self.timed_out(size, (expected, received, right)));
         let late = || (0..received.len()).find(|index| is_late(expected, received, *index));
         let late = does.then(late);
         let first = missed.into_iter().chain(late).flatten().min()?;
         Some(received[first].0)
+    }
+
+    /// Whether the bytes came back so close together, up to the first that differs, that no drive can have missed one. No byte leaves before the
+    /// bench sends it, and none comes back before a drive hears it. A computer that is late makes these spans longer, and never shorter.
+    fn nothing_was_missed(&self, expected: &[Heard], received: &[Heard], right: usize) -> bool {
+        let value = |heard: &[Heard], index: usize| heard.get(index).map(|own| own.1);
+        let same = |index: usize| index < right || value(expected, index) == value(received, index);
+        let Some(first) = (0..received.len()).find(|index| !same(*index)) else {
+            return false;
+        };
+        let from = received[first].0 - BEFORE_ZEROS;
+        let close = |index: usize| {
+            let before = index.checked_sub(1).and_then(|own| self.answered.get(own));
+            before.is_some_and(|start| received[index].0.since(*start) < EARLIEST_TIME_OUT)
+        };
+        let begins = received.partition_point(|(at, _)| *at < from);
+        begins > 0 && (begins..=first).all(close)
     }
 
     /// The first byte of the zeros and addresses of drives that have missed their master (ND21 9.9): in front of the byte that it
@@ -285,6 +313,49 @@ mod tests {
         };
         assert!(!excused(received.len() - 1));
         assert!(excused(0), "a zero that is not expected stands before it");
+    }
+
+    /// ND21 9.9: no drive detects a time-out after 5 ms. A zero in the place of an answer that comes so soon behind the byte before it is
+    /// wrong; behind a longer silence, or a byte that came late, it may be a drive's that has missed its master.
+    #[test]
+    fn a_zero_behind_a_short_silence_is_not_excused() {
+        let byte = Span::from_micros(286);
+        let size = RingSize::new(3).expect("a size");
+        let way = byte * 4;
+        // The bytes in front of the silence, how long it is, and how late each byte comes back.
+        let excused = |before: u64, silence: Span, late: Span| {
+            let start = |place: u64| {
+                let gap = if place < before { Span::ZERO } else { silence };
+                Instant::START + byte * place + gap
+            };
+            let starts: Vec<_> = (0..before + 4).map(start).collect();
+            let heard = |last: u8, late: Span| -> Vec<Heard> {
+                let places = 0..before + 4;
+                let value = |place: u64| if place < before { SYNCO } else { last };
+                let timed = places.map(|at| (start(at) + way + late, Received::good(value(at))));
+                timed.collect()
+            };
+            let sent = Sent {
+                answered: &starts,
+                all: &starts,
+                way,
+            };
+            let (expected, received) = (heard(SYNCO, Span::ZERO), heard(0, late));
+            let right = usize::try_from(before).expect("few");
+            let excused = sent.excused_from(size, (&expected, &received, right), (true, false));
+            excused.is_some()
+        };
+        let ms = Span::from_millis;
+        assert!(!excused(250, ms(6), Span::ZERO));
+        assert!(excused(250, ms(8), Span::ZERO));
+        assert!(
+            excused(250, ms(6), ms(2)),
+            "the computer may have been late"
+        );
+        assert!(
+            excused(20, ms(6), Span::ZERO),
+            "a silence before the conversation"
+        );
     }
 
     /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
