@@ -449,6 +449,8 @@ fn a_ring_that_is_asked_shows_what_is_wrong() {
         }
         is("read-word-stays-in-its-page", "10.1-ends-of-pages", "10.1");
         is("increments-seven-bits", "qualify-addresses", "9.3");
+        let seven_bits = "compares-seven-bits-of-the-address";
+        is(seven_bits, "9.3-every-address-byte", "9.3");
         // No drive can be told from another one by its address.
         nothing("does-not-increment", "qualify-addresses");
         // The first drive of the conversation has an address byte of its own.
@@ -467,16 +469,14 @@ fn a_ring_that_is_asked_shows_what_is_wrong() {
 }
 
 /// ND21 9.6, 9.7: the section is that of the rule that is broken. A drive that finds a wrong checking byte and begins its zeros one byte late
-/// breaks the rules of the error mode, and one that finds nothing those of the checking byte.
+/// breaks the rules of the error mode, and one that finds nothing those of the checking byte. Zeros behind a silence are those of 9.9.
 #[test]
 fn the_section_is_that_of_the_broken_rule() {
-    for (deviation, name, section) in [
-        (
-            "wrong-checksum-passed-on",
-            "qualify-checksum-drive-1",
-            "9.7",
-        ),
-        ("checksum-not-checked", "qualify-checksum-drive-1", "9.6"),
+    let (own, checksum) = (Meant::Own(1), "qualify-checksum-drive-1");
+    for (deviation, name, meant, section) in [
+        ("wrong-checksum-passed-on", checksum, own, "9.7"),
+        ("checksum-not-checked", checksum, own, "9.6"),
+        ("time-out-always", "qualify-silences", Meant::Nobody, "9.9"),
     ] {
         let lines = [STANDS.to_owned(), format!("drive 1 deviates {deviation}")];
         let link = twin(&lines).expect("a ring").into_link();
@@ -484,7 +484,7 @@ fn the_section_is_that_of_the_broken_rule() {
         let all = played_in_time(&named_plan(name), &link);
         let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
         let found = sighting.map(|own| (own.meant, own.section));
-        assert_eq!(found, Some((Meant::Own(1), section)), "{deviation}");
+        assert_eq!(found, Some((meant, section)), "{deviation}");
     }
 }
 

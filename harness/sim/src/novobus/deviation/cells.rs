@@ -370,6 +370,18 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
 /// Deviations that no scenario shows and a qualification does: it compares what is read with what was read before, and times with each other.
 pub(super) static OF_QUALIFICATIONS: &[Deviation] = &[
     wrong(
+        "compares-seven-bits-of-the-address",
+        "9.3",
+        "it takes the address 80 for its own as well as 00",
+        How::Mistakes(
+            |m| match becomes_80(m) {
+                true => m.good(0xFF),
+                false => m.received,
+            },
+            |m, byte| Some(if becomes_80(m) { 0x80 } else { byte }),
+        ),
+    ),
+    wrong(
         "sends-checking-bytes-late",
         "8.2",
         "it sends the checking bytes of its answers 5 ms late",
@@ -405,6 +417,11 @@ const fn wrong(
         behind_the_bus: false,
         how,
     }
+}
+
+/// Whether it is an address byte to which the drive adds 1 and gets 80.
+fn becomes_80(m: &Moment) -> bool {
+    m.place == Place::Address && m.received.is(0x7F)
 }
 
 /// A command whose checking byte has just been refused.

@@ -78,6 +78,16 @@ static INCREMENTS: &[Deviation] = &[
         }),
     ),
     numbered(
+        "increments-bytes-below-80-only",
+        "it does not add 1 to a byte from 80 on in the error mode",
+        How::Says(|m, byte| {
+            Some(match m.increments(byte) && m.received.byte >= 0x80 {
+                true => m.received.byte,
+                false => byte,
+            })
+        }),
+    ),
+    numbered(
         "increments-others-than-zeros",
         "it does not add 1 to zeros in the error mode",
         How::Says(|m, byte| {

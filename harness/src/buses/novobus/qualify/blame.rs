@@ -48,6 +48,8 @@ pub struct Sighting {
     pub(super) byte: u8,
     /// The drives, if any, whose telegrams the byte and the zeros directly in front of it belong to, apart from sync and address bytes.
     pub(super) addressed: Vec<Option<u8>>,
+    /// The address byte of its telegram, where that is for no drive.
+    pub(super) to_nobody: Option<u8>,
     /// Whether ReadWord or ReadLong reads it, of a cell that WriteByte has written.
     pub(super) word_of_bytes: bool,
     /// Whether zeros have come from it on, and not only in its place.
@@ -111,6 +113,7 @@ impl Sighting {
         let first = zeros.last().unwrap_or(index);
         let addressed = (first..=index).filter_map(|at| sent.addressed(at));
         let addressed = addressed.collect();
+        let to_nobody = sent.to_nobody(index);
         let count = end.max(index + 1).min(sent.bytes.len());
         let long = is_short
             .then(|| sent.with_addresses(count, drives))
@@ -131,6 +134,7 @@ impl Sighting {
             role,
             byte,
             addressed,
+            to_nobody,
             word_of_bytes,
             is_refused,
             is_short,
@@ -380,6 +384,7 @@ impl Sent {
         let late = expected == Some(0) && !refused && zeros && tells;
         let section = (of_own && late)
             .then_some("9.7")
+            .or_else(|| (refused && self.is_behind_a_silence(index)).then_some("9.9"))
             .or_else(|| self.comes_back(index, came))
             .unwrap_or_else(|| self.section(index, refused && before == Some(0)));
         (meant, section, end)
@@ -422,6 +427,14 @@ impl Sent {
             _ => Meant::Nobody,
         };
         (meant, end)
+    }
+
+    /// The address byte of the telegram of a byte, where it is for no drive.
+    fn to_nobody(&self, index: usize) -> Option<u8> {
+        let is_for_nobody = self.addressed(index) == Some(None);
+        let is_address = |at: &usize| matches!(self.roles[*at], Role::Address { .. });
+        let address = (0..index).rev().find(is_address)?;
+        is_for_nobody.then(|| self.bytes[address].0)
     }
 
     /// The drive that the telegram of a byte behind an address byte is addressed to, if any; `None` for every other byte.

@@ -3,7 +3,7 @@
 
 use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep};
 use crate::buses::novobus::twin::{Conversation, Done};
-use crate::link::{Moment, PlacedFault};
+use crate::link::{HARMLESS, Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::syntax::{Action, Scenario, Step};
 use crate::scenario::times::Duration;
@@ -101,6 +101,13 @@ impl Sent {
             Some(Piece::Gap(own)) => *own = *own + gap,
             _ => self.pieces.push(Piece::Gap(gap)),
         }
+    }
+
+    /// Whether the master was silent in front of a byte for longer than a computer makes it by chance (ND21 9.9).
+    pub(super) fn is_behind_a_silence(&self, index: usize) -> bool {
+        let mut bytes = (0..self.pieces.len()).filter(|place| self.pieces[*place].is_byte());
+        let before = bytes.nth(index).and_then(|place| place.checked_sub(1));
+        matches!(before.map(|place| &self.pieces[place]), Some(Piece::Gap(gap)) if *gap > HARMLESS)
     }
 
     /// Removes the telegrams to other drives if it is long. Also returns how many of the first `count` bytes are left. The behaviour of a

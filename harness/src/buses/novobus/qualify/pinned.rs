@@ -67,6 +67,8 @@ impl fmt::Display for Pinned {
 enum Kind {
     /// A drive went into the error mode where the model's did not: which one is it, and why?
     Refusal,
+    /// A telegram with this address byte is for no drive, and was not left as it is: which drive takes it for its own?
+    Nobody(u8),
     /// An address byte came back wrong, or a short address reached another drive: which drives have kept which sum?
     Address(u8),
     /// A cell does not hold what was written to it: is it the cell?
@@ -110,6 +112,7 @@ pub fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Question<'
         }
         let text = match kind {
             Kind::Refusal => refusal(sighting, drives),
+            Kind::Nobody(byte) => taken(drives, byte),
             Kind::Address(byte) => kept(drives, byte),
             Kind::Cell(drive) => march(drives, drive),
         };
@@ -132,6 +135,9 @@ impl Kind {
     /// What to ask about a sighting.
     fn of(sighting: &Sighting, drives: u8) -> Option<Self> {
         let (wanted, _) = sighting.values;
+        if let Some(byte) = sighting.to_nobody.filter(|_| !sighting.is_refused) {
+            return Some(Self::Nobody(byte));
+        }
         match sighting.role {
             Role::Foreign | Role::CheckSequence => None,
             _ if sighting.is_refused && wanted != 0 => Some(Self::Refusal),
@@ -148,6 +154,7 @@ impl Kind {
     const fn word(self) -> &'static str {
         match self {
             Self::Refusal => "who-refuses",
+            Self::Nobody(_) => "who-answers",
             Self::Address(_) => "who-kept",
             Self::Cell(_) => "which-cell",
         }
@@ -160,6 +167,7 @@ impl Question<'_> {
     pub fn answer(&self, conversations: &[Conversation]) -> Option<Pinned> {
         match self.kind {
             Kind::Refusal => self.refused(conversations),
+            Kind::Nobody(byte) => taken_by(self.drives, byte, conversations),
             Kind::Address(byte) => kept_by(self.drives, byte, conversations),
             Kind::Cell(drive) => cells(self.sighting, drive, conversations),
         }
@@ -291,17 +299,60 @@ const READ: [u8; 4] = [0xC0, MARK.to_be_bytes()[1], MARK.to_be_bytes()[0], 0];
 /// The command byte of WriteByte (10.2).
 const WRITE_BYTE: u8 = 0x82;
 
+/// Writes another byte to a cell of each drive.
+fn marks(drives: u8) -> String {
+    let mark = |drive: u8| format!("write-byte {drive} {MARK:04X} = {:02X}\n", drive + 1);
+    (0..drives).map(mark).collect()
+}
+
+/// A telegram with this address byte, which reads the mark of a drive that takes it for its own.
+fn read_behind(byte: u8) -> [u8; 6] {
+    let [command, low, high, _] = READ;
+    let sum = command.wrapping_add(low).wrapping_add(high);
+    [0x88, byte, command, low, high, sum]
+}
+
+fn taken(drives: u8, byte: u8) -> Option<String> {
+    let mut text = header(
+        "Who answers to an address byte that is for no drive",
+        drives,
+    );
+    text.push_str(&marks(drives));
+    let sent: String = read_behind(byte)
+        .iter()
+        .map(|byte| format!(" {byte:02X}"))
+        .collect();
+    text.push_str(&format!(">{sent} {SYNCO:02X}*{drives}\nrecover\n"));
+    Some(text)
+}
+
+/// The drive whose mark came, if the address byte came back as that of no drive: then each drive has added 1 to it (9.3).
+fn taken_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinned> {
+    let pairs = pairs(conversations.last()?)?;
+    let asked = read_behind(byte);
+    let answer = pairs
+        .windows(asked.len())
+        .find(|own| own.iter().map(|own| own.0).eq(asked))?;
+    let [_, (_, address), .., (_, data), _] = answer else {
+        return None;
+    };
+    let drive = data.checked_sub(1).filter(|drive| *drive < drives)?;
+    (*address == byte.wrapping_add(drives)).then(|| Pinned {
+        drive,
+        section: "9.3",
+        about: format!(
+            "the address byte {byte:02X} is for no drive, and drive {drive} answers to it"
+        ),
+        names_the_drive: true,
+    })
+}
+
 fn kept(drives: u8, byte: u8) -> Option<String> {
     let mut text = header(
         "The sums of an address byte that the drives have kept",
         drives,
     );
-    for drive in 0..drives {
-        text.push_str(&format!(
-            "write-byte {drive} {MARK:04X} = {:02X}\n",
-            drive + 1
-        ));
-    }
+    text.push_str(&marks(drives));
     let most = steps(drives, byte).into_iter().max()?;
     if steps(drives, byte).contains(&256) {
         return None;
