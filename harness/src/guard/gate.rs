@@ -79,6 +79,9 @@ pub trait Gate: Any + Send + fmt::Debug {
     /// After a denial: lets permitted pieces pass again, with nothing known of what drives do.
     fn reset_after_denial(&mut self);
 
+    /// Lets any number of pieces pass, for the way to the safe state.
+    fn lift_caps(&mut self) {}
+
     /// Copies what another gate to the same drives knows of them.
     fn know_as(&mut self, other: &dyn Gate);
 

@@ -98,6 +98,11 @@ impl<L: Line> Guarded<L> {
         }
     }
 
+    /// Lets any number of pieces pass from now on: nothing may stop the way to a [safe state](super::safe_state).
+    pub fn lift_caps(&mut self) {
+        self.gates.iter_mut().for_each(|gate| gate.lift_caps());
+    }
+
     /// The gate of a port, by its type; `None` where the port has none of this type.
     pub(crate) fn gate<G: Gate>(&self, port: usize) -> Option<&G> {
         let gate: &dyn Any = self.gates.get(port)?.as_ref();

@@ -217,6 +217,10 @@ impl Gate for RingGate {
         self.guard.reset_after_denial();
     }
 
+    fn lift_caps(&mut self) {
+        self.guard.lift_caps();
+    }
+
     fn know_as(&mut self, other: &dyn Gate) {
         let other: &dyn Any = other;
         if let Some(other) = other.downcast_ref::<Self>() {

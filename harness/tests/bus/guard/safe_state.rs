@@ -65,6 +65,32 @@ fn turning_motors_stand_and_are_blocked() {
     }
 }
 
+/// No cap of the bytes that are sent stands in the way of the safe state.
+#[test]
+fn no_cap_stops_the_safe_state() {
+    for (bytes_per_second, most_bytes) in [(Some(60), u64::MAX), (None, 60)] {
+        let limits = Limits {
+            motion: true,
+            bytes_per_second,
+            most_bytes,
+            ..Limits::default()
+        };
+        let confirmed = |lifted: bool| {
+            let mut line = guarded(1, limits);
+            line.send_octets(0, &[0x80; 60]);
+            assert!(line.trouble().is_some(), "{limits:?}");
+            line.reset_after_denial();
+            if lifted {
+                line.lift_caps();
+            }
+            let state = safe_state(&mut line, &[size(1)], &Standstill::default());
+            state == SafeConfirmation::Confirmed(vec![size(1)])
+        };
+        assert!(confirmed(true), "{limits:?}");
+        assert!(!confirmed(false), "{limits:?}");
+    }
+}
+
 /// What the watchdog sends past the guard is what the guard lets pass, whatever it allows.
 #[test]
 fn the_last_words_are_allowed() {

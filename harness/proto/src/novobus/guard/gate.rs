@@ -232,6 +232,12 @@ impl Guard {
         self.doubt();
     }
 
+    /// Lets any number of bytes pass: those of a safe state must not be denied for their number.
+    pub fn lift_caps(&mut self) {
+        self.limits.bytes_per_second = None;
+        self.limits.most_bytes = u64::MAX;
+    }
+
     /// Judges the next byte. `line_error`: it is sent with wrong parity or a broken frame. Not every port sends the error
     /// as requested, so the byte must also be allowed as a good byte, and the guard's state becomes doubtful.
     ///

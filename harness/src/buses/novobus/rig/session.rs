@@ -543,6 +543,7 @@ impl Session {
             }
             self.link.begin();
             self.link.reset_after_denial();
+            self.link.lift_caps();
             let wanted = self.rig.file.safe_state.clone();
             let standing = standing(&wanted);
             if !standing.order.is_empty() {
