@@ -5,6 +5,7 @@ use super::effect::DriveAct;
 use super::known::{Found, Known};
 use super::limits::Limits;
 use super::stage::Stage;
+use super::tail::Tail;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
 use crate::novobus::checksum::Checksum;
@@ -86,13 +87,6 @@ enum Process {
 #[derive(Clone, Copy, Debug, Default)]
 struct Half {
     bytes: [u8; LONGEST],
-    length: u8,
-}
-
-/// The last four bytes.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tail {
-    bytes: [u8; 4],
     length: u8,
 }
 
@@ -632,24 +626,5 @@ impl Half {
             self.length += 1;
         }
         self
-    }
-}
-
-impl Tail {
-    /// The increment that turns the last four bytes and this one into the check sequence.
-    fn shift(&self, byte: u8) -> Option<u8> {
-        let [a, b, c, d] = self.bytes;
-        let shift = SEQUENCE[0].wrapping_sub(a);
-        let fits = [a, b, c, d, byte]
-            .iter()
-            .zip(SEQUENCE)
-            .all(|(byte, printed)| byte.wrapping_add(shift) == printed);
-        (fits && usize::from(self.length) == self.bytes.len()).then_some(shift)
-    }
-
-    fn push(&mut self, byte: u8) {
-        self.bytes.rotate_left(1);
-        self.bytes[3] = byte;
-        self.length = (self.length + 1).min(4);
     }
 }

@@ -48,6 +48,7 @@ mod known;
 mod limits;
 mod stage;
 mod table;
+mod tail;
 #[cfg(test)]
 mod tests;
 
