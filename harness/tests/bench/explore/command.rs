@@ -296,6 +296,17 @@ fn what_cannot_be() {
     ended(&run(&["--out", name(&out)]), 0, "60 cases");
 }
 
+/// A run in which no case was judged has not passed.
+#[test]
+fn nothing_judged_has_not_passed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for bound in [["--cases", "0"], ["--wire-time", "1ms"]] {
+        let out = folder.path().join(bound[0]);
+        let run = ["fuzz", "run", bound[0], bound[1], "--out", name(&out)];
+        ended(&drivebench(&run), 5, "0 cases");
+    }
+}
+
 /// Two processes never work on one run.
 #[test]
 fn one_at_a_time() {
