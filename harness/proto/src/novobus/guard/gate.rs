@@ -2,6 +2,7 @@
 
 use super::denial::{Cause, Denial};
 use super::effect::DriveAct;
+use super::half::{Half, length};
 use super::known::{Found, Known};
 use super::limits::Limits;
 use super::stage::Stage;
@@ -16,8 +17,6 @@ use alloc::boxed::Box;
 
 /// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
 const FIRST_ADDRESS: u8 = 6;
-/// The longest command without its checking byte (ND21 10.1).
-const LONGEST: usize = 5;
 /// The most bytes in the place of a check sequence, until the next 17 zeros.
 const MOST_FOREIGN: u8 = 8;
 
@@ -81,13 +80,6 @@ enum Process {
     None,
     High,
     Low(u8),
-}
-
-/// A command, its checking byte left out, as far as it has been sent.
-#[derive(Clone, Copy, Debug, Default)]
-struct Half {
-    bytes: [u8; LONGEST],
-    length: u8,
 }
 
 /// What becomes of a parameter byte.
@@ -161,7 +153,7 @@ impl Guard {
     /// Whether every drive waits for a sync byte, and none has a command in part, as far as the bytes that have passed tell.
     #[must_use]
     pub fn at_rest(&self) -> bool {
-        self.state == State::Sync && self.halves.iter().all(|half| half.length == 0)
+        self.state == State::Sync && self.halves.iter().all(|half| half.sent().is_empty())
     }
 
     /// What the drives take the next byte for, as far as the bytes that have passed tell.
@@ -536,17 +528,6 @@ fn net(header: TelegramHeader, key: u8) -> State {
     }
 }
 
-/// How many bytes a command has in front of its checking byte (ND21 10.1-10.5).
-const fn length(code: u8) -> Option<usize> {
-    Some(match code {
-        0xC8 | 0xDD => 2,
-        0xC0 | 0xA4 | 0xA5 => 3,
-        0xC1 | 0x82 => 4,
-        0xC7 | 0x63 => 5,
-        _ => return None,
-    })
-}
-
 impl Doubt {
     /// The same behind this many zeros in a row.
     fn with_zeros(self, zeros: u8) -> Self {
@@ -612,19 +593,5 @@ impl Doubt {
             _ => return Err(Cause::of_doubt(self.behind_reset)),
         };
         Ok(Next::to(State::Doubt(next)))
-    }
-}
-
-impl Half {
-    fn sent(&self) -> &[u8] {
-        &self.bytes[..usize::from(self.length)]
-    }
-
-    fn with(mut self, byte: u8) -> Self {
-        if let Some(place) = self.bytes.get_mut(usize::from(self.length)) {
-            *place = byte;
-            self.length += 1;
-        }
-        self
     }
 }

@@ -44,6 +44,7 @@
 mod denial;
 mod effect;
 mod gate;
+mod half;
 mod known;
 mod limits;
 mod stage;
