@@ -47,7 +47,7 @@ pub trait Gate: Any + Send + fmt::Debug {
     /// [`Denied`]: what drives would read after it cannot be judged.
     fn fault(&mut self, fault: PlacedFault, moment: Moment, settled: bool) -> Result<(), Denied>;
 
-    /// Takes notice of what another station has sent.
+    /// Takes notice of what stations have sent.
     fn hear(&mut self, heard: &Heard) {
         let _of_no_interest = heard;
     }

@@ -447,7 +447,13 @@ impl<L: Link> Link for Guarded<L> {
             self.deny(denied);
             return Vec::new();
         }
-        self.inner.probe(port, octets)
+        let answers = self.inner.probe(port, octets);
+        if !copy {
+            for &answer in &answers {
+                gate.hear(&Heard::Octet(answer));
+            }
+        }
+        answers
     }
 
     fn beside(&self) -> Option<&dyn Any> {

@@ -4,7 +4,7 @@ use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::guard::{Denied, Gate, Guarded, Restore};
 use crate::link::{Capability, DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault};
-use crate::medium::Out;
+use crate::medium::{Heard, Out};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
@@ -179,7 +179,14 @@ impl Gate for RingGate {
         Ok(())
     }
 
+    fn hear(&mut self, heard: &Heard) {
+        if let Some(octet) = heard.octet() {
+            self.guard.hear(octet);
+        }
+    }
+
     fn begin(&mut self) {
+        self.guard.begin();
         self.sent = 0;
         self.damaged.clear();
     }

@@ -206,7 +206,7 @@ impl core::error::Error for Denial {}
 impl fmt::Display for DriveAct {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Read => f.write_str("a read")?,
+            Self::Read(_) => f.write_str("a read")?,
             Self::WriteByte(address, data) => write!(f, "WriteByte {data:02X} to {address:04X}")?,
             Self::WriteWord(address, data) => write!(f, "WriteWord {data:04X} to {address:04X}")?,
             Self::And(address, mask) => write!(f, "And {mask:02X} into {address:04X}")?,

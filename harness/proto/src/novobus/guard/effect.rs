@@ -15,8 +15,8 @@ use crate::novobus::output::OutputChange;
 /// Something that a drive would do at a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveAct {
-    /// `ReadByte`, `ReadWord`, `ReadLong` (ND21 10.1).
-    Read,
+    /// `ReadByte`, `ReadWord`, `ReadLong` (ND21 10.1): the address.
+    Read(u16),
     /// `WriteByte` (10.2): address and data.
     WriteByte(u16, u8),
     /// `WriteWord` (10.2): address and data.
@@ -190,15 +190,23 @@ fn of_ps_status(change: Change) -> Effect {
     effect(Need::MOTION, pace)
 }
 
+/// What makes the EEPROM controller read a byte (14.10.5.1).
+const EEPROM_READ: u8 = 0x81;
+/// The byte of the address of `EEPROMcontrol` that is in the answer to a read of it (10.1).
+const EEPROM_CONTROL_LOW: u8 = (ram::EEPROM_CONTROL & 0xFF) as u8;
+
 /// A command to the EEPROM controller (14.10.5).
 fn of_eeprom(command: u8, known: &Known) -> Effect {
     match command {
         // Read a byte, and the end of it.
-        0x81 | 0x10 => effect(Need::NONE, Pace::Same),
+        EEPROM_READ | 0x10 => effect(Need::NONE, Pace::Same),
         // ProgParam stores what the drive works with.
-        0x84 => effect(Need::EEPROM, Pace::Knowing(Facts::SOURCE)),
+        0x84 => effect(
+            Need::EEPROM,
+            Pace::Knowing(Facts::SOURCE.and(Facts::NO_SWITCHES)),
+        ),
         0x82 => {
-            let [address, data] = known.buffer();
+            let [address, data] = known.eeprom.bytes();
             let monitors = address.is_none_or(|address| address == ee::SELFTEST)
                 && data.is_none_or(|data| data & selftest::MONITORING != 0);
             let need = match monitors {
@@ -219,17 +227,34 @@ fn note_byte(address: u16, change: Change, known: &mut Known) {
         (ram::FLAGS2, Change::And(mask) | Change::Set(mask)) if mask & flags2::ORDERS == 0 => {
             known.note(Facts::FLAGS2_IDLE);
         }
-        (ram::EEPROM_BUFFER, change) => known.note_buffer(0, change.whole()),
+        (ram::EEPROM_BUFFER, change) => known.eeprom.write(0, change.whole()),
         (address, change) if address == ram::EEPROM_BUFFER + 1 => {
-            known.note_buffer(1, change.whole());
+            known.eeprom.write(1, change.whole());
         }
-        // 14.10.5.2: the byte that is read stands in the buffer then.
-        (ram::EEPROM_CONTROL, Change::Set(0x81)) => {
-            known.note_buffer(0, None);
-            known.note_buffer(1, None);
-        }
+        (ram::EEPROM_CONTROL, Change::Set(EEPROM_READ)) => known.eeprom.read(),
         _ => {}
     }
+}
+
+/// What is known of a drive behind an answer of it, the checking byte left out.
+pub(super) fn note_answer(answer: &[u8], known: &mut Known) {
+    match *answer {
+        [0xC0, EEPROM_CONTROL_LOW, control] => known.eeprom.control(control),
+        // The answer to a write has the bytes of the write (10.2).
+        _ => {
+            let act = DriveAct::of(answer).filter(|act| !matches!(act, DriveAct::Read(_)));
+            for change in act.into_iter().flat_map(DriveAct::changes).flatten() {
+                if matches!(change, (ram::EEPROM_CONTROL, Change::Set(EEPROM_READ))) {
+                    known.eeprom.read_answered();
+                }
+            }
+        }
+    }
+}
+
+/// Whether the answer to a read of this cell looks like one of `EEPROMcontrol`, which it is not.
+const fn alike(address: u16) -> bool {
+    address & 0xFF == ram::EEPROM_CONTROL & 0xFF && address != ram::EEPROM_CONTROL
 }
 
 impl DriveAct {
@@ -394,15 +419,17 @@ impl DriveAct {
         for (address, change) in self.changes().into_iter().flatten() {
             note_byte(address, change, known);
         }
-        if self == Self::Reset {
-            known.reset();
+        match self {
+            Self::Reset => known.reset(),
+            Self::Read(address) if alike(address) => known.eeprom.read_alike(),
+            _ => {}
         }
     }
 
     /// The act of a complete command, its checking byte left out; `None` where it is none.
     pub(super) const fn of(command: &[u8]) -> Option<Self> {
         Some(match *command {
-            [0xC0, ..] | [0xC1, ..] | [0xC7, ..] => Self::Read,
+            [0xC0 | 0xC1 | 0xC7, low, high, ..] => Self::Read(u16::from_be_bytes([high, low])),
             [0x82, data, low, high] => Self::WriteByte(u16::from_be_bytes([high, low]), data),
             [0x63, lower, upper, low, high] => Self::WriteWord(
                 u16::from_be_bytes([high, low]),

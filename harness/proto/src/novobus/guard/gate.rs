@@ -1,12 +1,15 @@
 //! The guard itself: takes bytes and permits or denies each one.
 
+use super::FIRST_ADDRESS;
 use super::denial::{Cause, Denial};
-use super::effect::DriveAct;
+use super::effect::{DriveAct, note_answer};
 use super::half::{Half, length};
 use super::known::{Found, Known};
 use super::limits::Limits;
+use super::listener::Listener;
 use super::stage::Stage;
 use super::tail::Tail;
+use crate::line::Received;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
 use crate::novobus::checksum::Checksum;
@@ -15,8 +18,6 @@ use crate::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte, TelegramHeader};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
 
-/// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
-const FIRST_ADDRESS: u8 = 6;
 /// The most bytes in the place of a check sequence, until the next 17 zeros.
 const MOST_FOREIGN: u8 = 8;
 
@@ -30,6 +31,7 @@ pub struct Guard {
     halves: Box<[Half; 256]>,
     /// What is known of each drive, by the address byte that means it.
     known: Box<[Known; 256]>,
+    listener: Listener,
     /// The last address byte, counted up by "next"; `None` where no short address is valid.
     kept: Option<u8>,
     /// The last bytes, and the last ones without PAUSE, which drives swallow.
@@ -102,6 +104,7 @@ impl Guard {
             state: State::Doubt(Doubt::default()),
             halves: Box::new([Half::default(); 256]),
             known: Box::new([Known::default(); 256]),
+            listener: Listener::new(),
             kept: None,
             tails: [Tail::default(); 2],
             zeros: 0,
@@ -115,16 +118,32 @@ impl Guard {
     /// for no physical ring.
     pub fn assume_fresh(&mut self) {
         self.state = State::Sync;
+        self.listener.start();
+    }
+
+    /// Takes notice of a byte that came back.
+    pub fn hear(&mut self, received: Received) {
+        if let Some((key, answer)) = self.listener.hear(received, self.ring) {
+            note_answer(answer.sent(), &mut self.known[usize::from(key)]);
+        }
+    }
+
+    /// A conversation begins: what is on its way is not heard.
+    pub fn begin(&mut self) {
+        match self.at_rest() && !self.known.iter().any(Known::reads_eeprom) {
+            true => self.listener.start(),
+            false => self.listener.lose(),
+        }
     }
 
     /// Replaces what is known of the drive with this address byte by values that were read from it.
     pub fn learn(&mut self, address: u8, found: &Found) {
-        self.known[usize::from(address)] = Known::of(found, &self.limits);
+        self.known[usize::from(address)].learn(found, &self.limits);
     }
 
     /// Forgets everything about the drives: one may have been switched off and on.
     pub fn forget(&mut self) {
-        self.known.fill(Known::default());
+        self.known.iter_mut().for_each(Known::forget);
     }
 
     /// Copies what another guard of the same ring knows of the drives.
@@ -317,6 +336,8 @@ impl Guard {
         if next.recovered {
             self.halves.fill(Half::default());
             self.kept = None;
+            self.listener.recovered();
+            self.known.iter_mut().for_each(Known::recovered);
         }
         if let Some((key, half)) = next.half {
             self.halves[usize::from(key)] = half;

@@ -9,6 +9,7 @@
 //! * It was written by a command that passed. If the command was damaged on its way, the drive is in the error mode and executes
 //!   nothing before a check sequence (ND21 9.7), so this knowledge holds until the next doubt.
 
+use super::eeprom::EepromBuffer;
 use super::limits::Limits;
 use crate::nd21::bits::{flags2, hw_version, ps_status, sw_version, sw_version2};
 use crate::nd21::ram;
@@ -213,8 +214,7 @@ pub(super) struct Known {
     found: Facts,
     written: Facts,
     range: Option<SpeedRange>,
-    /// `EEPROMbuffer`: address and byte, as far as they were written (ND21 14.10.5).
-    buffer: [Option<u8>; 2],
+    pub(super) eeprom: EepromBuffer,
 }
 
 impl Known {
@@ -227,13 +227,13 @@ impl Known {
         self.range
     }
 
-    /// Address and byte that a write to the EEPROM would take.
-    pub(super) const fn buffer(&self) -> [Option<u8>; 2] {
-        self.buffer
+    /// Whether its EEPROM controller may be reading a byte.
+    pub(super) const fn reads_eeprom(&self) -> bool {
+        self.eeprom.reading()
     }
 
-    /// Knowledge from values that were read from a drive; earlier knowledge is dropped.
-    pub(super) fn of(found: &Found, limits: &Limits) -> Self {
+    /// Takes in values that were read from a drive; earlier knowledge is dropped.
+    pub(super) fn learn(&mut self, found: &Found, limits: &Limits) {
         let own = found.configuration;
         let range = SpeedRange::from_sw_version2(own.sw_version2);
         let slow = |raw: u16| limits.max_speed.is_none_or(|most| within(raw, range, most));
@@ -261,17 +261,30 @@ impl Known {
             Facts::DATA_IN.when(u16::from(found.data_in) == ram::NSOLL & 0xFF),
             Facts::AFTER_RESET.when(stored),
         ];
-        Self {
-            found: facts.into_iter().fold(Facts::NONE, Facts::and),
-            range: Some(range),
+        self.forget();
+        self.found = facts.into_iter().fold(Facts::NONE, Facts::and);
+        self.range = Some(range);
+    }
+
+    /// Drops all knowledge. A read of the EEPROM that may be under way is still.
+    pub(super) fn forget(&mut self) {
+        let eeprom = self.eeprom;
+        *self = Self {
+            eeprom,
             ..Self::default()
-        }
+        };
+        self.eeprom.forget();
+    }
+
+    /// A check sequence was sent.
+    pub(super) fn recovered(&mut self) {
+        self.eeprom.recovered();
     }
 
     /// A doubt: what was written may not have been executed.
     pub(super) fn doubt(&mut self) {
         self.written = Facts::NONE;
-        self.buffer = [None; 2];
+        self.eeprom.forget();
     }
 
     /// `ResetH8` (ND21 10.5): the cells are those of the EEPROM, or, where it was not executed, as before.
@@ -280,20 +293,13 @@ impl Known {
         if self.found.contains(Facts::AFTER_RESET) {
             self.found = Facts(self.found.0 & Facts::BEHIND_RESET.0);
         } else {
-            *self = Self::default();
+            self.forget();
         }
     }
 
     /// A command has passed that makes these facts true.
     pub(super) fn note(&mut self, facts: Facts) {
         self.written = self.written.and(facts);
-    }
-
-    /// A byte of `EEPROMbuffer` was written, or is not known any more.
-    pub(super) fn note_buffer(&mut self, place: usize, byte: Option<u8>) {
-        if let Some(place) = self.buffer.get_mut(place) {
-            *place = byte;
-        }
     }
 }
 

@@ -30,6 +30,9 @@
 //! drive's own range. An order that makes a drive turn at a speed that it holds already, such as a release or a positioning, passes if the guard
 //! knows that speed (`known`).
 //!
+//! What comes back is read for one thing only (`listener`): whether the EEPROM controller has done with a read, which puts a byte over the
+//! address that the next write would take (14.10.5.2).
+//!
 //! The guard cannot protect against these:
 //!
 //! * An undetected bit error on a wire can turn one command into another: the parity bit detects an odd number of wrong bits in a
@@ -42,16 +45,21 @@
 //! * A regulator that overshoots the nominal speed.
 
 mod denial;
+mod eeprom;
 mod effect;
 mod gate;
 mod half;
 mod known;
 mod limits;
+mod listener;
 mod stage;
 mod table;
 mod tail;
 #[cfg(test)]
 mod tests;
+
+/// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
+const FIRST_ADDRESS: u8 = 6;
 
 pub use denial::{Cause, Denial};
 pub use effect::DriveAct;

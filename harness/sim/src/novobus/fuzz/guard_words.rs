@@ -144,7 +144,7 @@ const fn why(cause: &Cause) -> &'static str {
 
 const fn name(act: &DriveAct) -> &'static str {
     match act {
-        DriveAct::Read => "read",
+        DriveAct::Read(_) => "read",
         DriveAct::WriteByte(..) => "WriteByte",
         DriveAct::WriteWord(..) => "WriteWord",
         DriveAct::And(..) => "And",

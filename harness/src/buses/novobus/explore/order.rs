@@ -159,8 +159,8 @@ impl RawCommand {
     #[must_use]
     pub const fn act(self) -> GuardedAct {
         match self {
-            Self::ReadByte { .. } | Self::ReadWord { .. } | Self::ReadLong { .. } => {
-                GuardedAct::Read
+            Self::ReadByte { cell } | Self::ReadWord { cell } | Self::ReadLong { cell } => {
+                GuardedAct::Read(cell)
             }
             Self::WriteByte { cell, data } => GuardedAct::WriteByte(cell, data),
             Self::WriteWord { cell, data } => GuardedAct::WriteWord(cell, data),

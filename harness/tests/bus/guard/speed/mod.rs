@@ -45,6 +45,9 @@ struct Left {
     data_in: u8,
     analogue: i32,
     inputs: u8,
+    /// A byte of the EEPROM.
+    stored: Option<(u8, u8)>,
+    eeprom_read_time: Span,
 }
 
 impl Default for Left {
@@ -58,6 +61,8 @@ impl Default for Left {
             data_in: 8,
             analogue: 10_000,
             inputs: 0,
+            stored: None,
+            eeprom_read_time: Span::from_millis(1),
         }
     }
 }
@@ -87,10 +92,14 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
         let first = usize::from(first);
         eeprom[first..first + 2].copy_from_slice(&speed.to_be_bytes());
     }
+    if let Some((place, byte)) = left.stored {
+        eeprom[usize::from(place)] = byte;
+    }
     harness_sim::nd21::set_parity(&mut eeprom);
     let ring = Ring::new(size(1), Rate::Baud38400, |_| {
         let own = Nd21Properties {
             s_ramp_wire: SRampWire::Puffer,
+            eeprom_read_time: left.eeprom_read_time,
             ..Nd21Properties::default()
         };
         let mut drive = Nd21Drive::new(Properties::default(), own, eeprom);
@@ -156,6 +165,7 @@ fn watch(line: &mut Guarded<SimulatedLink>, millis: u64) -> f64 {
         let until = line.now() + Span::from_millis(2);
         while line.now() < until && line.wait(until) {}
         most = most.max(speed(line).abs());
+        while line.receive(0).is_some() {}
     }
     most
 }
@@ -301,4 +311,56 @@ fn what_is_forgotten() {
     );
     assert!(known(&mut line, &word(ram::NSOLL, 1_132)), "the range");
     assert!(!known(&mut line, &run), "ps_v0 is nMax behind a reset");
+}
+
+/// ND21 14.10.5.2: a read of the EEPROM that is under way puts its byte over the address that was written meanwhile, so that the next
+/// write goes to the cell of this number. Once `EEPROMcontrol` was read with bit 5 set, the address stays.
+#[test]
+fn a_read_that_is_under_way_changes_what_is_written() {
+    const SW_VERSION: u8 = 0x22;
+    let left = Left {
+        stored: Some((0x60, SW_VERSION)),
+        eeprom_read_time: Span::from_millis(30),
+        ..Left::default()
+    };
+    let poll = telegram(&[0xC0, 0x8A, 0xFD]);
+    let address = || byte(ram::EEPROM_BUFFER, 0x60);
+    let read = || byte(ram::EEPROM_CONTROL, 0x81);
+    let write = || {
+        [
+            byte(ram::EEPROM_BUFFER + 1, 0x40),
+            byte(ram::EEPROM_CONTROL, 0x82),
+        ]
+    };
+    // 10 ms each, as behind every telegram.
+    let wait = || vec![Vec::new(); 5];
+    let attack = |polls: Vec<Vec<u8>>, limits| {
+        let mut line = bench(&left, limits);
+        let begin = vec![address(), read()];
+        let sent = [begin, polls, vec![address()], wait(), write().into()].concat();
+        let denied = play(&mut line, &left, &sent).0;
+        let last = denied.map(|place| place + 1 == sent.len());
+        line.reset_after_denial();
+        line.synchronise();
+        let bus =
+            OpenRings::open(Box::new(&mut line), &[size(1)], Options::default()).expect("open");
+        let stored = bus.read_eeprom(super::axis(0), SW_VERSION);
+        (last, stored.expect("read"))
+    };
+    // As `bench` stores it.
+    let own = left.configuration[2] | 0x20;
+    let denied = (Some(true), own);
+    assert_eq!(attack(vec![], limits()), denied);
+    let unlimited = attack(vec![], Limits::unlimited());
+    assert_eq!(unlimited, (None, 0x40), "it is an attack");
+    assert_eq!(attack(vec![poll.clone()], limits()), denied, "not read yet");
+    let has_read = attack([wait(), vec![poll.clone()]].concat(), limits());
+    assert_eq!(has_read, (None, own));
+    let again = [wait(), vec![[poll, read()].concat()]].concat();
+    assert_eq!(attack(again, limits()), denied, "of the read before");
+    let alike = telegram(&[0xC0, 0x8A, 0xFF]);
+    let other = [wait(), vec![alike]].concat();
+    assert_eq!(attack(other, limits()), denied, "of another cell"); // To an address that no drive has; it comes back as it was sent.
+    let forged = vec![vec![0x88, 0x00, 0xC0, 0x8A, 0x20, 0x96]];
+    assert_eq!(attack(forged, limits()), denied, "of nobody");
 }

@@ -47,6 +47,7 @@ fn left() -> impl Strategy<Value = Left> {
                 },
                 analogue,
                 inputs,
+                ..Left::default()
             },
         )
 }
@@ -182,6 +183,7 @@ fn a_regulator_overshoots() {
         data_in: 8,
         analogue: 0,
         inputs: 0,
+        ..Left::default()
     };
     let mut line = bench(&left, limits());
     let mut most = watch(&mut line, 20);
