@@ -8,7 +8,7 @@ use crate::medium::{Heard, Out};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::guard::{Cause, Denial, Found, Guard, Limits};
+use harness_proto::novobus::guard::{Cause, Denial, Guard, Limits};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
 use std::any::Any;
@@ -294,12 +294,12 @@ impl<L: Line> Guarded<L> {
     }
 
     /// Learns what was read of a drive.
-    pub(crate) fn learn_of(&mut self, axis: Axis, found: &Found) {
+    pub(crate) fn learn_of(&mut self, axis: Axis, learn: impl FnOnce(&mut Guard, u8)) {
         let Some(gate) = self.gate_mut::<RingGate>(axis.ring()) else {
             return;
         };
         if let Ok(address) = gate.size.address_byte(axis.drive()) {
-            gate.guard.learn(address, found);
+            learn(&mut gate.guard, address);
         }
     }
 }

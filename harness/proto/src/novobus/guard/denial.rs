@@ -60,12 +60,12 @@ pub enum Cause {
         /// Why.
         why: &'static str,
     },
-    /// A motor would turn at a speed that the drive holds, and it is not known that this is within `max_speed`.
+    /// It does what the drive holds, such as a speed, and it is not known that this may be.
     NotKnown {
         /// What.
         act: DriveAct,
-        /// `max_speed` in rpm.
-        most: u16,
+        /// `max_speed` in rpm, where there is one.
+        most: Option<u16>,
         /// The facts that are not known.
         missing: Facts,
     },
@@ -166,11 +166,17 @@ impl fmt::Display for Denial {
             Cause::NotKnown { act, most, missing } => {
                 write!(f, "{act}")?;
                 whom(f)?;
-                write!(
-                    f,
-                    " can make the motor turn; to check it against `max_speed` = {most} rpm in the rig's [limits], the guard must know \
-                     {missing}"
-                )
+                match most {
+                    Some(most) => write!(
+                        f,
+                        " can make the motor turn; to check it against `max_speed` = {most} rpm in the rig's [limits], the guard must \
+                         know {missing}"
+                    ),
+                    None => write!(
+                        f,
+                        " can change what the rig's [limits] do not allow; the guard must know {missing}"
+                    ),
+                }
             }
             Cause::InDoubt => f.write_str(
                 "the position of the drives in a telegram is not known; send 17 zeros and the check sequence first \

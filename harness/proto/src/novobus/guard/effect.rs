@@ -222,7 +222,8 @@ fn of_eeprom(command: u8, known: &Known) -> Effect {
 /// What is known of a drive behind a changed byte.
 fn note_byte(address: u16, change: Change, known: &mut Known) {
     match (address, change) {
-        (ram::DATA_IN, Change::Set(NSOLL_LOW)) => known.note(Facts::DATA_IN),
+        // It has passed, so that process data may be written there.
+        (ram::DATA_IN, Change::Set(_)) => known.note(Facts::DATA_IN),
         (ram::PS_STATUS, Change::Set(0 | ps_status::FINISHED)) => known.note(Facts::PS_IDLE),
         (ram::FLAGS2, Change::And(mask) | Change::Set(mask)) if mask & flags2::ORDERS == 0 => {
             known.note(Facts::FLAGS2_IDLE);
@@ -346,10 +347,19 @@ impl DriveAct {
         if !missing.is_none() {
             return Err(Cause::NotAllowed { act: self, missing });
         }
-        let Some(most) = limits.max_speed else {
-            return Ok(());
-        };
         let act = self;
+        let Some(most) = limits.max_speed else {
+            // 14.10.3: the drive holds where they are written.
+            let missing = match self {
+                Self::ProcessData(_) if !limits.allow_everything() => known.knows(Facts::DATA_IN),
+                _ => Facts::NONE,
+            };
+            let most = None;
+            return match missing.is_none() {
+                true => Ok(()),
+                false => Err(Cause::NotKnown { act, most, missing }),
+            };
+        };
         if let Some(raw) = self.speed() {
             let range = known.range();
             if !within(raw, range.unwrap_or(SpeedRange::To12000), most) {
@@ -381,6 +391,7 @@ impl DriveAct {
         if missing.is_none() {
             Ok(())
         } else {
+            let most = Some(most);
             Err(Cause::NotKnown { act, most, missing })
         }
     }

@@ -141,6 +141,11 @@ impl Guard {
         self.known[usize::from(address)].learn(found, &self.limits);
     }
 
+    /// The same of `DataIn` alone, which says where process data are written (ND21 14.10.3).
+    pub fn learn_data_in(&mut self, address: u8, data_in: u8) {
+        self.known[usize::from(address)].learn_data_in(data_in, &self.limits);
+    }
+
     /// Forgets everything about the drives: one may have been switched off and on.
     pub fn forget(&mut self) {
         self.known.iter_mut().for_each(Known::forget);

@@ -10,6 +10,7 @@
 //!   nothing before a check sequence (ND21 9.7), so this knowledge holds until the next doubt.
 
 use super::eeprom::EepromBuffer;
+use super::effect::DriveAct;
 use super::limits::Limits;
 use crate::nd21::bits::{flags2, hw_version, ps_status, sw_version, sw_version2};
 use crate::nd21::ram;
@@ -70,7 +71,7 @@ const TEXTS: &[(Facts, &str, &str)] = &[
     ),
     (
         Facts::DATA_IN,
-        "`DataIn` (FF32) points at nsoll (ND21 14.10.3)",
+        "`DataIn` (FF32) points at nsoll (FF08), as process data are written to the cell to which it points (ND21 14.10.3)",
         "write 08 to DataIn first",
     ),
     (
@@ -100,7 +101,7 @@ impl Facts {
     pub const PS_IDLE: Self = Self(1 << 6);
     /// `Flags2` asks for no run (ND21 14.4.3).
     pub const FLAGS2_IDLE: Self = Self(1 << 7);
-    /// Process data are written to `nsoll` (ND21 14.10.3).
+    /// Process data are written to `nsoll`, or where the limits let any word be written (ND21 14.10.3).
     pub const DATA_IN: Self = Self(1 << 8);
     /// After a reset the drive stands and waits for a nominal value of the bus (ND21 14.2.2).
     pub const AFTER_RESET: Self = Self(1 << 9);
@@ -258,12 +259,18 @@ impl Known {
             Facts::TRAPEZOID.when(own.sw_version2 & sw_version2::NO_S_RAMP != 0),
             Facts::PS_IDLE.when(found.ps_status & busy == 0),
             Facts::FLAGS2_IDLE.when(found.flags2 & flags2::ORDERS == 0),
-            Facts::DATA_IN.when(u16::from(found.data_in) == ram::NSOLL & 0xFF),
             Facts::AFTER_RESET.when(stored),
         ];
         self.forget();
         self.found = facts.into_iter().fold(Facts::NONE, Facts::and);
         self.range = Some(range);
+        self.learn_data_in(found.data_in, limits);
+    }
+
+    /// Takes in `DataIn`, which was read.
+    pub(super) fn learn_data_in(&mut self, data_in: u8, limits: &Limits) {
+        let fact = Facts::DATA_IN.when(DriveAct::WriteByte(ram::DATA_IN, data_in).passes(limits));
+        self.found = self.found.without(Facts::DATA_IN).and(fact);
     }
 
     /// Drops all knowledge. A read of the EEPROM that may be under way is still.

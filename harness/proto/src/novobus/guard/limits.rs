@@ -89,13 +89,15 @@ impl Limits {
         let need = match cause {
             Cause::NotAllowed { missing, .. } => missing,
             // If everything is allowed, bytes that the guard cannot interpret pass.
-            Cause::InDoubt | Cause::BehindReset | Cause::NoAddress | Cause::CheckSequence => {
-                Need::EVERYTHING
-            }
+            Cause::InDoubt
+            | Cause::BehindReset
+            | Cause::NoAddress
+            | Cause::CheckSequence
+            | Cause::NotKnown { most: None, .. } => Need::EVERYTHING,
             Cause::TooFast { .. }
             | Cause::HalfSpeed { .. }
             | Cause::Faster { .. }
-            | Cause::NotKnown { .. } => Need::ANY_SPEED,
+            | Cause::NotKnown { most: Some(_), .. } => Need::ANY_SPEED,
             Cause::TooMany { .. } | Cause::TooLong { .. } | Cause::Closed => Need::NONE,
         };
         let rate = matches!(cause, Cause::TooMany { .. });

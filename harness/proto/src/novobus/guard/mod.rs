@@ -30,6 +30,9 @@
 //! drive's own range. An order that makes a drive turn at a speed that it holds already, such as a release or a positioning, passes if the guard
 //! knows that speed (`known`).
 //!
+//! Process data are written where `DataIn` (FF32) points (14.10.3). Unless everything is allowed, they pass if the guard knows that this is a cell
+//! in which any word may be written.
+//!
 //! What comes back is read for one thing only (`listener`): whether the EEPROM controller has done with a read, which puts a byte over the
 //! address that the next write would take (14.10.5.2).
 //!
@@ -40,7 +43,6 @@
 //!   out of step for the rest of a telegram.
 //! * A command that another program left incomplete may be completed by a 01, which a preceding drive in the error mode makes of a zero.
 //!   Process data that it left incomplete end with the next byte of any value (9.4), so with the first zero of the recovery.
-//! * Without a `max_speed`, the guard assumes that `DataIn` (FF32) points at `nsoll` (14.10.3), because it lets no other value be written there.
 //! * Actions of the drive itself: by its switches, its cycle control, its EEPROM after power-up. The guard judges only the bus.
 //! * A regulator that overshoots the nominal speed.
 

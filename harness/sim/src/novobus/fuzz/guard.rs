@@ -49,6 +49,11 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
         .map(|index| started(start, index, drives == 1))
         .collect();
     let mut guard = Guard::new(size, limits);
+    for place in 0..drives as u8 {
+        if let Ok(address) = size.address_byte(place) {
+            guard.learn_data_in(address, NSOLL);
+        }
+    }
     let mut passed = Vec::new();
     let mut now = Instant::START;
     for (index, &byte) in wire.iter().take(LONGEST).enumerate() {
@@ -93,18 +98,21 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     }
 }
 
+/// What `DataIn` holds: `nsoll` (14.10.3).
+const NSOLL: u8 = 0x08;
+
 /// A drive that has heard something. Process data that it awaits have come: whatever byte is sent next would end them
 /// (ND21 9.4), be it the first zero of the recovery, so no guard can keep them back.
 fn started(start: &[u8], index: usize, keep_half: bool) -> Drive {
     let mut drive = Drive::new();
     // 14.10.3: nominal speed in, actual speed out.
-    drive.poke(0xFF32, 0x08);
+    drive.poke(0xFF32, NSOLL);
     drive.poke(0xFF34, 0x0C);
     for &byte in start.iter().skip(index) {
         drive.receive(Cell { byte, error: false });
     }
     drive.take_executed();
-    drive.poke(0xFF32, 0x08);
+    drive.poke(0xFF32, NSOLL);
     drive.forget_process_data();
     if !keep_half {
         drive.forget_half();
@@ -147,14 +155,8 @@ fn denied(command: &[u8], limits: &Limits) -> Option<&'static str> {
         [0xC0 | 0xC1 | 0xC7, ..] => None,
         [0xC8, _] => unless(limits.outputs, "output"),
         [0xDD, _] => unless(limits.reset, "reset"),
-        [0, high, low] => unless(limits.motion, "motion")
-            .or_else(|| fast(high, low, limits))
-            .or_else(|| {
-                unless(
-                    limits.max_speed.is_none(),
-                    "process data to an unknown cell",
-                )
-            }),
+        // To `nsoll`, where they are written from the begin on.
+        [0, high, low] => unless(limits.motion, "motion").or_else(|| fast(high, low, limits)),
         // 14.10: block, stop, both; nominal speed 0.
         [0xA5, mask, 0x00] if mask & 0x7E == 0 => None,
         [0x82, 0x81, 0x00, 0xFF] | [0x63, 0, 0, 0x08, 0xFF] => None,

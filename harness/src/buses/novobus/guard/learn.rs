@@ -1,4 +1,4 @@
-//! What a guard with a `max_speed` has to know of drives, read from them.
+//! What a guard has to know of drives, read from them.
 
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, Width};
 use crate::guard::Guarded;
@@ -26,33 +26,50 @@ const CELLS: [(u16, Width); 9] = [
 impl<L: Line> Guarded<L> {
     /// Reads from every drive at which speeds it would turn, so that the guard can hold it to `max_speed`: the range of speeds,
     /// `nsoll` and its source, the speeds of positioning and referencing, `DataIn`; where resets are allowed, also the
-    /// configuration in the EEPROM. Without a `max_speed`, or where motors must not turn, nothing is read.
+    /// configuration in the EEPROM. Without a `max_speed` it is `DataIn` alone, and nothing where everything is allowed or where motors
+    /// must not turn: process data need that they may.
     ///
     /// A drive that does not answer is not known: what could make it turn is denied.
     ///
     /// # Errors
     /// See [`Error`]: the first drive that did not answer.
     pub fn learn(&mut self) -> Result<(), Error> {
-        if !self.limits().motion || self.limits().max_speed.is_none() {
+        let limits = self.limits();
+        if !limits.motion || limits.allow_everything() {
             return Ok(());
         }
         let sizes = self.sizes();
-        let resets = self.limits().reset;
-        let found = {
+        let (found, data_in) = {
             let options = Options {
                 patience: PATIENCE,
                 ..Options::default()
             };
             let bus = OpenRings::open(Box::new(&mut *self), &sizes, options)?;
-            let found = read(&bus, resets);
+            let found = match limits.max_speed {
+                Some(_) => read(&bus, limits.reset).map(|found| (found, Vec::new())),
+                None => read_data_in(&bus).map(|data_in| (Vec::new(), data_in)),
+            };
             bus.close();
-            found
+            found?
         };
-        for (axis, found) in found? {
-            self.learn_of(axis, &found);
+        for (axis, found) in found {
+            self.learn_of(axis, |guard, address| guard.learn(address, &found));
+        }
+        for (axis, data_in) in data_in {
+            self.learn_of(axis, |guard, address| {
+                guard.learn_data_in(address, data_in);
+            });
         }
         Ok(())
     }
+}
+
+fn read_data_in(bus: &OpenRings<'_>) -> Result<Vec<(Axis, u8)>, Error> {
+    let axes = bus.axes();
+    let cells = axes.iter().map(|axis| (*axis, ram::DATA_IN, Width::Byte));
+    let words = bus.read_many(cells)?;
+    let bytes = words.into_iter().map(|word| word.to_be_bytes()[1]);
+    Ok(axes.into_iter().zip(bytes).collect())
 }
 
 fn read(bus: &OpenRings<'_>, resets: bool) -> Result<Vec<(Axis, Found)>, Error> {

@@ -364,3 +364,47 @@ fn a_read_that_is_under_way_changes_what_is_written() {
     let forged = vec![vec![0x88, 0x00, 0xC0, 0x8A, 0x20, 0x96]];
     assert_eq!(attack(forged, limits()), denied, "of nobody");
 }
+
+/// ND21 14.10.3: process data are written where `DataIn` points, which may be an output (`AnOut`) or the switch of the monitoring (`Flags2`).
+#[test]
+fn process_data_go_where_they_may() {
+    const AN_OUT: u8 = 0x7C;
+    let motion = Limits {
+        motion: true,
+        ..Limits::default()
+    };
+    let outputs = Limits {
+        outputs: true,
+        ..motion
+    };
+    let data = || vec![0x85, 0xFF, 0x00, 0x40];
+    let denied = |data_in, limits, sent: &[Vec<u8>]| {
+        let left = Left {
+            data_in,
+            ..Left::default()
+        };
+        let mut line = bench(&left, limits);
+        let denied = play(&mut line, &left, sent).0;
+        if denied.is_some() {
+            let why = line.trouble().expect("denied").to_string();
+            assert!(why.contains("write 08 to DataIn first"), "{why}");
+        }
+        denied
+    };
+    let nsoll = byte(ram::DATA_IN, 8);
+    assert_eq!(denied(AN_OUT, motion, &[data()]), Some(0));
+    assert_eq!(denied(AN_OUT, motion, &[nsoll, data()]), None);
+    assert_eq!(denied(AN_OUT, outputs, &[data()]), None);
+    assert_eq!(denied(0x57, outputs, &[data()]), Some(0), "Flags2");
+    assert_eq!(denied(0x08, motion, &[data()]), None);
+    // What was read of it does not hold behind a reset.
+    let resets = Limits {
+        reset: true,
+        ..motion
+    };
+    let left = Left::default();
+    let mut line = bench(&left, resets);
+    assert_eq!(play(&mut line, &left, &[telegram(&[0xDD, 0x21])]).0, None);
+    line.synchronise();
+    assert_eq!(play(&mut line, &left, &[data()]).0, Some(0));
+}
