@@ -22,7 +22,7 @@ pub enum Exit {
     NothingSelected = 4,
     /// Nothing failed, but not everything could be shown.
     Incomplete = 5,
-    /// An interlock tripped; the safe state was reached.
+    /// An interlock tripped, or the longest run was over; the safe state was reached.
     Interlock = 6,
     /// The safe state could not be confirmed.
     NotSafe = 7,
@@ -45,7 +45,7 @@ Exit codes:
   4  nothing was selected
   5  passed but incomplete: nothing was judged (every scenario was skipped), the run ended early, a scenario
      was inconclusive or flaky, or one was skipped under --require-all
-  6  an interlock of the rig tripped; the safe state was reached
+  6  an interlock of the rig tripped, or its max_run was over; the safe state was reached
   7  the safe state could not be confirmed: look at the machine
   75 another user or process holds the rig
   130 interrupted; the safe state was reached";

@@ -91,7 +91,7 @@ impl QualifiedBench for Live<'_, '_> {
     }
 
     fn over(&mut self) -> bool {
-        over(self.run, self.output)
+        over(self.run)
     }
 
     fn twin(&self, header: &Header) -> Result<Twin, Problems> {

@@ -311,8 +311,8 @@ impl Course for OnRings<'_> {
         }
     }
 
-    fn over(&mut self, output: &mut Output) -> bool {
-        over(&mut self.run, output)
+    fn over(&mut self, _: &mut Output) -> bool {
+        over(&mut self.run)
     }
 }
 
@@ -329,7 +329,7 @@ pub(super) fn course_of(
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut tally = Tally::of_named(&job.named, job.earlier.clone());
     let mut left = entries.iter();
-    for entry in left.by_ref() {
+    while let Some(entry) = left.next() {
         bar.set_message(entry.short_name().to_owned());
         let (name, played) = match course.play(entry, folder.as_deref_mut()) {
             Err(EarlyEnd::Session(error)) => {
@@ -355,7 +355,8 @@ pub(super) fn course_of(
         }
         bar.inc(1);
         course.note(entry, &name, &played, output);
-        if played.shows_an_ill_rig() || course.over(output) {
+        // Behind the last one nothing is cut short.
+        if played.shows_an_ill_rig() || !left.as_slice().is_empty() && course.over(output) {
             break;
         }
     }
@@ -409,13 +410,9 @@ pub(super) fn keep(
 }
 
 /// Whether nothing more can or may be played.
-pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
+pub(crate) fn over(run: &mut Run<'_>) -> bool {
     let session = run.session();
-    if session.overdue() {
-        output.complain("the run reached `max_run` of the rig's file");
-        return true;
-    }
-    session.link().trouble().is_some_and(Trouble::ends_a_run)
+    session.overdue() || session.link().trouble().is_some_and(Trouble::ends_a_run)
 }
 
 /// What a record begins with.

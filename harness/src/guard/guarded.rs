@@ -19,6 +19,12 @@ const KEPT: Span = Span::from_millis(40);
 /// Why a conversation on simulated drives ends that is recorded.
 const RECORD_FULL: &str = "it exchanges more than a capture can hold of one request: ask for less at a time, or end the capture first";
 
+/// The longest wait at a time, in milliseconds.
+const ONE_DAY: u64 = 86_400_000;
+
+/// Why the work ends at its deadline.
+const OVERDUE: &str = "`max_run` of the rig's file is over";
+
 /// Counts what a link has carried.
 type Carried<L> = fn(&L) -> u64;
 
@@ -45,6 +51,8 @@ pub struct Guarded<L> {
     faulty: bool,
     /// Whether the lines are [kept](Line::keep).
     keeps: bool,
+    /// When the longest run is over that the rig's file allows.
+    deadline: Option<std::time::Instant>,
     /// How much the link behind the guard may have carried, and how that is counted; `None` where its record needs no limit.
     most_carried: Option<(u64, Carried<L>)>,
 }
@@ -65,6 +73,7 @@ impl<L: Line> Guarded<L> {
             interrupt: Arc::default(),
             faulty: false,
             keeps: false,
+            deadline: None,
             most_carried: None,
         }
     }
@@ -98,9 +107,44 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Lets any number of pieces pass from now on: nothing may stop the way to a [safe state](super::safe_state).
-    pub fn lift_caps(&mut self) {
+    /// Lets nothing stop the way to a [safe state](super::safe_state): no watch, no deadline, no number of pieces. Trouble from an
+    /// interlock is cleared.
+    pub fn clear_the_way(&mut self) {
+        self.watch = None;
+        self.deadline = None;
         self.gates.iter_mut().for_each(|gate| gate.lift_caps());
+        if matches!(self.trouble, Some(Trouble::Interlock(_))) {
+            self.trouble = None;
+        }
+    }
+
+    /// Ends the work at this time, as an interlock does.
+    pub(crate) fn set_deadline(&mut self, deadline: Option<std::time::Instant>) {
+        self.deadline = deadline;
+    }
+
+    /// Whether the longest run is over; the link is in trouble then.
+    pub(crate) fn is_overdue(&mut self) -> bool {
+        let left = self.time_left();
+        let over = left.is_some_and(|left| left.is_zero());
+        if over && self.trouble.is_none() {
+            self.trouble = Some(Trouble::Interlock(OVERDUE.to_owned()));
+        }
+        over
+    }
+
+    /// The earlier of a time and of the end of the longest run.
+    fn soonest(&self, until: Instant, left: std::time::Duration) -> Instant {
+        let most = u64::try_from(left.as_millis()).unwrap_or(u64::MAX);
+        // What is left may be less than the wait can tell from nothing.
+        let left = Span::from_millis(most.min(ONE_DAY) + 1);
+        until.min(self.inner.now() + left)
+    }
+
+    /// What is left of the longest run, where there is one.
+    fn time_left(&self) -> Option<std::time::Duration> {
+        let now = std::time::Instant::now();
+        Some(self.deadline?.saturating_duration_since(now))
     }
 
     /// The gate of a port, by its type; `None` where the port has none of this type.
@@ -132,13 +176,9 @@ impl<L: Line> Guarded<L> {
         &mut self.inner
     }
 
-    /// Sets the watch that looks at drives in every [pause](Line::pause). Trouble from an interlock is cleared: on the way to the safe
-    /// state there is no watch, and nothing may stop it.
+    /// Sets the watch that looks at drives in every [pause](Line::pause).
     pub fn set_watch(&mut self, watch: Option<Box<dyn Watch>>) {
         self.watch = watch;
-        if matches!(self.trouble, Some(Trouble::Interlock(_))) {
-            self.trouble = None;
-        }
     }
 
     /// Ends the conversation in [trouble](Trouble::Interrupted) once this is set, for a link that does not look at it itself.
@@ -146,11 +186,12 @@ impl<L: Line> Guarded<L> {
         self.interrupt = interrupt;
     }
 
-    /// Runs `act` without the watch: nothing may stop the way to a safe state.
+    /// Runs `act` without the watch and the deadline: nothing may stop the way to a safe state.
     pub(crate) fn unwatched<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
-        let watch = self.watch.take();
+        let (watch, deadline) = (self.watch.take(), self.deadline.take());
         let result = act(self);
         self.watch = watch;
+        self.deadline = deadline;
         result
     }
 
@@ -326,6 +367,10 @@ impl<L: Line> Line for Guarded<L> {
         {
             self.trouble = Some(Trouble::Denied(RECORD_FULL.to_owned()));
         }
+        let until = match self.time_left() {
+            Some(left) if !self.is_overdue() => self.soonest(until, left),
+            _ => until,
+        };
         self.trouble != Some(Trouble::Interrupted) && self.inner.wait(until)
     }
 

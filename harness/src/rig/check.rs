@@ -14,7 +14,7 @@ use crate::scenario::source::Source;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use toml::Spanned;
 use toml::de::DeTable;
 
@@ -90,6 +90,12 @@ impl Rig {
     pub(crate) fn examinations(&self) -> Option<u8> {
         let wanted = self.file.health.between || !self.file.interlock.is_empty();
         wanted.then_some(self.file.health.attempts)
+    }
+
+    /// When the longest run is over that its file allows, for one that started at this time.
+    pub(crate) fn deadline(&self, started: Instant) -> Option<Instant> {
+        let longest = self.file.limits.max_run.as_ref()?;
+        started.checked_add(longest.0)
     }
 
     /// Whether its drives are simulated in the program. Such a rig needs no lock: everyone has a copy.

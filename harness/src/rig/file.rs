@@ -506,7 +506,7 @@ pub struct Limits {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100_000))]
     pub max_bytes_per_second: Option<u32>,
-    /// The longest run; default no limit.
+    /// The longest run; default no limit. Then what is being done ends like by an interlock, with the drives in their safe state.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_run: Option<Time>,
     /// What only benches with `[port.1]` permit.

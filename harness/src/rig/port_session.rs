@@ -73,7 +73,6 @@ pub struct PortSession<D: PortDrives> {
     rig: Rig,
     link: Guarded<Ends>,
     drives: D,
-    started: Instant,
     listen_only: bool,
     /// The drives are as they are to be left.
     ended: bool,
@@ -93,12 +92,12 @@ impl<D: PortDrives> PortSession<D> {
             .port()
             .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
         let taken = take(rig, options)?;
+        let started = Instant::now();
         let (drives, link, locks) = D::open(rig, port, options)?;
         let mut session = Self {
             rig: rig.clone(),
             link,
             drives,
-            started: Instant::now(),
             listen_only: port.listen_only,
             // Nothing has been sent: there is nothing to make safe.
             ended: true,
@@ -121,6 +120,7 @@ impl<D: PortDrives> PortSession<D> {
         session.ended = session.listen_only || rig.is_simulated();
         let watch = session.drives.watch(rig);
         session.link.set_watch(watch);
+        session.link.set_deadline(rig.deadline(started));
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
@@ -187,11 +187,9 @@ impl<D: PortDrives> PortSession<D> {
         &self.link
     }
 
-    /// Whether it has been used for longer than its file allows.
-    #[must_use]
-    pub fn overdue(&self) -> bool {
-        let longest = self.rig.file.limits.max_run.as_ref();
-        longest.is_some_and(|longest| self.started.elapsed() > longest.0)
+    /// Whether it has been used for longer than its file allows; its link is in trouble then.
+    pub fn overdue(&mut self) -> bool {
+        self.link.is_overdue()
     }
 
     /// Whether the link is sound.
@@ -223,7 +221,7 @@ impl<D: PortDrives> PortSession<D> {
 
     /// Makes the link of use again after a signal: for the safe state, and what is set back behind it.
     pub(crate) fn resume(&mut self) {
-        self.link.set_watch(None);
+        self.link.clear_the_way();
         if let Some(ports) = self.link.inner_mut().ports_mut() {
             ports.resume();
         }

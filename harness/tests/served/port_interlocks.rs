@@ -175,3 +175,23 @@ fn a_parameter_of_an_inverter_is_watched() {
         said(&read)
     );
 }
+
+/// The longest run that the rig's file allows ends like an interlock that trips: a scenario in the middle of a wait, and words that are held.
+#[test]
+fn the_longest_run_is_over() {
+    let over = "`max_run` of the rig's file is over";
+    let limit = "max_run = \"1s\"\n";
+    let desk = drives_on_can::Desk::new("slcan", "allow_motion = true\n");
+    add(&desk.path("desk.toml"), limit);
+    let wait = "title long\nsource unitek ex 3\nbus unitek\ndrive 1\n\n> 201 31 CD 0C\nwait 600s\n";
+    std::fs::write(desk.path("long.scn"), wait).expect("room");
+    let run = desk.run("run long.scn --allow-motion");
+    ended(&run, 6, over);
+    ended(&run, 6, drives_on_can::SAFE);
+    let desk = inverters_on_line::Desk::new("tcp", "");
+    add(&desk.path("desk.toml"), limit);
+    let held = "exchange 8 STW=047E then STW=047F HSW=20% --hold --move --rig desk.toml";
+    let held = desk.run(held);
+    ended(&held, 6, over);
+    ended(&held, 6, inverters_on_line::SAFE);
+}

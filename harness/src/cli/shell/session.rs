@@ -119,8 +119,8 @@ impl HeldSession {
                 return Exit::RigError;
             }
             if self.bench.overdue() {
-                told.complain("the session reached `max_run` of the rig's file");
-                return Exit::RigError;
+                // It is told where the rig is given back.
+                return Exit::Interlock;
             }
             match self.inbox.next(patience) {
                 Some(SessionItem::End) => return Exit::Passed,

@@ -150,10 +150,12 @@ impl<B: LineRig> Target<LineTalk<B>> for OnAdapter<'_, B> {
     }
 
     fn over(&mut self) -> Option<String> {
-        if self.session.link().trouble() == Some(&Trouble::Interrupted) {
-            return Some("the run was interrupted".to_owned());
+        // Its link is in trouble then.
+        self.session.overdue();
+        match self.session.link().trouble() {
+            Some(Trouble::Interrupted) => Some("the run was interrupted".to_owned()),
+            Some(Trouble::Interlock(why)) => Some(why.clone()),
+            _ => None,
         }
-        let overdue = self.session.overdue();
-        overdue.then(|| "the rig's file allows no longer run".to_owned())
     }
 }

@@ -100,7 +100,7 @@ pub(crate) trait SegmentRun {
     fn notes(&mut self) -> Vec<String>;
 
     /// Why nothing more is played, in a sentence; `None` if the next scenario can be.
-    fn over(&self) -> Option<String>;
+    fn over(&mut self) -> Option<String>;
 
     /// Why the link carries nothing more.
     fn trouble(&self) -> Option<Trouble>;

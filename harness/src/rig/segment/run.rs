@@ -254,10 +254,10 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
         std::mem::take(&mut self.notes)
     }
 
-    fn over(&self) -> Option<String> {
-        let late = self.session.overdue();
-        let overdue = late.then(|| "the run reached `max_run` of the rig's file".to_owned());
-        self.over.clone().or(overdue)
+    fn over(&mut self) -> Option<String> {
+        // The link is in trouble then, which ends the run.
+        self.session.overdue();
+        self.over.clone()
     }
 
     fn trouble(&self) -> Option<Trouble> {

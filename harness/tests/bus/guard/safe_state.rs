@@ -81,7 +81,7 @@ fn no_cap_stops_the_safe_state() {
             assert!(line.trouble().is_some(), "{limits:?}");
             line.reset_after_denial();
             if lifted {
-                line.lift_caps();
+                line.clear_the_way();
             }
             let state = safe_state(&mut line, &[size(1)], &Standstill::default());
             state == SafeConfirmation::Confirmed(vec![size(1)])

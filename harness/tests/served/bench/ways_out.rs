@@ -303,3 +303,30 @@ fn a_full_disk_is_the_benchs_fault() {
         assert!(text.contains("File too large"), "{text}");
     }
 }
+
+/// The longest run that the rig's file allows ends what is being done, wherever that stands, with the drives in their safe state.
+#[test]
+fn the_longest_run_ends() {
+    let (_served, desk) = desk(true);
+    turn(&desk);
+    edit(&desk, "[limits]\n", "[limits]\nmax_run = \"2s\"\n");
+    let scenario = desk.path("long.scn");
+    let name = scenario.to_str().expect("a name");
+    let text = "title long\nring 2\nread-byte 0 nist\nwait 600s\nread-byte 0 nist\n";
+    std::fs::write(&scenario, text).expect("room");
+    let kept = desk.path("kept");
+    let folder = kept.to_str().expect("a name");
+    for arguments in [
+        &["run", name][..],
+        &["run", name, "9.2-synco", "--evidence", folder],
+        &["watch", "0", "nist", "--every", "100ms"],
+    ] {
+        let output = desk.run(arguments);
+        ended(&output, 6, "`max_run` of the rig's file is over");
+        ended(&output, 6, SAFE);
+    }
+    let program = env!("CARGO_BIN_EXE_drivebench");
+    let verified = Command::new(program).args(["verify", folder]).output();
+    let verified = verified.expect("the program");
+    assert_eq!(verified.status.code(), Some(5), "incomplete");
+}

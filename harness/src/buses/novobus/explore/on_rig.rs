@@ -291,9 +291,8 @@ impl Target for OnRig<'_, '_> {
 
     fn over(&mut self) -> Option<String> {
         let session = self.run.session();
-        if session.overdue() {
-            return Some("the run reached `max_run` of the rig's file".to_owned());
-        }
+        // Its link is in trouble then.
+        session.overdue();
         match session.link().trouble() {
             None | Some(Trouble::Denied(_)) => None,
             Some(trouble) => Some(trouble.to_string()),

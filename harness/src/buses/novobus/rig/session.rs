@@ -39,7 +39,6 @@ pub struct Session {
     rig: Rig,
     link: Guarded<Ends>,
     rings: Vec<RingSize>,
-    started: Instant,
     allow_motion: bool,
     ill_as_well: bool,
     ended: bool,
@@ -146,11 +145,11 @@ impl Session {
             .rings()
             .filter_map(|(_, ring)| RingSize::new(ring.drives.into()).ok())
             .collect();
+        let started = Instant::now();
         let mut session = Self {
             rig: rig.clone(),
             link: Guarded::new(opened.ends, limits(rig, options.allow_motion)),
             rings,
-            started: Instant::now(),
             allow_motion: options.allow_motion,
             ill_as_well: options.ill_as_well,
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
@@ -184,6 +183,7 @@ impl Session {
         session.ended = rig.is_simulated();
         let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
         session.link.set_watch(watch);
+        session.link.set_deadline(rig.deadline(started));
         session.look_at_interlocks();
         session.around.used();
         session.watchdog = session.watched(options.alarm.clone())?;
@@ -262,11 +262,9 @@ impl Session {
         self.link.inner_mut().ports_mut()
     }
 
-    /// Whether it has been used for longer than its file allows.
-    #[must_use]
-    pub fn overdue(&self) -> bool {
-        let longest = self.rig.file.limits.max_run.as_ref();
-        longest.is_some_and(|longest| self.started.elapsed() > longest.0)
+    /// Whether it has been used for longer than its file allows; its link is in trouble then.
+    pub fn overdue(&mut self) -> bool {
+        self.link.is_overdue()
     }
 
     /// Listens before anything is sent: a bench must not disturb another program's conversation. Returns whether drives have missed their
@@ -535,15 +533,13 @@ impl Session {
         if std::mem::replace(&mut self.ended, true) && !self.rig.is_simulated() {
             return end;
         }
-        // On the way to the safe state nothing may stop it.
-        self.link.set_watch(None);
+        self.link.clear_the_way();
         if !self.rig.is_simulated() {
             if let Some(ports) = self.link.inner_mut().ports_mut() {
                 ports.resume();
             }
             self.link.begin();
             self.link.reset_after_denial();
-            self.link.lift_caps();
             let wanted = self.rig.file.safe_state.clone();
             let standing = standing(&wanted);
             if !standing.order.is_empty() {
