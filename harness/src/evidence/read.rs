@@ -72,12 +72,17 @@ fn parse(bytes: &[u8]) -> Result<RecordLine, (usize, String)> {
         let byte = bytes.get(at).copied().unwrap_or(0);
         (at + 1, format!("this is not UTF-8: {byte:02X} stands here"))
     })?;
-    serde_json::from_str::<RecordLine>(text.trim_end_matches('\n')).map_err(|error| {
+    let text = text.strip_suffix('\n').unwrap_or(text);
+    let line = serde_json::from_str::<RecordLine>(text).map_err(|error| {
         let message = error.to_string();
         // The place is reported separately.
         let message = message.split(" at line ").next().unwrap_or_default();
         (error.column(), message.to_owned())
-    })
+    })?;
+    match text.ends_with('\r') {
+        true => Err((text.len(), "a CR stands at the end of the line".to_owned())),
+        false => Ok(line),
+    }
 }
 
 /// What stood in front of a line.
@@ -86,6 +91,8 @@ struct Order {
     drives: Vec<u8>,
     begun: bool,
     scenario: bool,
+    /// The attempt has ended in trouble.
+    trouble: bool,
     verdict: bool,
     ended: bool,
 }
@@ -113,7 +120,7 @@ impl Order {
                 in_time(Span::from_units(*tolerance))
             }
             RecordLine::Scenario { attempt, .. } => {
-                (self.scenario, self.verdict) = (true, false);
+                (self.scenario, self.trouble, self.verdict) = (true, false, false);
                 match attempt {
                     0 => Err("attempts are counted from 1".to_owned()),
                     _ => Ok(()),
@@ -164,7 +171,7 @@ impl Order {
         Ok(())
     }
 
-    fn event(&self, event: &LinkEvent) -> Result<(), String> {
+    fn event(&mut self, event: &LinkEvent) -> Result<(), String> {
         let (ring, at) = match event {
             LinkEvent::Begin(at) => (0, *at),
             LinkEvent::Look(look) => {
@@ -179,7 +186,13 @@ impl Order {
             | LinkEvent::Fault(ring, at, ..)
             | LinkEvent::Probe(ring, at, ..) => (*ring, *at),
             LinkEvent::Tapped(ring, _, at, _) => (*ring, *at),
-            LinkEvent::Step(_) | LinkEvent::Trouble(_) => return Ok(()),
+            LinkEvent::Step(_) => return Ok(()),
+            LinkEvent::Trouble(_) => {
+                return match std::mem::replace(&mut self.trouble, true) {
+                    true => Err("the attempt is in trouble already".to_owned()),
+                    false => Ok(()),
+                };
+            }
         };
         let Some(drives) = self.drives.get(ring) else {
             return Err(format!("the bench has no ring {}", ring + 1));

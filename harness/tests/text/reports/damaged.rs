@@ -106,6 +106,12 @@ fn every_mistake_has_its_place() {
             words,
         );
     }
+    let lost = "{\"kind\":\"trouble\",\"cause\":\"lost\",\"text\":\"gone\"}\n";
+    let twice = format!("{begun}{lost}{lost}");
+    let second = begun.len() + lost.len();
+    at(twice.as_bytes(), 4, 1, second, "in trouble already");
+    let crlf = text.replacen('\n', "\r\n", 1);
+    at(crlf.as_bytes(), 1, first, first - 1, "CR");
     let huge = format!("{begun}{{\"kind\":\"begin\",\"t\":99999999999999999999999}}\n");
     assert_eq!(error(huge.as_bytes()).line, 3);
     let deep = format!("{begun}{}\n", "[".repeat(100_000));
