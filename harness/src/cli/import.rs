@@ -317,6 +317,10 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     let (Some(left), Some(right)) = (left, right) else {
         return Ok(Exit::Usage);
     };
+    if is_silent(&left) && is_silent(&right) {
+        output.complain("nothing was compared: no byte and no frame is on either side");
+        return Ok(Exit::Incomplete);
+    }
     let names = [title(&arguments.left), title(&arguments.right)];
     let traces = [&left.traces[..], &right.traces[..]];
     let shown = [&names[0][..], &names[1]];
@@ -356,6 +360,12 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     } else {
         Exit::Failed
     })
+}
+
+/// Whether nothing was carried.
+fn is_silent(capture: &Capture) -> bool {
+    let mut channels = capture.traces.iter().flat_map(|trace| &trace.channels);
+    channels.all(|channel| channel.octets().is_empty() && channel.frames().is_empty())
 }
 
 /// A capture, or a scenario that is played.

@@ -93,6 +93,7 @@ impl Comparer<'_> {
         let tail = conversation.end - self.exactness.tolerance;
         let rows = Rows {
             ring,
+            before,
             size,
             roles: &roles,
             sent: &answered,
@@ -265,6 +266,7 @@ impl Comparer<'_> {
         self.note_write(ring, rows, index);
         match (same, wanted_good == found_good) {
             (true, true) => {
+                let index = rows.before + index;
                 self.time((ring, index), role, step, ((due, wanted), (at, found)));
                 None
             }

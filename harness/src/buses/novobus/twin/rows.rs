@@ -16,6 +16,8 @@ const LONGEST_ANSWER: usize = 6;
 /// What a ring sent back, beside what its twin received.
 pub(super) struct Rows<'a> {
     pub(super) ring: usize,
+    /// How many bytes were received in front of the first.
+    pub(super) before: usize,
     pub(super) size: RingSize,
     /// What each byte is for, as far as that is known.
     pub(super) roles: &'a [Role],
