@@ -372,7 +372,7 @@ impl Opened {
                 "the clock of the computer: times fit the rate of the line and each other, but could be others by as much",
             );
             all.push(
-                "which faults on links never happened, line errors without their bytes, bytes on inner links, why a port was lost, and the safe state",
+                "which faults on links never happened, line errors without their bytes, bytes on inner links, whether a port had more to send, why one was lost, and the safe state",
             );
         }
         if header.qualified && !header.simulated {
