@@ -37,6 +37,12 @@ impl RingSize {
         self.0 - 1
     }
 
+    /// The lowest address byte that means a drive: that of drive 0 (ND21 9.3).
+    #[must_use]
+    pub const fn lowest_address(self) -> u8 {
+        0_u8.wrapping_sub(self.0)
+    }
+
     /// The address byte that the master sends to drive `drive`: k-N mod 256 (ND21 9.3).
     ///
     /// # Errors

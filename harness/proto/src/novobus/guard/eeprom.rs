@@ -12,8 +12,8 @@ pub(super) struct EepromBuffer {
     bytes: [Option<u8>; 2],
     /// A read may be under way.
     reading: bool,
-    /// Answers on their way before the first one that tells of this read.
-    earlier: u32,
+    /// How many reads were begun.
+    reads: u32,
 }
 
 impl EepromBuffer {
@@ -22,9 +22,9 @@ impl EepromBuffer {
         self.bytes
     }
 
-    /// Whether a read may be under way.
-    pub(super) const fn reading(&self) -> bool {
-        self.reading
+    /// How many reads were begun.
+    pub(super) const fn reads(&self) -> u32 {
+        self.reads
     }
 
     /// A byte was written, or is not known any more.
@@ -38,31 +38,14 @@ impl EepromBuffer {
     pub(super) fn read(&mut self) {
         self.forget();
         self.reading = true;
-        self.earlier = self.earlier.saturating_add(1);
+        self.reads = self.reads.wrapping_add(1);
     }
 
-    /// A read was sent of a cell whose answer cannot be told from one of `EEPROMcontrol`: an answer has half the address (10.1).
-    pub(super) fn read_alike(&mut self) {
-        if self.reading {
-            self.earlier = self.earlier.saturating_add(1);
-        }
-    }
-
-    /// The answer to 81 has come.
-    pub(super) fn read_answered(&mut self) {
-        self.earlier = self.earlier.saturating_sub(1);
-    }
-
-    /// `EEPROMcontrol` was read, and held this.
-    pub(super) fn control(&mut self, control: u8) {
-        if self.earlier == 0 && control & READ != 0 {
+    /// `EEPROMcontrol` held this when it was read behind this number of reads.
+    pub(super) fn control(&mut self, reads: u32, control: u8) {
+        if reads == self.reads && control & READ != 0 {
             self.reading = false;
         }
-    }
-
-    /// A check sequence was sent; answers in front of it do not count any more.
-    pub(super) fn recovered(&mut self) {
-        self.earlier = 0;
     }
 
     /// What was written is not known any more.

@@ -192,8 +192,6 @@ fn of_ps_status(change: Change) -> Effect {
 
 /// What makes the EEPROM controller read a byte (14.10.5.1).
 const EEPROM_READ: u8 = 0x81;
-/// The byte of the address of `EEPROMcontrol` that is in the answer to a read of it (10.1).
-const EEPROM_CONTROL_LOW: u8 = (ram::EEPROM_CONTROL & 0xFF) as u8;
 
 /// A command to the EEPROM controller (14.10.5).
 fn of_eeprom(command: u8, known: &Known) -> Effect {
@@ -235,27 +233,6 @@ fn note_byte(address: u16, change: Change, known: &mut Known) {
         (ram::EEPROM_CONTROL, Change::Set(EEPROM_READ)) => known.eeprom.read(),
         _ => {}
     }
-}
-
-/// What is known of a drive behind an answer of it, the checking byte left out.
-pub(super) fn note_answer(answer: &[u8], known: &mut Known) {
-    match *answer {
-        [0xC0, EEPROM_CONTROL_LOW, control] => known.eeprom.control(control),
-        // The answer to a write has the bytes of the write (10.2).
-        _ => {
-            let act = DriveAct::of(answer).filter(|act| !matches!(act, DriveAct::Read(_)));
-            for change in act.into_iter().flat_map(DriveAct::changes).flatten() {
-                if matches!(change, (ram::EEPROM_CONTROL, Change::Set(EEPROM_READ))) {
-                    known.eeprom.read_answered();
-                }
-            }
-        }
-    }
-}
-
-/// Whether the answer to a read of this cell looks like one of `EEPROMcontrol`, which it is not.
-const fn alike(address: u16) -> bool {
-    address & 0xFF == ram::EEPROM_CONTROL & 0xFF && address != ram::EEPROM_CONTROL
 }
 
 impl DriveAct {
@@ -430,10 +407,8 @@ impl DriveAct {
         for (address, change) in self.changes().into_iter().flatten() {
             note_byte(address, change, known);
         }
-        match self {
-            Self::Reset => known.reset(),
-            Self::Read(address) if alike(address) => known.eeprom.read_alike(),
-            _ => {}
+        if self == Self::Reset {
+            known.reset();
         }
     }
 

@@ -1,8 +1,9 @@
 //! The guard itself: takes bytes and permits or denies each one.
 
 use super::FIRST_ADDRESS;
+use super::asked::Asked;
 use super::denial::{Cause, Denial};
-use super::effect::{DriveAct, note_answer};
+use super::effect::DriveAct;
 use super::half::{Half, length};
 use super::known::{Found, Known};
 use super::limits::Limits;
@@ -32,6 +33,7 @@ pub struct Guard {
     /// What is known of each drive, by the address byte that means it.
     known: Box<[Known; 256]>,
     listener: Listener,
+    asked: Asked,
     /// The last address byte, counted up by "next"; `None` where no short address is valid.
     kept: Option<u8>,
     /// The last bytes, and the last ones without PAUSE, which drives swallow.
@@ -105,6 +107,7 @@ impl Guard {
             halves: Box::new([Half::default(); 256]),
             known: Box::new([Known::default(); 256]),
             listener: Listener::new(),
+            asked: Asked::default(),
             kept: None,
             tails: [Tail::default(); 2],
             zeros: 0,
@@ -118,21 +121,36 @@ impl Guard {
     /// for no physical ring.
     pub fn assume_fresh(&mut self) {
         self.state = State::Sync;
-        self.listener.start();
+        self.listener.start(None);
     }
 
     /// Takes notice of a byte that came back.
     pub fn hear(&mut self, received: Received) {
         if let Some((key, answer)) = self.listener.hear(received, self.ring) {
-            note_answer(answer.sent(), &mut self.known[usize::from(key)]);
+            let known = (&mut self.known[usize::from(key)], &self.limits);
+            if !self.asked.answered(key, answer.sent(), known) {
+                self.listener.lose();
+            }
         }
     }
 
-    /// A conversation begins: what is on its way is not heard.
+    /// A conversation begins: nothing is on its way, or it is not heard.
     pub fn begin(&mut self) {
-        match self.at_rest() && !self.known.iter().any(Known::reads_eeprom) {
-            true => self.listener.start(),
+        self.asked.clear();
+        match self.at_rest() {
+            true => self.listener.start(self.kept),
             false => self.listener.lose(),
+        }
+    }
+
+    /// Notes a command that its drive executes, and will answer.
+    fn note(&mut self, key: u8, act: DriveAct) {
+        let known = &mut self.known[usize::from(key)];
+        act.note(known);
+        let is_there = key >= self.ring.lowest_address();
+        if is_there && !self.asked.sent(key, act, known) {
+            self.asked.clear();
+            self.listener.lose();
         }
     }
 
@@ -222,6 +240,7 @@ impl Guard {
     /// The drives may be in any state from now on: bytes were changed on their way, or a drive was switched on.
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());
+        self.listener.lose();
         self.kept = None;
         self.doubt_commands();
     }
@@ -341,8 +360,6 @@ impl Guard {
         if next.recovered {
             self.halves.fill(Half::default());
             self.kept = None;
-            self.listener.recovered();
-            self.known.iter_mut().for_each(Known::recovered);
         }
         if let Some((key, half)) = next.half {
             self.halves[usize::from(key)] = half;
@@ -351,7 +368,7 @@ impl Guard {
             self.kept = kept;
         }
         if let Some((key, act)) = next.act {
-            act.note(&mut self.known[usize::from(key)]);
+            self.note(key, act);
         }
         let certain = !matches!(self.state, State::Doubt(_));
         self.state = match (self.state, next.state) {
@@ -372,6 +389,7 @@ impl Guard {
             (_, state) => state,
         };
         if certain && matches!(self.state, State::Doubt(_)) {
+            self.listener.lose();
             self.doubt_commands();
         }
     }

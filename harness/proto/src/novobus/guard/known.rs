@@ -228,11 +228,6 @@ impl Known {
         self.range
     }
 
-    /// Whether its EEPROM controller may be reading a byte.
-    pub(super) const fn reads_eeprom(&self) -> bool {
-        self.eeprom.reading()
-    }
-
     /// Takes in values that were read from a drive; earlier knowledge is dropped.
     pub(super) fn learn(&mut self, found: &Found, limits: &Limits) {
         let own = found.configuration;
@@ -281,11 +276,6 @@ impl Known {
             ..Self::default()
         };
         self.eeprom.forget();
-    }
-
-    /// A check sequence was sent.
-    pub(super) fn recovered(&mut self) {
-        self.eeprom.recovered();
     }
 
     /// A doubt: what was written may not have been executed.

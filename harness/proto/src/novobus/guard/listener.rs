@@ -1,16 +1,15 @@
-//! What comes back from a ring, read as far as the guard must know what drives have answered (ND21 9.1 to 9.8).
+//! What comes back from a ring, read as far as the guard must know what drives have answered (ND21 9.1 to 9.6).
 
-use super::FIRST_ADDRESS;
 use super::half::{Half, length};
 use crate::line::Received;
 use crate::novobus::address::RingSize;
-use crate::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use crate::novobus::checksum::Checksum;
 use crate::novobus::sync::{Addressing, SyncByte, TelegramHeader};
 use alloc::boxed::Box;
 
-/// Reads answers. Behind anything that it does not understand it reads none before a check sequence, so that no byte is taken for an
-/// answer that is none.
+/// Reads answers from the begin of a conversation on, where every drive waits for a sync byte and nothing is on its way. Behind anything
+/// that it does not understand it reads none before the next conversation: with bytes chosen for it, it could be brought to read telegrams
+/// from their middle on, and take a byte for an answer that is none.
 #[derive(Clone, Debug)]
 pub(super) struct Listener {
     stage: Stage,
@@ -18,9 +17,6 @@ pub(super) struct Listener {
     kept: Option<u8>,
     /// Answers received in part, by the address byte that means their drive.
     halves: Box<[Half; 256]>,
-    sequence: SequenceWatch,
-    /// Check sequences that were sent, behind which drives wait for a sync byte, and have not come round.
-    awaited: u32,
 }
 
 /// What the next byte is.
@@ -38,55 +34,53 @@ enum Stage {
 }
 
 impl Listener {
-    /// One that waits for a check sequence.
+    /// One that reads nothing yet.
     pub(super) fn new() -> Self {
         Self {
             stage: Stage::Lost,
             kept: None,
             halves: Box::new([Half::default(); 256]),
-            sequence: SequenceWatch::default(),
-            awaited: 0,
         }
     }
 
-    /// Every drive waits for a sync byte, and nothing is on its way.
-    pub(super) fn start(&mut self) {
+    /// Every drive waits for a sync byte, and nothing is on its way; `kept` is what a short address goes on from.
+    pub(super) fn start(&mut self, kept: Option<u8>) {
         *self = Self {
             stage: Stage::Sync,
+            kept,
             ..Self::new()
         };
     }
 
-    /// Bytes may be missing.
+    /// Nothing is read before the next conversation.
     pub(super) fn lose(&mut self) {
         self.stage = Stage::Lost;
-        self.sequence = SequenceWatch::default();
-    }
-
-    /// A check sequence was sent.
-    pub(super) fn recovered(&mut self) {
-        self.lose();
-        self.awaited = self.awaited.saturating_add(1);
     }
 
     /// Takes a byte. Returns the answer that it completes, without its checking byte, and the address byte that was sent to its drive.
     pub(super) fn hear(&mut self, received: Received, ring: RingSize) -> Option<(u8, Half)> {
-        let Received { byte, error } = received;
-        if self.stage == Stage::Lost {
-            self.seek(byte, error.is_none());
-            return None;
+        match self.read(received, ring) {
+            Ok((stage, answer)) => {
+                self.stage = stage;
+                answer
+            }
+            Err(NotUnderstood) => {
+                self.lose();
+                None
+            }
         }
-        if error.is_some() {
-            self.lose();
-            return None;
-        }
-        let stage = self.stage;
-        let (next, answer) = match stage {
-            Stage::Lost => (Some(Stage::Lost), None),
-            Stage::Sync => (self.sync_byte(byte), None),
+    }
+
+    fn read(&mut self, received: Received, ring: RingSize) -> Result<Read, NotUnderstood> {
+        let Received { byte, error: None } = received else {
+            return Err(NotUnderstood);
+        };
+        Ok(match self.stage {
+            Stage::Lost => (Stage::Lost, None),
+            Stage::Sync => (self.sync_byte(byte)?, None),
             Stage::Address(header) => {
                 let address = byte.wrapping_sub(ring.drives());
-                (Some(self.addressed(header, address)), None)
+                (self.addressed(header, address), None)
             }
             Stage::Net {
                 address,
@@ -94,8 +88,9 @@ impl Listener {
                 process,
             } => {
                 let answer = match process {
-                    0 if address >= FIRST_ADDRESS => self.parameter(address, byte),
-                    _ => Ok(None),
+                    // What no drive answers comes back as it was sent (8.4, 9.3).
+                    0 if address >= ring.lowest_address() => self.parameter(address, byte)?,
+                    _ => None,
                 };
                 let next = match left {
                     1 => Stage::Sync,
@@ -105,39 +100,27 @@ impl Listener {
                         process: process.saturating_sub(1),
                     },
                 };
-                (answer.is_ok().then_some(next), answer.ok().flatten())
+                (next, answer)
             }
+        })
+    }
+
+    /// ND21 9.2.
+    fn sync_byte(&mut self, byte: u8) -> Result<Stage, NotUnderstood> {
+        let Ok(read) = SyncByte::decode(byte) else {
+            return Err(NotUnderstood);
         };
-        match next {
-            Some(next) => self.stage = next,
-            None => self.lose(),
-        }
-        answer
-    }
-
-    /// Waits for the last of the check sequences that were sent.
-    fn seek(&mut self, byte: u8, good: bool) {
-        if self.sequence.see(byte, good) == SequenceProgress::Complete && self.awaited > 0 {
-            self.awaited -= 1;
-            if self.awaited == 0 {
-                self.start();
-            }
-        }
-    }
-
-    /// ND21 9.2. `None`: no drive sends that, if all are as they should be.
-    fn sync_byte(&mut self, byte: u8) -> Option<Stage> {
-        let SyncByte::Telegram(header) = SyncByte::decode(byte).ok()? else {
-            return Some(Stage::Sync);
+        let SyncByte::Telegram(header) = read else {
+            return Ok(Stage::Sync);
         };
         let address = match (header.addressing(), self.kept) {
-            (Addressing::AddressFollows, _) => return Some(Stage::Address(header)),
+            (Addressing::AddressFollows, _) => return Ok(Stage::Address(header)),
             (Addressing::SameDrive, Some(kept)) => kept,
             (Addressing::NextDrive, Some(kept)) => kept.wrapping_add(1),
-            (_, None) if header.net_length() == 0 => return Some(Stage::Sync),
-            (_, None) => return None,
+            (_, None) if header.net_length() == 0 => return Ok(Stage::Sync),
+            (_, None) => return Err(NotUnderstood),
         };
-        Some(self.addressed(header, address))
+        Ok(self.addressed(header, address))
     }
 
     /// The telegram of this drive.
@@ -154,24 +137,26 @@ impl Listener {
     }
 
     /// ND21 9.5, 9.6, chapter 10: an answer begins with the command byte and is as long as its command.
-    fn parameter(&mut self, address: u8, byte: u8) -> Result<Option<(u8, Half)>, NoAnswer> {
+    fn parameter(&mut self, address: u8, byte: u8) -> Result<Option<(u8, Half)>, NotUnderstood> {
         let half = self.halves[usize::from(address)];
         let sent = half.sent();
         let code = sent.first().copied().unwrap_or(byte);
-        let length = length(code).ok_or(NoAnswer)?;
+        let length = length(code).ok_or(NotUnderstood)?;
         if sent.len() < length {
             self.halves[usize::from(address)] = half.with(byte);
             return Ok(None);
         }
         self.halves[usize::from(address)] = Half::default();
-        match code {
-            // It may have no checking byte (10.1), and nothing is learnt from it.
-            0xC7 => Ok(None),
-            _ if Checksum::over(sent).minus() == byte => Ok(Some((address, half))),
-            _ => Err(NoAnswer),
+        // A ReadLong may have no checking byte (10.1).
+        match code == 0xC7 || Checksum::over(sent).minus() == byte {
+            true => Ok(Some((address, half))),
+            false => Err(NotUnderstood),
         }
     }
 }
 
-/// A byte that is no part of an answer.
-struct NoAnswer;
+/// What comes next, and an answer that is complete.
+type Read = (Stage, Option<(u8, Half)>);
+
+/// A byte that does not come where every drive does as it should.
+struct NotUnderstood;

@@ -33,8 +33,8 @@
 //! Process data are written where `DataIn` (FF32) points (14.10.3). Unless everything is allowed, they pass if the guard knows that this is a cell
 //! in which any word may be written.
 //!
-//! What comes back is read for one thing only (`listener`): whether the EEPROM controller has done with a read, which puts a byte over the
-//! address that the next write would take (14.10.5.2).
+//! What comes back is read for two things only (`listener`): what `DataIn` holds, and whether the EEPROM controller has done with a read, which
+//! puts a byte over the address that the next write would take (14.10.5.2).
 //!
 //! The guard cannot protect against these:
 //!
@@ -46,6 +46,7 @@
 //! * Actions of the drive itself: by its switches, its cycle control, its EEPROM after power-up. The guard judges only the bus.
 //! * A regulator that overshoots the nominal speed.
 
+mod asked;
 mod denial;
 mod eeprom;
 mod effect;

@@ -112,8 +112,8 @@ pub(super) fn of_stored(address: Option<u8>) -> Pace {
     let Some(address) = address else {
         return Faster(
             "14.10.5.3",
-            "it is not known which cell of the EEPROM is meant: behind a ReadByte (81), read EEPROMcontrol until its bit 5 is 1, and \
-             then write EEPROMbuffer",
+            "it is not known which cell of the EEPROM is meant: behind a ReadByte (81), read EEPROMcontrol until its bit 5 is 1, before \
+             any disturbance, and then write EEPROMbuffer",
         );
     };
     match address {

@@ -39,6 +39,8 @@ pub struct Session {
     rig: Rig,
     link: Guarded<Ends>,
     rings: Vec<RingSize>,
+    /// When the longest run is over.
+    deadline: Option<Instant>,
     allow_motion: bool,
     ill_as_well: bool,
     ended: bool,
@@ -145,11 +147,11 @@ impl Session {
             .rings()
             .filter_map(|(_, ring)| RingSize::new(ring.drives.into()).ok())
             .collect();
-        let started = Instant::now();
         let mut session = Self {
             rig: rig.clone(),
             link: Guarded::new(opened.ends, limits(rig, options.allow_motion)),
             rings,
+            deadline: rig.deadline(Instant::now()),
             allow_motion: options.allow_motion,
             ill_as_well: options.ill_as_well,
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
@@ -183,7 +185,7 @@ impl Session {
         session.ended = rig.is_simulated();
         let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
         session.link.set_watch(watch);
-        session.link.set_deadline(rig.deadline(started));
+        session.link.set_deadline(session.deadline);
         session.look_at_interlocks();
         session.around.used();
         session.watchdog = session.watched(options.alarm.clone())?;
@@ -262,9 +264,11 @@ impl Session {
         self.link.inner_mut().ports_mut()
     }
 
-    /// Whether it has been used for longer than its file allows; its link is in trouble then.
-    pub fn overdue(&mut self) -> bool {
-        self.link.is_overdue()
+    /// Whether it has been used for longer than its file allows.
+    #[must_use]
+    pub fn overdue(&self) -> bool {
+        let now = Instant::now();
+        self.deadline.is_some_and(|deadline| deadline <= now)
     }
 
     /// Listens before anything is sent: a bench must not disturb another program's conversation. Returns whether drives have missed their
@@ -470,6 +474,7 @@ impl Session {
     /// Learns how fast the drives would turn, for `max_speed`. What is not learnt is denied when it is needed, with its cell, and a
     /// lost link is its own trouble.
     fn learn(&mut self) {
+        self.link.begin();
         let _unlearnt = self.link.learn();
         self.link.begin();
     }

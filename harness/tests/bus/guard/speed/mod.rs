@@ -15,6 +15,7 @@ use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::nd21::{ee, ram};
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, Stimulus, factory};
@@ -134,7 +135,9 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
     link.begin();
     let mut line = Guarded::new(link, limits);
     line.synchronise();
+    line.begin();
     line.learn().expect("learnt");
+    line.begin();
     line
 }
 
@@ -363,6 +366,19 @@ fn a_read_that_is_under_way_changes_what_is_written() {
     assert_eq!(attack(other, limits()), denied, "of another cell"); // To an address that no drive has; it comes back as it was sent.
     let forged = vec![vec![0x88, 0x00, 0xC0, 0x8A, 0x20, 0x96]];
     assert_eq!(attack(forged, limits()), denied, "of nobody");
+    // An answer from before the read, with check sequences around.
+    let poll = telegram(&[0xC0, 0x8A, 0xFD]);
+    let sequences = [
+        &CHECK_SEQUENCE[..17],
+        &[0x80],
+        &CHECK_SEQUENCE[17..],
+        &CHECK_SEQUENCE,
+        &poll,
+        &read(),
+        &CHECK_SEQUENCE,
+    ];
+    let stale = [wait(), vec![sequences.concat()]].concat();
+    assert_eq!(attack(stale, limits()), denied, "before check sequences");
 }
 
 /// ND21 14.10.3: process data are written where `DataIn` points, which may be an output (`AnOut`) or the switch of the monitoring (`Flags2`).
@@ -407,4 +423,10 @@ fn process_data_go_where_they_may() {
     assert_eq!(play(&mut line, &left, &[telegram(&[0xDD, 0x21])]).0, None);
     line.synchronise();
     assert_eq!(play(&mut line, &left, &[data()]).0, Some(0));
+    // Until it is read again.
+    line.reset_after_denial();
+    line.synchronise();
+    line.begin();
+    let read = telegram(&[0xC0, 0x32, 0xFF]);
+    assert_eq!(play(&mut line, &left, &[read, data()]).0, None);
 }
