@@ -23,7 +23,7 @@ const RECORD_FULL: &str = "it exchanges more than a capture can hold of one requ
 const ONE_DAY: u64 = 86_400_000;
 
 /// Why the work ends at its deadline.
-const OVERDUE: &str = "`max_run` of the rig's file is over";
+pub(crate) const OVERDUE: &str = "`max_run` of the rig's file is over";
 
 /// Counts what a link has carried.
 type Carried<L> = fn(&L) -> u64;
@@ -123,28 +123,27 @@ impl<L: Line> Guarded<L> {
         self.deadline = deadline;
     }
 
-    /// Whether the longest run is over; the link is in trouble then.
-    pub(crate) fn is_overdue(&mut self) -> bool {
-        let left = self.time_left();
-        let over = left.is_some_and(|left| left.is_zero());
-        if over && self.trouble.is_none() {
+    /// Ends the work if its deadline is over. A denial, behind which work may go on, weighs less.
+    pub(crate) fn end_if_overdue(&mut self) -> bool {
+        let over = self
+            .deadline
+            .is_some_and(|own| own <= std::time::Instant::now());
+        if over && !self.trouble.as_ref().is_some_and(Trouble::ends_a_run) {
             self.trouble = Some(Trouble::Interlock(OVERDUE.to_owned()));
         }
         over
     }
 
-    /// The earlier of a time and of the end of the longest run.
-    fn soonest(&self, until: Instant, left: std::time::Duration) -> Instant {
+    /// Waits up to the deadline, where that comes first. Behind it a caller looks again.
+    fn wait_until(&mut self, until: Instant) -> bool {
+        let Some(deadline) = self.deadline.filter(|_| self.trouble.is_none()) else {
+            return self.inner.wait(until);
+        };
+        let left = deadline.saturating_duration_since(std::time::Instant::now());
         let most = u64::try_from(left.as_millis()).unwrap_or(u64::MAX);
-        // What is left may be less than the wait can tell from nothing.
-        let left = Span::from_millis(most.min(ONE_DAY) + 1);
-        until.min(self.inner.now() + left)
-    }
-
-    /// What is left of the longest run, where there is one.
-    fn time_left(&self) -> Option<std::time::Duration> {
-        let now = std::time::Instant::now();
-        Some(self.deadline?.saturating_duration_since(now))
+        // Not less than a wait can tell from nothing.
+        let end = self.inner.now() + Span::from_millis(most.min(ONE_DAY) + 1);
+        self.inner.wait(until.min(end)) || end < until
     }
 
     /// The gate of a port, by its type; `None` where the port has none of this type.
@@ -367,11 +366,10 @@ impl<L: Line> Line for Guarded<L> {
         {
             self.trouble = Some(Trouble::Denied(RECORD_FULL.to_owned()));
         }
-        let until = match self.time_left() {
-            Some(left) if !self.is_overdue() => self.soonest(until, left),
-            _ => until,
-        };
-        self.trouble != Some(Trouble::Interrupted) && self.inner.wait(until)
+        if self.trouble.is_none() {
+            self.end_if_overdue();
+        }
+        self.trouble != Some(Trouble::Interrupted) && self.wait_until(until)
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {

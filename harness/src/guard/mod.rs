@@ -18,6 +18,7 @@ pub use crate::buses::rings::guard::{
 };
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
+pub(crate) use guarded::OVERDUE;
 pub use safe::Safe;
 pub use standstill::{Standstill, StandstillStep};
 pub use watch::Watch;

@@ -142,6 +142,11 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         }
     }
 
+    /// The trouble in which the link is stands in the record already.
+    pub(crate) fn trouble_is_told(&mut self) {
+        self.trouble = self.link.trouble().cloned();
+    }
+
     /// Records trouble once, where it shows.
     fn tell(&mut self) {
         if self.trouble.is_none()

@@ -73,6 +73,8 @@ pub struct PortSession<D: PortDrives> {
     rig: Rig,
     link: Guarded<Ends>,
     drives: D,
+    /// When the longest run is over.
+    deadline: Option<Instant>,
     listen_only: bool,
     /// The drives are as they are to be left.
     ended: bool,
@@ -92,12 +94,13 @@ impl<D: PortDrives> PortSession<D> {
             .port()
             .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
         let taken = take(rig, options)?;
-        let started = Instant::now();
+        let deadline = rig.deadline(Instant::now());
         let (drives, link, locks) = D::open(rig, port, options)?;
         let mut session = Self {
             rig: rig.clone(),
             link,
             drives,
+            deadline,
             listen_only: port.listen_only,
             // Nothing has been sent: there is nothing to make safe.
             ended: true,
@@ -120,7 +123,7 @@ impl<D: PortDrives> PortSession<D> {
         session.ended = session.listen_only || rig.is_simulated();
         let watch = session.drives.watch(rig);
         session.link.set_watch(watch);
-        session.link.set_deadline(rig.deadline(started));
+        session.link.set_deadline(session.deadline);
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
@@ -187,9 +190,19 @@ impl<D: PortDrives> PortSession<D> {
         &self.link
     }
 
-    /// Whether it has been used for longer than its file allows; its link is in trouble then.
-    pub fn overdue(&mut self) -> bool {
-        self.link.is_overdue()
+    /// Whether it has been used for longer than its file allows.
+    #[must_use]
+    pub fn overdue(&self) -> bool {
+        let now = Instant::now();
+        self.deadline.is_some_and(|deadline| deadline <= now)
+    }
+
+    /// Does something that is not ended in its middle by the end of the longest run.
+    pub(crate) fn without_deadline<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        self.link.set_deadline(None);
+        let result = act(self);
+        self.link.set_deadline(self.deadline);
+        result
     }
 
     /// Whether the link is sound.

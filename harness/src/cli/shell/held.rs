@@ -72,8 +72,8 @@ pub(crate) trait HeldBench {
     /// Why the link carries nothing.
     fn trouble(&self) -> Option<Trouble>;
 
-    /// Whether the bench has been used for longer than its file allows; its link is in trouble then.
-    fn overdue(&mut self) -> bool;
+    /// Whether the bench has been used for longer than its file allows.
+    fn overdue(&self) -> bool;
 
     /// Makes the link of use again after a denial or a cancelled request.
     ///
@@ -214,8 +214,8 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         self.0.session().guarded().trouble().cloned()
     }
 
-    fn overdue(&mut self) -> bool {
-        self.session().overdue()
+    fn overdue(&self) -> bool {
+        self.0.session().overdue()
     }
 
     fn resume(&mut self) -> Result<(), Failure> {

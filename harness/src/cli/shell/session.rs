@@ -13,6 +13,7 @@ use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::help::command;
 use crate::cli::output::Output;
 use crate::cli::run::play_entry_until;
+use crate::guard::OVERDUE;
 use crate::library::{Entry, sources};
 use crate::link::Trouble;
 use crate::rig::Rig;
@@ -119,7 +120,7 @@ impl HeldSession {
                 return Exit::RigError;
             }
             if self.bench.overdue() {
-                // It is told where the rig is given back.
+                told.complain(OVERDUE);
                 return Exit::Interlock;
             }
             match self.inbox.next(patience) {

@@ -2,6 +2,7 @@
 
 use super::{LineBus, LineTalk, Seen};
 use crate::explore::{ExploreError, Rehearsal, Target, Tried};
+use crate::guard::OVERDUE;
 use crate::link::{Line as _, Link as _, Trouble};
 use crate::rig::Rig;
 use crate::rig::port_session::{PortDrives, PortSession};
@@ -69,6 +70,8 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
     /// # Errors
     /// A drive does not answer.
     pub fn new(session: &'s mut SessionOf<B>, model: B::Setup) -> Result<Self, ExploreError> {
+        // A run ends between two cases.
+        session.link().set_deadline(None);
         Ok(Self {
             kept: B::keep(session)?,
             session,
@@ -150,12 +153,9 @@ impl<B: LineRig> Target<LineTalk<B>> for OnAdapter<'_, B> {
     }
 
     fn over(&mut self) -> Option<String> {
-        // Its link is in trouble then.
-        self.session.overdue();
-        match self.session.link().trouble() {
-            Some(Trouble::Interrupted) => Some("the run was interrupted".to_owned()),
-            Some(Trouble::Interlock(why)) => Some(why.clone()),
-            _ => None,
+        if self.session.link().trouble() == Some(&Trouble::Interrupted) {
+            return Some("the run was interrupted".to_owned());
         }
+        self.session.overdue().then(|| OVERDUE.to_owned())
     }
 }

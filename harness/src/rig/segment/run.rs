@@ -186,7 +186,9 @@ impl<P: PortPlayer> PortRun<P> {
             let safe = self.session.make_safe();
             match safe.confirmed {
                 true => {
-                    let notes = self.player.set_back(own, &mut self.session);
+                    let player = &mut self.player;
+                    let set_back = |session: &mut _| player.set_back(own, session);
+                    let notes = self.session.without_deadline(set_back);
                     self.notes.extend(notes);
                 }
                 false => {
@@ -256,7 +258,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
 
     fn over(&mut self) -> Option<String> {
         // The link is in trouble then, which ends the run.
-        self.session.overdue();
+        self.session.link().end_if_overdue();
         self.over.clone()
     }
 

@@ -237,7 +237,7 @@ impl HeldBench for HeldRings {
         trouble.flatten()
     }
 
-    fn overdue(&mut self) -> bool {
+    fn overdue(&self) -> bool {
         self.rig.with(|session| session.overdue()).unwrap_or(true)
     }
 

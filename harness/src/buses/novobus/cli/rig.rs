@@ -351,7 +351,6 @@ fn give_back(
         .with(|session| session.link().trouble().cloned())
         .flatten();
     let sound = trouble.is_none();
-    let interrupted = trouble == Some(Trouble::Interrupted);
     let (exit, leave) = match result {
         Ok(exit) => (exit, as_what.holds),
         // Impossible requests and missing permissions are refused before anything is done.
@@ -360,7 +359,15 @@ fn give_back(
         }
         Err(failure) => (failure.tell(output), false),
     };
-    let exit = if interrupted { Exit::Interrupted } else { exit };
+    let exit = match trouble {
+        Some(Trouble::Interrupted) => Exit::Interrupted,
+        // It may have shown behind the last call of a command that went well.
+        Some(Trouble::Interlock(why)) if exit != Exit::Interlock => {
+            output.complain(&why);
+            Exit::Interlock
+        }
+        _ => exit,
+    };
     let end = if leave && sound {
         rig.release()
     } else {

@@ -14,7 +14,7 @@ use crate::buses::novobus::twin::SILENCED;
 use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
-use crate::guard::Guarded;
+use crate::guard::{Guarded, OVERDUE};
 use crate::link::{Capability, Lead, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::rig::{Run, examine};
 use crate::scenario::run::start_anew;
@@ -65,6 +65,8 @@ impl<'r, 's> OnRig<'r, 's> {
     /// Its model cannot be made.
     pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
+        // A run ends between two cases.
+        session.link().set_deadline(None);
         let mut rig = session.rig().clone();
         // The setup describes the simulated drives themselves; the model must follow the manual.
         rig.setup = Header::default();
@@ -291,8 +293,9 @@ impl Target for OnRig<'_, '_> {
 
     fn over(&mut self) -> Option<String> {
         let session = self.run.session();
-        // Its link is in trouble then.
-        session.overdue();
+        if session.overdue() {
+            return Some(OVERDUE.to_owned());
+        }
         match session.link().trouble() {
             None | Some(Trouble::Denied(_)) => None,
             Some(trouble) => Some(trouble.to_string()),

@@ -187,7 +187,12 @@ impl<'s> Run<'s> {
         if examined.is_ok() {
             self.session.ask_interlocks();
         }
+        let is_trouble = |event: &LinkEvent| matches!(event, LinkEvent::Trouble(_));
+        let told = both.events.iter().any(is_trouble);
         let mut recording = Recording::new(self.session.link(), &mut both);
+        if told {
+            recording.trouble_is_told();
+        }
         let outcome = examined.map(|()| play_examined(&mut recording, plan, &way));
         let rings = way.rings.len();
         let traces = (0..rings).map(|ring| recording.trace(ring)).collect();
