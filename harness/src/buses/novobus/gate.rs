@@ -29,6 +29,8 @@ pub struct RingGate {
     damaged: BTreeMap<u64, u8>,
     /// Bytes handed on, denied ones not counted: the numbers of the link's own.
     sent: u64,
+    /// A link was cut in this conversation, and is whole again behind it.
+    cut: bool,
 }
 
 /// What is to be done about a fault.
@@ -52,6 +54,7 @@ impl RingGate {
             guard: Guard::new(size, limits),
             damaged: BTreeMap::new(),
             sent: 0,
+            cut: false,
         }
     }
 
@@ -101,6 +104,7 @@ impl RingGate {
                     _ => Verdict::Open,
                 }
             }
+            // What a cut link has lost matters when it is joined again.
             PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => Verdict::Harmless,
             // Bytes are lost on the way: drives that nothing tells of it are out of step.
             PlacedFault::Drive(_, DriveFault::On) | PlacedFault::Link(_, LinkFault::Join)
@@ -160,7 +164,7 @@ impl Gate for RingGate {
             return Ok(());
         }
         match self.verdict(fault, moment, settled) {
-            Verdict::Harmless => {}
+            Verdict::Harmless => self.cut |= matches!(fault, PlacedFault::Link(_, LinkFault::Cut)),
             Verdict::Damages { byte, data } => *self.damaged.entry(byte).or_default() ^= data,
             Verdict::Doubt => {
                 self.guard.doubt();
@@ -186,6 +190,10 @@ impl Gate for RingGate {
     }
 
     fn begin(&mut self) {
+        if std::mem::take(&mut self.cut) {
+            self.guard.doubt();
+            self.guard.forget();
+        }
         self.guard.begin();
         self.sent = 0;
         self.damaged.clear();

@@ -3,6 +3,7 @@
 use super::{axis, bus, guarded, link, size};
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Error, OpenRings, count_drives, recover};
+use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble};
@@ -376,4 +377,36 @@ fn the_corpus_with_everything_allowed() {
     for (name, denied) in corpus(Limits::unlimited()) {
         assert_eq!(denied, None, "{name}");
     }
+}
+
+/// ND21 9.1: a link that was cut is whole again in the next conversation, and drives behind it stand in the middle of a telegram. A part of
+/// what is sent to no drive then is a command to one of them.
+#[test]
+fn a_link_that_was_cut_leaves_drives_in_the_middle_of_a_telegram() {
+    let written = |limits| {
+        let mut line = guarded(3, limits);
+        line.begin();
+        let wait = |line: &mut Guarded<_>| {
+            let end = line.now() + Span::from_millis(50);
+            while line.now() < end && line.wait(end) {}
+        };
+        line.send_octets(0, &[0x8E, 0x02, 0x80, 0x80, 0x80, 0x80, 0x80]);
+        wait(&mut line);
+        line.inject(0, PlacedFault::Link(0, LinkFault::Cut), Moment::Now);
+        line.send_octets(0, &[0x80, 0x80]);
+        wait(&mut line);
+        line.begin();
+        // WriteByte FE20 = 55 to drive 0, behind the two bytes that its telegram lacks.
+        let inside = [0x8E, 0x02, 0x8A, 0xFD, 0x82, 0x55, 0x20, 0xFE, 0xF5];
+        line.send_octets(0, &inside);
+        wait(&mut line);
+        let denied = matches!(line.trouble(), Some(Trouble::Denied(_)));
+        (denied, line.peek(0, 0, 0xFE20) == Some(0x55))
+    };
+    assert_eq!(
+        written(Limits::unlimited()),
+        (false, true),
+        "it is an attack"
+    );
+    assert_eq!(written(Limits::default()), (true, false));
 }
