@@ -341,6 +341,25 @@ fn a_capture_is_read_by_import() {
     }
 }
 
+/// A denial is an answer, and the session goes on, where the limits allow some things and not others.
+#[test]
+fn a_denial_does_not_end_a_session() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = at(&served);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let (rig, _) = text.split_once("[limits]").expect("limits");
+    let limited = format!("{rig}[limits]\nallow_motion = true\n");
+    std::fs::write(&path, limited).expect("room");
+    let mut session = Session::open(&desk, &["--rig", "desk.toml", "--move"]);
+    let denied = session.ask(&json!({"id": 1, "do": "write", "drive": 0, "values": ["AnOut=55"]}));
+    assert_eq!(code_of(&denied), 2, "{denied}");
+    let read = session.ask(&json!({"id": 2, "do": "read", "drive": 0, "cells": ["nist"]}));
+    assert_eq!(read["result"]["values"][0]["unit"], "rpm", "{read}");
+    let (_, output) = session.end();
+    assert_eq!(output.status.code(), Some(0));
+}
+
 /// On a rig with a port, times are those of the day, a scenario leaves a mark, and the end of the session writes the file.
 #[test]
 fn a_capture_of_a_port() {
