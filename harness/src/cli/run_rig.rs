@@ -412,7 +412,7 @@ pub(super) fn keep(
 /// Whether nothing more can or may be played.
 pub(crate) fn over(run: &mut Run<'_>) -> bool {
     let session = run.session();
-    session.link().end_if_overdue();
+    session.end_if_overdue();
     session.link().trouble().is_some_and(Trouble::ends_a_run)
 }
 

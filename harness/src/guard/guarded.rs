@@ -124,14 +124,13 @@ impl<L: Line> Guarded<L> {
     }
 
     /// Ends the work if its deadline is over. A denial, behind which work may go on, weighs less.
-    pub(crate) fn end_if_overdue(&mut self) -> bool {
+    pub(crate) fn end_if_overdue(&mut self) {
         let over = self
             .deadline
             .is_some_and(|own| own <= std::time::Instant::now());
         if over && !self.trouble.as_ref().is_some_and(Trouble::ends_a_run) {
             self.trouble = Some(Trouble::Interlock(OVERDUE.to_owned()));
         }
-        over
     }
 
     /// Waits up to the deadline, where that comes first. Behind it a caller looks again.

@@ -197,6 +197,12 @@ impl<D: PortDrives> PortSession<D> {
         self.deadline.is_some_and(|deadline| deadline <= now)
     }
 
+    /// Ends the work if it has been used for longer than its file allows.
+    pub(crate) fn end_if_overdue(&mut self) {
+        self.link.set_deadline(self.deadline);
+        self.link.end_if_overdue();
+    }
+
     /// Does something that is not ended in its middle by the end of the longest run.
     pub(crate) fn without_deadline<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
         self.link.set_deadline(None);

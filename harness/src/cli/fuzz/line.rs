@@ -109,6 +109,7 @@ fn run<B: LineRig>(
         }
         let how = ("fuzz", arguments.allow_motion, arguments.wait);
         return on_adapter::<B>(&rig, how, output, |target, (scope, setup), output| {
+            target.end_between_cases();
             let about = settings((&name, true), (&scope, setup), run);
             let bounds = bounds_on_ports(arguments);
             explore(arguments, (about, scope), target, &bounds, output)
@@ -193,6 +194,7 @@ fn on_adapter<B: LineRig>(
         Err(error) => Ok(tell(&error, output)),
     };
     let exit = worked.unwrap_or_else(|error| output.unwritable(&error));
+    session.end_if_overdue();
     let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = session.close(matches!(exit, Exit::RigError | Exit::Interlock));
     Ok(tell_end(&end, exit, output))

@@ -51,6 +51,7 @@ pub(crate) fn on_ports(
         }
     };
     leave_clean(&mut session, output);
+    session.end_if_overdue();
     let exit = worked.unwrap_or_else(|error| output.unwritable(&error));
     Ok(give_back(session, exit, output).1)
 }

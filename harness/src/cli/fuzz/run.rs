@@ -223,6 +223,7 @@ fn on_rings(
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
         };
+        target.end_between_cases();
         let about = about(
             arguments,
             (RingSetup::of_ports(rig.rings().count()), true),

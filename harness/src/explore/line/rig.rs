@@ -70,13 +70,16 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
     /// # Errors
     /// A drive does not answer.
     pub fn new(session: &'s mut SessionOf<B>, model: B::Setup) -> Result<Self, ExploreError> {
-        // A run ends between two cases.
-        session.link().set_deadline(None);
         Ok(Self {
             kept: B::keep(session)?,
             session,
             model,
         })
+    }
+
+    /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
+    pub(crate) fn end_between_cases(&mut self) {
+        self.session.link().set_deadline(None);
     }
 
     /// Leaves the drives as they were before, as far as the rig's file permits that. Returns what could not be restored, in sentences.

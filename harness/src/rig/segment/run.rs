@@ -123,6 +123,14 @@ impl<P: PortPlayer> PortRun<P> {
         &mut self.session
     }
 
+    /// Sets back what a scenario has changed.
+    fn set_back(&mut self, own: &P::Own) {
+        let player = &mut self.player;
+        let set_back = |session: &mut _| player.set_back(own, session);
+        let notes = self.session.without_deadline(set_back);
+        self.notes.extend(notes);
+    }
+
     /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed. Returns whether that
     /// was done, or nothing was to do.
     pub(crate) fn clear_up(&mut self) -> bool {
@@ -131,8 +139,7 @@ impl<P: PortPlayer> PortRun<P> {
         };
         let safe = self.session.make_safe().confirmed;
         if safe {
-            let notes = self.player.set_back(&own, &mut self.session);
-            self.notes.extend(notes);
+            self.set_back(&own);
         } else {
             self.unfinished = Some(own);
         }
@@ -185,12 +192,7 @@ impl<P: PortPlayer> PortRun<P> {
         } else if played {
             let safe = self.session.make_safe();
             match safe.confirmed {
-                true => {
-                    let player = &mut self.player;
-                    let set_back = |session: &mut _| player.set_back(own, session);
-                    let notes = self.session.without_deadline(set_back);
-                    self.notes.extend(notes);
-                }
+                true => self.set_back(own),
                 false => {
                     self.unfinished = Some(Arc::clone(own));
                     self.over = Some(format!("after the scenario: {safe}"));
@@ -258,7 +260,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
 
     fn over(&mut self) -> Option<String> {
         // The link is in trouble then, which ends the run.
-        self.session.link().end_if_overdue();
+        self.session.end_if_overdue();
         self.over.clone()
     }
 

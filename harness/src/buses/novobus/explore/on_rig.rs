@@ -65,8 +65,6 @@ impl<'r, 's> OnRig<'r, 's> {
     /// Its model cannot be made.
     pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
-        // A run ends between two cases.
-        session.link().set_deadline(None);
         let mut rig = session.rig().clone();
         // The setup describes the simulated drives themselves; the model must follow the manual.
         rig.setup = Header::default();
@@ -91,6 +89,11 @@ impl<'r, 's> OnRig<'r, 's> {
             stale: true,
             monitors: None,
         })
+    }
+
+    /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
+    pub(crate) fn end_between_cases(&mut self) {
+        self.run.session().link().set_deadline(None);
     }
 
     /// Makes the drives ready, so that earlier bytes have no effect any more.

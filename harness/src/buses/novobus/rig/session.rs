@@ -271,6 +271,12 @@ impl Session {
         self.deadline.is_some_and(|deadline| deadline <= now)
     }
 
+    /// Ends the work if it has been used for longer than its file allows.
+    pub(crate) fn end_if_overdue(&mut self) {
+        self.link.set_deadline(self.deadline);
+        self.link.end_if_overdue();
+    }
+
     /// Listens before anything is sent: a bench must not disturb another program's conversation. Returns whether drives have missed their
     /// master (ND21 9.9).
     fn listen(&mut self) -> Result<bool, SessionError> {
