@@ -43,6 +43,9 @@
 //!   out of step for the rest of a telegram.
 //! * A command that another program left incomplete may be completed by a 01, which a preceding drive in the error mode makes of a zero.
 //!   Process data that it left incomplete end with the next byte of any value (9.4), so with the first zero of the recovery.
+//! * The guard does not count time. A drive that monitors time-outs and sends no zeros behind one (9.9 leaves it open) may take a check sequence that it
+//!   does not pass on. After a silence of 10 ms in the middle of a telegram, or of a check sequence, the drives behind it stand elsewhere than
+//!   the guard believes, until the next check sequence.
 //! * Actions of the drive itself: by its switches, its cycle control, its EEPROM after power-up. The guard judges only the bus.
 //! * A regulator that overshoots the nominal speed.
 
