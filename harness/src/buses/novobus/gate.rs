@@ -104,7 +104,7 @@ impl RingGate {
                     _ => Verdict::Open,
                 }
             }
-            // What a cut link has lost matters when it is joined again.
+            // What a cut link has lost matters when it is joined again, at the latest by the next conversation.
             PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => Verdict::Harmless,
             // Bytes are lost on the way: drives that nothing tells of it are out of step.
             PlacedFault::Drive(_, DriveFault::On) | PlacedFault::Link(_, LinkFault::Join)
@@ -190,9 +190,9 @@ impl Gate for RingGate {
     }
 
     fn begin(&mut self) {
+        // What was read of the drives still holds: they have heard nothing else.
         if std::mem::take(&mut self.cut) {
             self.guard.doubt();
-            self.guard.forget();
         }
         self.guard.begin();
         self.sent = 0;
