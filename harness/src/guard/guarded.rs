@@ -135,14 +135,14 @@ impl<L: Line> Guarded<L> {
 
     /// Waits up to the deadline, where that comes first. Behind it a caller looks again.
     fn wait_until(&mut self, until: Instant) -> bool {
-        let Some(deadline) = self.deadline.filter(|_| self.trouble.is_none()) else {
+        let Some(deadline) = self.deadline.filter(|_| self.trouble().is_none()) else {
             return self.inner.wait(until);
         };
         let left = deadline.saturating_duration_since(std::time::Instant::now());
         let most = u64::try_from(left.as_millis()).unwrap_or(u64::MAX);
         // Not less than a wait can tell from nothing.
         let end = self.inner.now() + Span::from_millis(most.min(ONE_DAY) + 1);
-        self.inner.wait(until.min(end)) || end < until
+        self.inner.wait(until.min(end)) || end < until && self.trouble().is_none()
     }
 
     /// The gate of a port, by its type; `None` where the port has none of this type.
