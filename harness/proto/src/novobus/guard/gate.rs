@@ -3,6 +3,7 @@
 use super::FIRST_ADDRESS;
 use super::asked::Asked;
 use super::denial::{Cause, Denial};
+use super::doubt::Doubt;
 use super::effect::DriveAct;
 use super::half::{Half, length};
 use super::known::{Found, Known};
@@ -12,15 +13,12 @@ use super::stage::Stage;
 use super::tail::Tail;
 use crate::line::Received;
 use crate::novobus::address::RingSize;
-use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
+use crate::novobus::check_sequence::ZEROS;
 use crate::novobus::checksum::Checksum;
 use crate::novobus::error_mode::UPSTREAM_ZEROS;
 use crate::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte, TelegramHeader};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
-
-/// The most bytes in the place of a check sequence, until the next 17 zeros.
-const MOST_FOREIGN: u8 = 8;
 
 /// Decides for each byte whether it may go onto one ring. See the module documentation.
 #[derive(Clone, Debug)]
@@ -60,23 +58,6 @@ enum State {
         left: u8,
         process: Process,
     },
-}
-
-/// What has been done about doubt.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Doubt {
-    /// No drive is in the middle of a telegram.
-    cleared: bool,
-    /// Zeros in a row, up to 17, and not lost by a check sequence behind them.
-    zeros: u8,
-    /// Bytes of the check sequence.
-    matched: u8,
-    /// It began with a bad sync byte, while every drive waited for a sync byte: every drive is in the error mode.
-    in_error_mode: bool,
-    /// Other bytes that may still pass: behind 17 zeros every drive in the error mode waits for the check sequence.
-    foreign: u8,
-    /// It began with `ResetH8`.
-    behind_reset: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -397,7 +378,13 @@ impl Guard {
     /// What follows behind a byte.
     fn follow(&self, byte: u8) -> Result<Next, Cause> {
         match self.state {
-            State::Doubt(doubt) => doubt.follow(byte),
+            State::Doubt(doubt) => Ok(match doubt.follow(byte)? {
+                Some(doubt) => Next::to(State::Doubt(doubt)),
+                None => Next {
+                    recovered: true,
+                    ..Next::to(State::Sync)
+                },
+            }),
             State::Sync => self.sync_byte(byte),
             State::Address(header) => {
                 self.may_have_process_data(header, byte)?;
@@ -569,73 +556,5 @@ fn net(header: TelegramHeader, key: u8) -> State {
                 Process::None
             },
         },
-    }
-}
-
-impl Doubt {
-    /// The same behind this many zeros in a row.
-    fn with_zeros(self, zeros: u8) -> Self {
-        Self {
-            cleared: self.cleared || zeros >= ZEROS,
-            zeros: zeros.min(ZEROS),
-            ..self
-        }
-    }
-
-    fn follow(self, byte: u8) -> Result<Next, Cause> {
-        let next = match byte {
-            0 => {
-                let zeros = (self.zeros + 1).min(ZEROS);
-                // A sequence that breaks off leaves a single zero.
-                let zeros = if self.matched > 0 { 1 } else { zeros };
-                Self {
-                    cleared: self.cleared || zeros == ZEROS,
-                    zeros,
-                    matched: 0,
-                    foreign: match self.in_error_mode && zeros == ZEROS {
-                        true => MOST_FOREIGN,
-                        false => self.foreign,
-                    },
-                    ..self
-                }
-            }
-            _ if !self.cleared => return Err(Cause::of_doubt(self.behind_reset)),
-            SYNCO | PAUSE => Self {
-                zeros: 0,
-                matched: 0,
-                ..self
-            },
-            _ if byte == SEQUENCE[usize::from(self.matched)] => {
-                let matched = self.matched + 1;
-                if usize::from(matched) < SEQUENCE.len() {
-                    Self { matched, ..self }
-                } else if self.zeros == ZEROS {
-                    return Ok(Next {
-                        recovered: true,
-                        ..Next::to(State::Sync)
-                    });
-                } else {
-                    // Every drive may have left the error mode, or none.
-                    Self {
-                        cleared: true,
-                        ..Self::default()
-                    }
-                }
-            }
-            0xFF => Self {
-                zeros: 0,
-                matched: 1,
-                ..self
-            },
-            // ND21 9.7, 9.8: a drive that waits for the check sequence takes these for nothing else. Should it be wrong, they are no sync bytes.
-            1..=0x7F if self.foreign > 0 => Self {
-                zeros: 0,
-                matched: 0,
-                foreign: self.foreign - 1,
-                ..self
-            },
-            _ => return Err(Cause::of_doubt(self.behind_reset)),
-        };
-        Ok(Next::to(State::Doubt(next)))
     }
 }

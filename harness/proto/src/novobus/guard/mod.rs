@@ -51,6 +51,7 @@
 
 mod asked;
 mod denial;
+mod doubt;
 mod eeprom;
 mod effect;
 mod gate;
