@@ -362,14 +362,18 @@ impl Way {
         self.attempts = Some(rig.file.health.attempts);
     }
 
-    /// Examines the rings, where they are examined before an attempt.
+    /// Examines the rings, where they are examined before an attempt. An interlock that ends the examination is trouble of the link.
     ///
     /// # Errors
     /// Returns the ring that fails the health check.
     fn examine(&self, link: &mut dyn Link) -> Result<(), (usize, Unhealthy)> {
-        match self.attempts {
-            Some(attempts) => examine(link, &self.rings, attempts).map(|_| ()),
-            None => Ok(()),
+        let Some(attempts) = self.attempts else {
+            return Ok(());
+        };
+        match examine(link, &self.rings, attempts) {
+            // It ends the attempt as it does at a step.
+            Ok(_) | Err((_, Unhealthy::Trouble(Trouble::Interlock(_)))) => Ok(()),
+            Err(ill) => Err(ill),
         }
     }
 

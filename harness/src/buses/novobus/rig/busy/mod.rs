@@ -6,7 +6,7 @@ mod qualified;
 use super::run::Run;
 use super::session::Session;
 use crate::buses::novobus::guard::safe_state::{SafeConfirmation, safe_state};
-use crate::guard::Standstill;
+use crate::guard::{OVERDUE, Standstill};
 use crate::library::{Entry, sources};
 use crate::link::Line as _;
 use crate::rig::check::parse;
@@ -132,6 +132,23 @@ fn nothing_is_awaited_for_a_pause() {
     assert_eq!(played.outcome.verdict, Verdict::Passed);
     let took = run.session().link().now().since_start();
     assert!(took < Span::from_millis(100), "{took}");
+}
+
+/// ND21 9.8: the longest run may be over while the rings are examined before a scenario. That attempt is aborted, like one in which it ends.
+#[test]
+fn the_longest_run_ends_at_an_examination() {
+    let rig = rig("");
+    let line = Box::new(line("", Stalls::new(1, 0)));
+    let mut session = Session::at_port(&rig, &UseOptions::default(), line).expect("a right ring");
+    session.link().set_deadline(Some(std::time::Instant::now()));
+    let mut run = Run::new(&mut session).expect("a run");
+    let entry = entry("a.scn", "title t\nring 3\n> 80\n< 80\n".to_owned());
+    let played = run.play(entry.plan.as_ref().expect("a plan"), None);
+    let played = played.expect("an attempt");
+    assert_eq!(played.outcome.verdict, Verdict::RigError);
+    let found = played.outcome.finding.map(|found| found.message);
+    assert_eq!(found.as_deref(), Some(OVERDUE));
+    assert_eq!(played.attempts.len(), 1);
 }
 
 /// A computer that stands still for longer than an answer is awaited has not lost the drives: they reach their safe state.
