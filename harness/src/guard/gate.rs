@@ -85,6 +85,20 @@ pub trait Gate: Any + Send + fmt::Debug {
     /// Copies what another gate to the same drives knows of them.
     fn know_as(&mut self, other: &dyn Gate);
 
+    /// Until when this must wait; `None` where it need not.
+    fn waits_until(&self, now: Instant, what: Out<'_>) -> Option<Instant> {
+        let _at_once = (now, what);
+        None
+    }
+
+    /// What was sent last leaves the line at this time.
+    fn ends(&mut self, at: Instant) {
+        let _unknown = at;
+    }
+
+    /// A drive has shown that it monitors time-outs.
+    fn expect_time_outs(&mut self) {}
+
     /// Whether a line may be filled at all.
     fn may_keep(&self) -> bool {
         false

@@ -3,7 +3,9 @@
 use super::Watch;
 use super::gate::{Denied, Gate};
 use crate::buses::LimitSetting;
-use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble};
+use crate::link::{
+    Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble, wait_keeping,
+};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -78,8 +80,14 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// [Keeps](Line::keep) the lines from now on, where no gate limits the number of pieces: a drive has shown that it monitors
-    /// time-outs.
+    /// A drive has shown that it monitors time-outs.
+    pub(crate) fn expect_time_outs(&mut self) {
+        for gate in &mut self.gates {
+            gate.expect_time_outs();
+        }
+    }
+
+    /// [Keeps](Line::keep) the lines from now on, where no gate limits the number of pieces.
     pub(crate) fn keep_lines(&mut self) {
         self.keeps = self.gates.iter().all(|gate| gate.may_keep());
     }
@@ -143,6 +151,18 @@ impl<L: Line> Guarded<L> {
         // Not less than a wait can tell from nothing.
         let end = self.inner.now() + Span::from_millis(most.min(ONE_DAY) + 1);
         self.inner.wait(until.min(end)) || end < until && self.trouble().is_none()
+    }
+
+    /// Waits until a gate lets this pass, and keeps the lines meanwhile. Returns whether it may be sent then.
+    fn wait_at_gate(&mut self, port: usize, what: Out<'_>) -> bool {
+        let now = self.guard_time();
+        let gate = self.gates.get(port);
+        let Some(until) = gate.and_then(|gate| gate.waits_until(now, what)) else {
+            return true;
+        };
+        let end = self.inner.now() + until.since(now);
+        while self.inner.now() < end && self.trouble().is_none() && wait_keeping(self, end) {}
+        self.inner.now() >= end || self.trouble().is_none()
     }
 
     /// The gate of a port, by its type; `None` where the port has none of this type.
@@ -293,6 +313,10 @@ impl<L: Line> Line for Guarded<L> {
     }
 
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        if !self.wait_at_gate(port, what) {
+            self.refused = what.len();
+            return self.inner.now();
+        }
         let now = self.inner.now();
         let guard_time = self.on_guard_clock(now);
         let Some(gate) = self.gates.get_mut(port) else {
@@ -311,6 +335,10 @@ impl<L: Line> Line for Guarded<L> {
         let end = self.inner.send(port, what.first(admitted));
         // An adapter may have no words for a frame.
         self.refused += self.inner.refused();
+        let left = self.on_guard_clock(end);
+        if let Some(gate) = self.gates.get_mut(port) {
+            gate.ends(left);
+        }
         denied.into_iter().for_each(|denied| self.deny(denied));
         end
     }

@@ -243,6 +243,25 @@ impl Gate for RingGate {
         }
     }
 
+    fn waits_until(&self, now: Instant, what: Out<'_>) -> Option<Instant> {
+        // Most pieces need not wait, wherever a zero stands in them.
+        self.guard.waits_until(now, 0)?;
+        let mut guard = self.guard.clone();
+        what.octets().iter().find_map(|byte| {
+            let until = guard.waits_until(now, *byte);
+            let denied = until.is_none() && guard.admit(now, *byte, false).is_err();
+            (until.is_some() || denied).then_some(until)
+        })?
+    }
+
+    fn ends(&mut self, at: Instant) {
+        self.guard.ends(at);
+    }
+
+    fn expect_time_outs(&mut self) {
+        self.guard.expect_time_outs();
+    }
+
     fn may_keep(&self) -> bool {
         self.limits.bytes_per_second.is_none()
     }

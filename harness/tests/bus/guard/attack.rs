@@ -155,6 +155,67 @@ fn process_data_left_by_others_end_with_the_next_byte() {
     harness_sim::novobus::fuzz::guard(&case);
 }
 
+/// ND21 9.9: the time of the first drive is up in the middle of a command to the second, and it keeps a recovery to itself. The second one
+/// takes another command for the rest of the first.
+#[test]
+fn a_drive_that_passes_nothing_on() {
+    let silent = RECOVERY.len() as u8 + 7;
+    for (wait_ms, filled) in [(7, 3), (10, 14)] {
+        let mut case = vec![0x20, 0, silent, wait_ms << 4 | 8, 0];
+        case.extend(RECOVERY);
+        // WriteByte 3E to FF01; its checking byte, C0, begins a read.
+        case.extend([0x88, 0xFE, 0x82, 0x3E, 0x01, 0xFF]);
+        case.extend(RECOVERY);
+        case.extend(vec![0x80; filled]);
+        case.extend([0x88, 0xFE, 0xC0]);
+        harness_sim::novobus::fuzz::guard(&case);
+    }
+}
+
+/// ND21 9.9: the first drive keeps the rest of a check sequence to itself. The second one, which has heard its begin, makes one of a telegram to
+/// no drive, and takes what follows in it for telegrams.
+#[test]
+fn a_check_sequence_that_does_not_reach_everyone() {
+    let silent = RECOVERY.len() as u8 - 2;
+    let mut case = vec![0x20, 0, silent, 10 << 4 | 8, 0];
+    case.extend(RECOVERY);
+    case.extend(vec![0x80; 30]);
+    // Kept up to its address byte; then the rest of the check sequence, and the begin of a telegram with WriteByte.
+    case.extend([0x8C, 0x00, 0x72, 0x4C, 0x41, 0x8E, 0xFF, 0x82]);
+    // 88 to FF01: the first drive makes 01 of the address byte.
+    case.extend([0x88, 0x00, 0xFF, 0x0A]);
+    harness_sim::novobus::fuzz::guard(&case);
+}
+
+/// ND21 9.9: a drive that no command had reached in part keeps a recovery to itself, is ready, and still keeps the begin of a telegram to no
+/// drive.
+#[test]
+fn a_drive_that_is_ready_and_keeps_bytes() {
+    let silent = RECOVERY.len() as u8 + 1;
+    let mut case = vec![0x20, 0, silent, 10 << 4 | 8, 0];
+    case.extend([RECOVERY, RECOVERY].concat());
+    case.extend(vec![0x80; 11]);
+    case.extend([0x8E, 0x00, 0x8A, 0xFF, 0x82, 0x3E, 0x01, 0xFF, 0xC0]);
+    harness_sim::novobus::fuzz::guard(&case);
+}
+
+/// ND21 9.7, 9.9: zeros that a drive has kept show it that the drive in front of it is in the error mode, so it makes 01 of the next ones.
+#[test]
+fn zeros_that_were_kept() {
+    let silent = RECOVERY.len() as u8 + 5;
+    let mut case = vec![0x20, 0, silent, 10 << 4 | 8, 0];
+    case.extend(RECOVERY);
+    case.extend([0x88, 0xFE, 0xA5, 0x5B, 0x38, 0x38]);
+    case.extend(vec![0; 40]);
+    harness_sim::novobus::fuzz::guard(&case);
+    let mut case = vec![0x20, 0, silent, 10 << 4 | 8, 0];
+    case.extend(RECOVERY);
+    case.extend([0x8A, 0xFE, 0x82, 0x7F, 0x88, 0xFD, 0x86]);
+    case.extend(vec![0; 31]);
+    case.extend([0x00, 0xFF, 0x00]);
+    harness_sim::novobus::fuzz::guard(&case);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3_000, failure_persistence: None, ..ProptestConfig::default() })]
 

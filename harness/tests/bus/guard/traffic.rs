@@ -12,6 +12,7 @@ use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::time::Span;
 use harness_sim::fault::Flips;
@@ -259,6 +260,26 @@ fn after_a_denial() {
     // A SYNCO would stand in the place of the checking byte.
     line.send_octets(0, &[0x80]);
     assert!(line.trouble().is_some());
+}
+
+/// ND21 9.9: where time-outs may be monitored, a recovery behind a silence in the middle of a telegram waits until 40 ms are over. None is
+/// denied.
+#[test]
+fn a_recovery_behind_a_silence_waits() {
+    for (monitoring, sent_at) in [(false, 15), (true, 40)] {
+        let limits = Limits {
+            monitoring,
+            ..Limits::default()
+        };
+        let mut line = guarded(2, limits);
+        let begin = line.send_octets(0, &[0x88, 0xFF]);
+        let silence = begin + Span::from_millis(15);
+        while line.now() < silence && line.wait(silence) {}
+        line.send_octets(0, &CHECK_SEQUENCE);
+        let waited = (line.now().since(begin).as_nanos() + 500_000) / 1_000_000;
+        line.send_octets(0, &[0x88, 0xFF, 0xC0, 0x17, 0xFE, 0xD5]);
+        assert_eq!((waited, line.trouble()), (sent_at, None));
+    }
 }
 
 /// Faults that change what drives hear need everything.

@@ -73,6 +73,8 @@ pub enum Cause {
     InDoubt,
     /// The same behind `ResetH8`: a drive does not listen for a time after it (ND21 10.5).
     BehindReset,
+    /// A drive may keep the byte to itself, as its time may be up by a silence (ND21 9.9).
+    BehindSilence,
     /// A short address whose drive is not known (ND21 9.2).
     NoAddress,
     /// A check sequence, or bytes that become one by being counted up, where none is due (ND21 9.7, 9.8).
@@ -186,6 +188,11 @@ impl fmt::Display for Denial {
                 "ResetH8 was sent, and a drive does not listen for a time after it (ND21 10.5), so its position in a telegram is not \
                  known; send 17 zeros and the check sequence first (ND21 9.8), or allow everything in the rig's [limits] without \
                  `max_speed`",
+            ),
+            Cause::BehindSilence => f.write_str(
+                "where time-outs may be monitored, a drive may keep to itself what it receives in the 10 ms behind one (ND21 9.9), so \
+                 behind a silence of 8 ms or more in the middle of a telegram nothing is sent before 40 ms are over, and behind any such silence \
+                 no zero outside of a telegram; wait for 40 ms, or allow everything in the rig's [limits] without `max_speed`",
             ),
             Cause::NoAddress => f.write_str(
                 "a short telegram has no meaning before an address byte has been sent (ND21 9.2)",

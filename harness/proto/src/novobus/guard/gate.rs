@@ -9,6 +9,7 @@ use super::half::{Half, length};
 use super::known::{Found, Known};
 use super::limits::Limits;
 use super::listener::Listener;
+use super::silence::Silence;
 use super::stage::Stage;
 use super::tail::Tail;
 use crate::line::Received;
@@ -16,7 +17,7 @@ use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::ZEROS;
 use crate::novobus::checksum::Checksum;
 use crate::novobus::error_mode::UPSTREAM_ZEROS;
-use crate::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte, TelegramHeader};
+use crate::novobus::sync::{Addressing, PAUSE, SyncByte, TelegramHeader};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
 
@@ -32,6 +33,7 @@ pub struct Guard {
     known: Box<[Known; 256]>,
     listener: Listener,
     asked: Asked,
+    silence: Silence,
     /// The last address byte, counted up by "next"; `None` where no short address is valid.
     kept: Option<u8>,
     /// The last bytes, and the last ones without PAUSE, which drives swallow.
@@ -89,6 +91,7 @@ impl Guard {
             known: Box::new([Known::default(); 256]),
             listener: Listener::new(),
             asked: Asked::default(),
+            silence: Silence::new(limits.monitoring),
             kept: None,
             tails: [Tail::default(); 2],
             zeros: 0,
@@ -135,6 +138,16 @@ impl Guard {
         }
     }
 
+    /// A drive of the ring has shown that it monitors time-outs (ND21 9.9).
+    pub fn expect_time_outs(&mut self) {
+        self.silence.is_monitored();
+    }
+
+    /// The last byte leaves the line at this time.
+    pub fn ends(&mut self, at: Instant) {
+        self.silence.ends(at);
+    }
+
     /// Replaces what is known of the drive with this address byte by values that were read from it.
     pub fn learn(&mut self, address: u8, found: &Found) {
         self.known[usize::from(address)].learn(found, &self.limits);
@@ -153,6 +166,7 @@ impl Guard {
     /// Copies what another guard of the same ring knows of the drives.
     pub fn know_as(&mut self, other: &Self) {
         self.known.clone_from(&other.known);
+        self.silence.know_as(other.silence);
     }
 
     /// The limits that it enforces.
@@ -221,6 +235,7 @@ impl Guard {
     /// The drives may be in any state from now on: bytes were changed on their way, or a drive was switched on.
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());
+        self.silence.doubt();
         self.listener.lose();
         self.kept = None;
         self.doubt_commands();
@@ -246,6 +261,17 @@ impl Guard {
     pub fn lift_caps(&mut self) {
         self.limits.bytes_per_second = None;
         self.limits.most_bytes = u64::MAX;
+    }
+
+    /// Until when a byte must wait, because a drive may keep it to itself (ND21 9.9); `None` where it need not.
+    #[must_use]
+    pub fn waits_until(&self, now: Instant, byte: u8) -> Option<Instant> {
+        if self.limits.allow_everything() {
+            return None;
+        }
+        let recovers = byte == 0 && matches!(self.state, State::Sync | State::Doubt(_));
+        let silence = self.silence.at(now, || self.at_rest());
+        silence.until(now, recovers)
     }
 
     /// Judges the next byte. `line_error`: it is sent with wrong parity or a broken frame. Not every port sends the error
@@ -294,6 +320,9 @@ impl Guard {
         {
             return Err(Cause::TooMany { most });
         }
+        if self.waits_until(now, byte).is_some() {
+            return Err(Cause::BehindSilence);
+        }
         match self.next(byte) {
             // If everything is allowed, bytes that the guard cannot interpret pass as well.
             Err(_) if self.limits.allow_everything() => Ok(Next::to(in_doubt(byte, false))),
@@ -328,6 +357,7 @@ impl Guard {
             self.second.0 = now;
         }
         self.second.1 = count.saturating_add(1);
+        self.silence = self.silence.at(now, || self.at_rest()).with_byte(now);
         self.passed += 1;
         self.tails[0].push(byte);
         if byte != PAUSE {

@@ -91,6 +91,7 @@ impl Limits {
             // If everything is allowed, bytes that the guard cannot interpret pass.
             Cause::InDoubt
             | Cause::BehindReset
+            | Cause::BehindSilence
             | Cause::NoAddress
             | Cause::CheckSequence
             | Cause::NotKnown { most: None, .. } => Need::EVERYTHING,

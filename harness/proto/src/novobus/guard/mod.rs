@@ -33,6 +33,10 @@
 //! Process data are written where `DataIn` (FF32) points (14.10.3). Unless everything is allowed, they pass if the guard knows that this is a cell
 //! in which any word may be written.
 //!
+//! A drive whose time is up may keep what it receives for 10 ms, so that it does not reach the drives behind it (9.9). Where time-outs may be
+//! monitored, nothing passes in this time behind a silence in the middle of a telegram, a command or a recovery, and no recovery behind any silence
+//! (`silence`).
+//!
 //! What comes back is read for two things only (`listener`): what `DataIn` holds, and whether the EEPROM controller has done with a read, which
 //! puts a byte over the address that the next write would take (14.10.5.2).
 //!
@@ -43,9 +47,7 @@
 //!   out of step for the rest of a telegram.
 //! * A command that another program left incomplete may be completed by a 01, which a preceding drive in the error mode makes of a zero.
 //!   Process data that it left incomplete end with the next byte of any value (9.4), so with the first zero of the recovery.
-//! * The guard does not count time. A drive that monitors time-outs and sends no zeros behind one (9.9 leaves it open) may take a check sequence that it
-//!   does not pass on. After a silence of 10 ms in the middle of a telegram, or of a check sequence, the drives behind it stand elsewhere than
-//!   the guard believes, until the next check sequence.
+//! * Silence that the computer does not know of, such as that of an adapter in the middle of a telegram.
 //! * Actions of the drive itself: by its switches, its cycle control, its EEPROM after power-up. The guard judges only the bus.
 //! * A regulator that overshoots the nominal speed.
 
@@ -59,6 +61,7 @@ mod half;
 mod known;
 mod limits;
 mod listener;
+mod silence;
 mod stage;
 mod table;
 mod tail;

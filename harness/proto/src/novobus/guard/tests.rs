@@ -5,7 +5,7 @@ use super::{Cause, DriveAct, Guard, Limits, Need};
 use crate::nd21::ram;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::CHECK_SEQUENCE;
-use crate::time::Instant;
+use crate::time::{Instant, Span};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -253,6 +253,40 @@ fn the_reason_of_a_doubt_is_named() {
         Some(Cause::BehindReset)
     );
     assert_eq!(cause(reset, &[0x22, 0x88]), Some(Cause::InDoubt));
+}
+
+/// ND21 9.9: behind a silence in the middle of something nothing passes before 40 ms are over, and behind any silence no recovery; where no drive
+/// monitors time-outs, everything passes at once.
+#[test]
+fn behind_a_silence() {
+    const TELEGRAM: [u8; 2] = [0x88, 0xFF];
+    let behind = |monitored: bool, part: &[u8], silence: u64, bytes: &[u8]| {
+        let mut guard = behind(Limits::default(), part, false).expect("harmless");
+        if monitored {
+            guard.expect_time_outs();
+        }
+        let later = Instant::START + Span::from_millis(silence);
+        let mut admit = |byte: &u8| guard.admit(later, *byte, false);
+        bytes
+            .iter()
+            .try_for_each(&mut admit)
+            .map_err(|why| why.cause)
+    };
+    for (part, bytes, is_kept) in [
+        (&TELEGRAM[..], &CHECK_SEQUENCE[..], true),
+        (&TELEGRAM, &[0xC0], true),
+        (&[0x84, 0xFF, 0xC0, 0x00], &CHECK_SEQUENCE, true),
+        (&[0x84, 0xFF, 0xC0, 0x00], &TELEGRAM, true),
+        (&[0x80], &CHECK_SEQUENCE, true),
+        (&[0x80], &[0x88, 0x00, 0x00, 0x00], false),
+    ] {
+        for (silence, in_time) in [(0, false), (7, false), (20, true), (39, true), (60, false)] {
+            let denied = (is_kept && in_time).then_some(Cause::BehindSilence);
+            let found = behind(true, part, silence, bytes).err();
+            assert_eq!(found, denied, "{part:02X?}, {silence} ms, {bytes:02X?}");
+            assert_eq!(behind(false, part, silence, bytes), Ok(()), "{part:02X?}");
+        }
+    }
 }
 
 /// ND21 14.10.3: `DataIn` may point at a cell where any word may be written, so that a drive can be given back the value that it held.

@@ -12,7 +12,8 @@ use harness_proto::time::{Instant, Span};
 /// Five bytes, a start, and the wire. Byte 1: bits 0 to 3 allow motion, EEPROM, reset, outputs, bit 4 sets a greatest speed of 1000 rpm, bits 5 and 6
 /// are the number of drives less 1, bit 7: a port sends what should be damaged as a good byte. Byte 2: the number of the byte that is sent
 /// damaged, 0 for none. Byte 3: the number of the byte before which there is silence, 0 for none; byte 4: the drive whose time
-/// is up by it (low half), and how many zeros it sends unasked (high half). Byte 5: how many bytes the start has: what the first drive heard before, the second
+/// is up by it (bits 0 to 2), and how many zeros it sends unasked (high half), or, with bit 3, for how many milliseconds longer it passes
+/// nothing on, as the manual leaves that open. Byte 5: how many bytes the start has: what the first drive heard before, the second
 /// one without the first byte of it, and so on, so that no two drives are at the same place. A
 /// ring of one keeps a half command from its start; the others have forgotten it.
 ///
@@ -45,10 +46,15 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
         return;
     };
     let (start, wire) = rest.split_at(usize::from(start).min(rest.len()));
-    let mut ring: Vec<_> = (0..drives)
-        .map(|index| started(start, index, drives == 1))
-        .collect();
+    let place = |index| Place {
+        drive: started(start, index, drives == 1),
+        silent_until: Instant::START,
+    };
+    let mut ring: Vec<_> = (0..drives).map(place).collect();
     let mut guard = Guard::new(size, limits);
+    if silent > 0 {
+        guard.expect_time_outs();
+    }
     for place in 0..drives as u8 {
         if let Ok(address) = size.address_byte(place) {
             guard.learn_data_in(address, NSOLL);
@@ -59,7 +65,8 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     for (index, &byte) in wire.iter().take(LONGEST).enumerate() {
         now += Span::from_micros(287);
         if index + 1 == usize::from(silent) {
-            silence(&mut ring, usize::from(whose & 15), whose >> 4);
+            now += TIME_OUT;
+            silence(&mut ring, usize::from(whose & 7), whose, now);
         }
         let bad = index + 1 == usize::from(damaged);
         let heard = Heard {
@@ -76,13 +83,13 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
         passed.push(byte);
         send(
             &mut ring,
-            0,
+            now,
             Cell {
                 byte,
                 error: bad && what < 0x80,
             },
         );
-        for (place, drive) in ring.iter_mut().enumerate() {
+        for (place, Place { drive, .. }) in ring.iter_mut().enumerate() {
             if drive.in_error() {
                 words::note_error_mode(notes, &heard);
             }
@@ -96,6 +103,16 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
             }
         }
     }
+}
+
+/// How long silence lasts, from the last byte on: a time-out (9.9).
+const TIME_OUT: Span = Span::from_millis(10);
+
+/// A drive in the ring.
+struct Place {
+    drive: Drive,
+    /// Until when it passes nothing on.
+    silent_until: Instant,
 }
 
 /// What `DataIn` holds: `nsoll` (14.10.3).
@@ -120,30 +137,33 @@ fn started(start: &[u8], index: usize, keep_half: bool) -> Drive {
     drive
 }
 
-/// Sends a byte to the drive at a place, and what it makes of it to those behind.
-fn send(ring: &mut [Drive], place: usize, mut cell: Cell) {
-    for drive in ring.iter_mut().skip(place) {
-        let Some(byte) = drive.receive(cell) else {
-            return;
-        };
-        cell = Cell { byte, error: false };
+/// Sends a byte to the first of these drives, and what it makes of it to those behind.
+fn send(ring: &mut [Place], now: Instant, mut cell: Cell) {
+    for Place {
+        drive,
+        silent_until,
+    } in ring
+    {
+        match drive.receive(cell) {
+            Some(byte) if now >= *silent_until => cell = Cell { byte, error: false },
+            _ => return,
+        }
     }
 }
 
-/// The time of a drive is up, and it sends zeros unasked (ND21 9.9).
-fn silence(ring: &mut [Drive], whose: usize, zeros: u8) {
-    if let Some(drive) = ring.get_mut(whose) {
-        drive.time_out();
-        for _ in 0..zeros {
-            send(
-                ring,
-                whose + 1,
-                Cell {
-                    byte: 0,
-                    error: false,
-                },
-            );
-        }
+/// The time of a drive is up (ND21 9.9). It sends zeros unasked, or it waits.
+fn silence(ring: &mut [Place], whose: usize, what: u8, now: Instant) {
+    let Some((own, behind)) = ring.get_mut(whose..).and_then(<[_]>::split_first_mut) else {
+        return;
+    };
+    own.drive.time_out();
+    if what & 8 != 0 {
+        own.silent_until = now + Span::from_millis(u64::from(what >> 4));
+        return;
+    }
+    for _ in 0..what >> 4 {
+        let (byte, error) = (0, false);
+        send(behind, now, Cell { byte, error });
     }
 }
 

@@ -134,6 +134,7 @@ const fn why(cause: &Cause) -> &'static str {
         Cause::Faster { .. } => "turns faster",
         Cause::NotKnown { .. } => "not known to be slow",
         Cause::InDoubt | Cause::BehindReset => "in doubt",
+        Cause::BehindSilence => "behind a silence",
         Cause::NoAddress => "no address is known",
         Cause::CheckSequence => "a check sequence",
         Cause::TooMany { .. } => "too many a second",

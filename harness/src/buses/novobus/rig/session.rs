@@ -165,8 +165,11 @@ impl Session {
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
         }
-        if session.listen()? && options.keeps_lines {
-            session.link.keep_lines();
+        if session.listen()? {
+            session.link.expect_time_outs();
+            if options.keeps_lines {
+                session.link.keep_lines();
+            }
         }
         let ready = options.unless_interrupted(rig);
         match ready.and_then(|()| session.make_ready()) {
