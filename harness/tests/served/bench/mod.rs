@@ -416,6 +416,13 @@ fn a_ring_that_does_not_open_says_why() {
     let plain = Served::start("nd21", &[3], "tcp", false, &[]);
     let desk = Desk::of(&plain);
     ended(&desk.run(&["run"]), 3, "set `marks = \"none\"`");
+    // Also where the guard reads the drives when the rig is opened.
+    edited(&desk, "allow_monitoring = true", "");
+    ended(
+        &desk.run(&["run", "--allow-motion"]),
+        3,
+        "set `marks = \"none\"`",
+    );
     edited(&desk, "marks = \"in-band\"", "");
     ended(&desk.run(&["run", "9.2-synco"]), 0, "");
 }

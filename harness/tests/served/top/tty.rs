@@ -93,7 +93,12 @@ impl Tty {
             if wanted(&seen) {
                 return seen;
             }
-            assert!(Instant::now() < end, "{what} is not seen:\n{}", seen.text());
+            assert!(
+                Instant::now() < end,
+                "{what} is not seen:\n{}\n{}",
+                seen.first,
+                seen.text()
+            );
             std::thread::sleep(Duration::from_millis(20));
         }
     }

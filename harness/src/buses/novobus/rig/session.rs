@@ -46,6 +46,8 @@ pub struct Session {
     ended: bool,
     /// What the check at its opening found.
     opening: Option<RingHealth>,
+    /// A ring behind in-band marks answered as one that knows none.
+    damages_ff: bool,
     // Given back in this order.
     around: Around,
     /// While drives may move.
@@ -62,8 +64,8 @@ impl Session {
     /// [`SessionError`]; nothing is left locked or open.
     pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         match Self::open_as_stated(rig, options) {
-            Ok(mut session) => {
-                if !session.lacks_marks() {
+            Ok(session) => {
+                if !session.damages_ff {
                     return Ok(session);
                 }
                 let bytes = "a net byte FF comes back damaged".to_owned();
@@ -95,7 +97,11 @@ impl Session {
         };
         for _ in 0..PORT_TRIES {
             match Self::opens(&other, options) {
-                Some(false) => return Self::open_as_stated(rig, options),
+                Some(false) => {
+                    let mut session = Self::open_as_stated(rig, options)?;
+                    session.learn();
+                    return Ok(session);
+                }
                 Some(true) => break,
                 None => std::thread::sleep(PORT_PAUSE),
             }
@@ -157,6 +163,7 @@ impl Session {
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
             opening: None,
+            damages_ff: false,
             around: taken.around,
             watchdog: None,
             _ports: opened.locks,
@@ -335,13 +342,25 @@ impl Session {
         if self.opens_quietly() || self.rig.is_simulated() && !self.rig.file.health.before {
             return Ok(());
         }
-        match self.health() {
+        match self.examined() {
             Err(SessionError::Ill { ill, .. })
                 if self.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
             Err(error) => return Err(self.with_cause(error)),
             Ok(health) => self.opening = Some(health),
         }
-        self.runs_at_its_rate()
+        self.runs_at_its_rate()?;
+        if self.opening.is_none() {
+            return Ok(());
+        }
+        // Before anything else with a byte FF is sent.
+        self.damages_ff = self.lacks_marks();
+        if self.damages_ff {
+            // It has put drives into the error mode.
+            let healthy = self.examined().map(drop);
+            return healthy.map_err(|error| self.with_cause(error));
+        }
+        self.learn();
+        Ok(())
     }
 
     /// Adds the likely cause to the error of a ring that did not open.
@@ -407,9 +426,6 @@ impl Session {
 
     /// Whether a ring answers as one that knows no in-band marks, although its file says so.
     fn lacks_marks(&mut self) -> bool {
-        if self.opening.is_none() {
-            return false;
-        }
         let marked: Vec<_> = self
             .rig
             .rings()
@@ -472,12 +488,16 @@ impl Session {
     /// # Errors
     /// [`SessionError::Ill`].
     pub fn health(&mut self) -> Result<RingHealth, SessionError> {
-        self.link.reset_after_denial();
-        let attempts = self.rig.file.health.attempts;
-        let health = examine(&mut self.link, &self.rings, attempts)
-            .map_err(|(ring, ill)| self.ill(ring, ill))?;
+        let health = self.examined()?;
         self.learn();
         Ok(health)
+    }
+
+    /// The same without learning anything of the drives.
+    fn examined(&mut self) -> Result<RingHealth, SessionError> {
+        self.link.reset_after_denial();
+        let attempts = self.rig.file.health.attempts;
+        examine(&mut self.link, &self.rings, attempts).map_err(|(ring, ill)| self.ill(ring, ill))
     }
 
     /// Learns how fast the drives would turn, for `max_speed`. What is not learnt is denied when it is needed, with its cell, and a
