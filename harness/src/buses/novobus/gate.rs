@@ -244,8 +244,9 @@ impl Gate for RingGate {
     }
 
     fn waits_until(&self, now: Instant, what: Out<'_>) -> Option<Instant> {
-        // Most pieces need not wait, wherever a zero stands in them.
-        self.guard.waits_until(now, 0)?;
+        if !self.guard.in_silence(now) {
+            return None;
+        }
         let mut guard = self.guard.clone();
         what.octets().iter().find_map(|byte| {
             let until = guard.waits_until(now, *byte);

@@ -282,6 +282,22 @@ fn a_recovery_behind_a_silence_waits() {
     }
 }
 
+/// ND21 9.9: a recovery waits too that ends a telegram which was begun behind a silence.
+#[test]
+fn a_recovery_in_a_telegram_behind_a_silence_waits() {
+    let limits = Limits {
+        monitoring: true,
+        ..Limits::default()
+    };
+    let mut line = guarded(2, limits);
+    let silence = line.send_octets(0, &[0x80]) + Span::from_millis(15);
+    while line.now() < silence && line.wait(silence) {}
+    line.send_octets(0, &[0x88, 0xFF]);
+    line.send_octets(0, &CHECK_SEQUENCE);
+    line.send_octets(0, &[0x88, 0xFF, 0xC0, 0x17, 0xFE, 0xD5]);
+    assert_eq!(line.trouble(), None);
+}
+
 /// Faults that change what drives hear need everything.
 #[test]
 fn faults_that_nobody_can_judge() {

@@ -13,6 +13,7 @@ use super::silence::Silence;
 use super::stage::Stage;
 use super::tail::Tail;
 use crate::line::Received;
+use crate::nd21::bits::flags2;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::ZEROS;
 use crate::novobus::checksum::Checksum;
@@ -151,6 +152,9 @@ impl Guard {
     /// Replaces what is known of the drive with this address byte by values that were read from it.
     pub fn learn(&mut self, address: u8, found: &Found) {
         self.known[usize::from(address)].learn(found, &self.limits);
+        if found.flags2 & flags2::MONITORING != 0 {
+            self.expect_time_outs();
+        }
     }
 
     /// The same of `DataIn` alone, which says where process data are written (ND21 14.10.3).
@@ -274,6 +278,13 @@ impl Guard {
         silence.until(now, recovers)
     }
 
+    /// Whether a drive may keep to itself what it receives now.
+    #[must_use]
+    pub fn in_silence(&self, now: Instant) -> bool {
+        let silence = self.silence.at(now, || self.at_rest());
+        !self.limits.allow_everything() && silence.until(now, true).is_some()
+    }
+
     /// Judges the next byte. `line_error`: it is sent with wrong parity or a broken frame. Not every port sends the error
     /// as requested, so the byte must also be allowed as a good byte, and the guard's state becomes doubtful.
     ///
@@ -357,7 +368,7 @@ impl Guard {
             self.second.0 = now;
         }
         self.second.1 = count.saturating_add(1);
-        self.silence = self.silence.at(now, || self.at_rest()).with_byte(now);
+        self.silence = self.silence.at(now, || self.at_rest()).with_byte(now, byte);
         self.passed += 1;
         self.tails[0].push(byte);
         if byte != PAUSE {
@@ -525,6 +536,14 @@ impl Guard {
             if half.sent().len() == length
                 && Checksum::over(half.sent()) == Checksum::EMPTY
                 && let Some(act) = DriveAct::of(half.sent())
+            {
+                act.judge(&self.limits, self.known(key))?;
+            }
+            // Drives whose time is up one behind the other can send 00 and 01, which complete an And or Or of this sum (ND21 9.6, 9.9).
+            if self.silence.may_time_out()
+                && (half.sent().len(), length) == (2, 3)
+                && Checksum::over(half.sent()) == Checksum::EMPTY
+                && let Some(act) = DriveAct::of(half.with(0).sent())
             {
                 act.judge(&self.limits, self.known(key))?;
             }

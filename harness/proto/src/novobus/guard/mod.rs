@@ -35,7 +35,7 @@
 //!
 //! A drive whose time is up may keep what it receives for 10 ms, so that it does not reach the drives behind it (9.9). Where time-outs may be
 //! monitored, nothing passes in this time behind a silence in the middle of a telegram, a command or a recovery, and no recovery behind any silence
-//! (`silence`).
+//! (`silence`). PAUSE counts as silence, as the first drive keeps it (9.2).
 //!
 //! What comes back is read for two things only (`listener`): what `DataIn` holds, and whether the EEPROM controller has done with a read, which
 //! puts a byte over the address that the next write would take (14.10.5.2).

@@ -1,5 +1,6 @@
 //! Silence where drives monitor time-outs (ND21 9.9).
 
+use crate::novobus::sync::PAUSE;
 use crate::time::{Instant, Span};
 
 /// The shortest silence that may be a time-out, which comes after 10 ms (ND21 9.9). A drive may count more of it than the guard.
@@ -19,6 +20,8 @@ pub(super) struct Silence {
     monitored: bool,
     /// When the last byte is over; before the first one, when the guard began.
     last: Instant,
+    /// The same of the last byte but PAUSE, which the first drive keeps to itself (ND21 9.2).
+    heard: Instant,
     /// Until when a drive may keep what it receives.
     until: Instant,
     /// Before the silence, drives were in the middle of something.
@@ -30,6 +33,7 @@ impl Silence {
         Self {
             monitored,
             last: Instant::START,
+            heard: Instant::START,
             until: Instant::START,
             in_part: false,
         }
@@ -38,6 +42,10 @@ impl Silence {
     /// A drive monitors time-outs.
     pub(super) fn is_monitored(&mut self) {
         self.monitored = true;
+    }
+
+    pub(super) const fn may_time_out(self) -> bool {
+        self.monitored
     }
 
     /// The same if a drive does on another line to the same ring.
@@ -53,12 +61,16 @@ impl Silence {
 
     /// The last byte is over at this time.
     pub(super) fn ends(&mut self, at: Instant) {
+        let is_heard = self.heard == self.last;
         self.last = self.last.max(at);
+        if is_heard {
+            self.heard = self.last;
+        }
     }
 
     /// The same at the time of the next byte. `at_rest`: whether no drive is in the middle of anything before it.
     pub(super) fn at(self, now: Instant, at_rest: impl FnOnce() -> bool) -> Self {
-        match self.monitored && now.since(self.last) >= TIME_OUT {
+        match self.monitored && now.since(self.heard) >= TIME_OUT {
             true => Self {
                 until: self.last + ZEROS_SENT,
                 in_part: !at_rest(),
@@ -69,9 +81,11 @@ impl Silence {
     }
 
     /// The same behind a byte.
-    pub(super) fn with_byte(self, now: Instant) -> Self {
+    pub(super) fn with_byte(self, now: Instant, byte: u8) -> Self {
+        let last = self.last.max(now) + BYTE;
         Self {
-            last: self.last.max(now) + BYTE,
+            last,
+            heard: if byte == PAUSE { self.heard } else { last },
             ..self
         }
     }

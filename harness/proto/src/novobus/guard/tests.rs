@@ -289,6 +289,35 @@ fn behind_a_silence() {
     }
 }
 
+/// ND21 9.2, 9.9: the first drive keeps PAUSE to itself, so it is silence for those behind it.
+#[test]
+fn a_pause_is_silence() {
+    let passes = |filler: u8| {
+        let mut guard =
+            behind(Limits::default(), &[0x84, 0xFF, 0xC0, 0x00], false).expect("a half");
+        guard.expect_time_outs();
+        let later = Instant::START + Span::from_millis(14);
+        guard.admit(later, filler, false).expect("in time");
+        guard.admit(later + Span::from_millis(6), 0, false).is_ok()
+    };
+    assert_eq!([0x80, 0x81].map(passes), [true, false]);
+}
+
+/// ND21 9.6, 9.9: drives whose time is up one behind the other can send 00 and 01 behind the first two bytes of And and Or.
+#[test]
+fn what_time_outs_would_complete_is_judged() {
+    for part in [[0x88, 0xFF, 0xA4, 0x5C], [0x88, 0xFF, 0xA5, 0x5B]] {
+        let last = |monitored: bool| {
+            let mut guard = behind(Limits::default(), &part[..3], false).expect("a begin");
+            if monitored {
+                guard.expect_time_outs();
+            }
+            guard.admit(Instant::START, part[3], false).is_ok()
+        };
+        assert_eq!([false, true].map(last), [true, false], "{part:02X?}");
+    }
+}
+
 /// ND21 14.10.3: `DataIn` may point at a cell where any word may be written, so that a drive can be given back the value that it held.
 #[test]
 fn data_in_needs_what_the_cell_needs_that_it_points_at() {
