@@ -342,7 +342,8 @@ impl<L: Line> Line for Guarded<L> {
         // An adapter may have no words for a frame.
         self.refused += self.inner.refused();
         let left = self.on_guard_clock(end);
-        if let Some(gate) = self.gates.get_mut(port) {
+        // Who only asks when the line is free ends no silence.
+        if let Some(gate) = self.gates.get_mut(port).filter(|_| admitted > 0) {
             gate.ends(left);
         }
         denied.into_iter().for_each(|denied| self.deny(denied));

@@ -244,15 +244,7 @@ impl Gate for RingGate {
     }
 
     fn waits_until(&self, now: Instant, what: Out<'_>) -> Option<Instant> {
-        if !self.guard.in_silence(now) {
-            return None;
-        }
-        let mut guard = self.guard.clone();
-        what.octets().iter().find_map(|byte| {
-            let until = guard.waits_until(now, *byte);
-            let denied = until.is_none() && guard.admit(now, *byte, false).is_err();
-            (until.is_some() || denied).then_some(until)
-        })?
+        self.guard.waits_until(now, what.octets())
     }
 
     fn ends(&mut self, at: Instant) {

@@ -267,22 +267,31 @@ impl Guard {
         self.limits.most_bytes = u64::MAX;
     }
 
-    /// Until when a byte must wait, because a drive may keep it to itself (ND21 9.9); `None` where it need not.
+    /// Until when these bytes must wait, because a drive may keep one of them to itself (ND21 9.9); `None` where they need not, or where one of
+    /// them is denied for another reason.
     #[must_use]
-    pub fn waits_until(&self, now: Instant, byte: u8) -> Option<Instant> {
-        if self.limits.allow_everything() {
-            return None;
+    pub fn waits_until(&self, now: Instant, bytes: &[u8]) -> Option<Instant> {
+        self.kept_until(now, true)?;
+        let mut guard = self.clone();
+        for &byte in bytes {
+            if let Some(until) = guard.kept_until(now, guard.recovers(byte)) {
+                return Some(until);
+            }
+            guard.admit(now, byte, false).ok()?;
         }
-        let recovers = byte == 0 && matches!(self.state, State::Sync | State::Doubt(_));
-        let silence = self.silence.at(now, || self.at_rest());
-        silence.until(now, recovers)
+        None
     }
 
-    /// Whether a drive may keep to itself what it receives now.
-    #[must_use]
-    pub fn in_silence(&self, now: Instant) -> bool {
+    /// Whether a byte would be the first of a recovery, or one of its zeros.
+    fn recovers(&self, byte: u8) -> bool {
+        byte == 0 && matches!(self.state, State::Sync | State::Doubt(_))
+    }
+
+    /// Until when a drive may keep to itself what comes now.
+    fn kept_until(&self, now: Instant, recovers: bool) -> Option<Instant> {
         let silence = self.silence.at(now, || self.at_rest());
-        !self.limits.allow_everything() && silence.until(now, true).is_some()
+        let until = silence.until(now, recovers);
+        until.filter(|_| !self.limits.allow_everything())
     }
 
     /// Judges the next byte. `line_error`: it is sent with wrong parity or a broken frame. Not every port sends the error
@@ -331,7 +340,7 @@ impl Guard {
         {
             return Err(Cause::TooMany { most });
         }
-        if self.waits_until(now, byte).is_some() {
+        if self.kept_until(now, self.recovers(byte)).is_some() {
             return Err(Cause::BehindSilence);
         }
         match self.next(byte) {
