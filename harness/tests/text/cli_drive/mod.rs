@@ -233,7 +233,7 @@ fn what_can_turn_a_motor_needs_leave_and_says_so_first() {
         ),
         (
             "position 1 --reference",
-            "a referencing run, at most at 3000.1 rpm",
+            "a referencing run (RefV1 200.01 rpm, RefV2 -50.068 rpm), at most at 3000.1 rpm",
         ),
     ] {
         refused(line, 2, &[part, "nothing was", "add --move to allow it"]);
@@ -340,7 +340,7 @@ fn positions() {
     assert_eq!(code, 0, "{stderr}");
     assert_eq!(
         stderr,
-        "drive 0 stands at 0 turns and will turn: a referencing run, then to 10.25 turns, at most at 500 rpm (ps_v0)\n"
+        "drive 0 stands at 0 turns and will turn: a referencing run (RefV1 200.01 rpm, RefV2 -50.068 rpm), then to 10.25 turns, at most at 500 rpm (ps_v0)\n"
     );
     assert!(stdout.starts_with("drive 0 stands at 10.2"), "{stdout}");
     let (code, stdout, _) = drivebench("position 1 --by -50deg --init --move");
@@ -402,6 +402,37 @@ fn modes_of_drives() {
     assert_eq!((code, stdout.as_str()), (0, "drive 1 is in go\n"));
     assert_eq!(stderr, "reset: drive 1: its motor may turn\n");
     refused("stop", 2, &["DRIVE"]);
+}
+
+/// A drive that is not as it was asked to be has failed (ND21 11.8).
+#[test]
+fn a_drive_that_does_not_obey_has_failed() {
+    let folder = folder("disobeys");
+    for (command, lines, is) in [
+        ("block", "drive 1 deviates or-spares-bit-0", "go"),
+        ("stop", "drive 1 deviates stop-ignored", "go"),
+        (
+            "go",
+            "drive 1 memory FF00 = 80\ndrive 1 deviates and-spares-bit-7",
+            "stop",
+        ),
+    ] {
+        let setup = format!("drive 1 input GPIN3 GPIN5 high\n{lines}\n");
+        std::fs::write(folder.join("setup.scn"), setup).expect("a file");
+        let run = |line: &str| {
+            let line = format!("{line} --rig sim:2 --setup setup.scn");
+            let arguments: Vec<_> = line.split(' ').collect();
+            drivebench_in(&folder, &arguments)
+        };
+        let leave = match command {
+            "go" => " --move",
+            _ => "",
+        };
+        let (code, _, stderr) = run(&format!("{command} 1{leave}"));
+        assert_eq!(code, 1, "{command}: {stderr}");
+        let words = format!("drive 1: `{command}` was sent, and it is in {is} (ND21 11.8)");
+        assert!(stderr.contains(&words), "{stderr}");
+    }
 }
 
 #[test]

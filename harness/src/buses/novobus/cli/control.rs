@@ -3,21 +3,57 @@
 use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
 use super::rig::{self, OpenBench, RigName, Use};
-use crate::buses::novobus::driver::{Axis, Error, OpenRings};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings, State};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::link::Line;
 use crate::rig::Session;
 use crate::scenario::run::reset_drives;
+use harness_proto::nd21::bits::status;
 use harness_proto::time::Span;
 
 /// How long a drive is given before it is looked at: some of its cycles of 432 us (4.1).
 const CYCLES: Span = Span::from_millis(5);
 /// The same after a reset.
-const RESET: Span = Span::from_millis(200);
+const AFTER_RESET: Span = Span::from_millis(200);
 
-type Call = fn(&OpenRings<'_>, Axis) -> Result<(), Error>;
+/// What is sent to a drive, and whether the drive is then as it was asked to be.
+#[derive(Clone, Copy)]
+struct Order {
+    what: &'static str,
+    call: fn(&OpenRings<'_>, Axis) -> Result<(), Error>,
+    reached: fn(&State) -> bool,
+}
+
+/// The drive may stay blocked or stopped by its inputs.
+const GO: Order = Order {
+    what: "go",
+    call: |bus, axis| bus.go(axis),
+    reached: |state| {
+        state.status & (status::BLOCK | status::STOP | status::ERROR | status::RESET) == 0
+    },
+};
+const STOP: Order = Order {
+    what: "stop",
+    call: |bus, axis| bus.stop(axis),
+    reached: |state| state.mode() != "go",
+};
+const BLOCK: Order = Order {
+    what: "block",
+    call: |bus, axis| bus.block(axis),
+    reached: |state| !["go", "stop"].contains(&state.mode()),
+};
+const DELETE_ERROR: Order = Order {
+    what: "delete-error",
+    call: |bus, axis| bus.delete_error(axis),
+    reached: |state| state.mode() != "error",
+};
+const RESET: Order = Order {
+    what: "reset",
+    call: |bus, axis| bus.reset(axis),
+    reached: |_| true,
+};
 
 /// Lets drives run.
 pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
@@ -25,7 +61,7 @@ pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit,
     rig::on(&arguments.select.rig, as_what, output, |bench, output| {
         let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
         warn(arguments, &drives, "go", output)?;
-        let exit = each(bench, &drives, output, |bus, axis| bus.go(axis), CYCLES)?;
+        let exit = each(bench, &drives, output, GO, CYCLES)?;
         if bench.has_ports() && !arguments.hold.hold {
             output.say(
                 "this command ends in the safe state; add --hold to leave the drives in go: their motors may then turn without supervision\n",
@@ -38,8 +74,7 @@ pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit,
 /// Resets drives.
 pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
     let Some(RigName::Named(_)) = &arguments.select.rig.rig else {
-        let reset: Call = |bus, axis| bus.reset(axis);
-        return with_leave(arguments, output, "reset", reset, RESET);
+        return with_leave(arguments, output, RESET, AFTER_RESET);
     };
     let first = |session: &mut Session, output: &mut Output| {
         let drives = axes::select(&arguments.select.drives, &session.axes())?;
@@ -59,7 +94,11 @@ pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Ex
         first,
         |bench, output| {
             let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
-            each(bench, &drives, output, |_, _| Ok(()), CYCLES)
+            let seen = Order {
+                call: |_, _| Ok(()),
+                ..RESET
+            };
+            each(bench, &drives, output, seen, CYCLES)
         },
     )
 }
@@ -82,16 +121,12 @@ fn leave_to(arguments: &MoveArguments, purpose: &'static str) -> Use {
 
 /// Stops drives.
 pub(crate) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
-    quietly(arguments, output, Use::look("stop"), |bus, axis| {
-        bus.stop(axis)
-    })
+    quietly(arguments, output, STOP)
 }
 
 /// Blocks drives.
 pub(crate) fn block(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
-    quietly(arguments, output, Use::look("block"), |bus, axis| {
-        bus.block(axis)
-    })
+    quietly(arguments, output, BLOCK)
 }
 
 /// Confirms errors.
@@ -112,8 +147,7 @@ pub(crate) fn delete_error(
                 axes::named(&drives)
             )));
         }
-        let confirm: Call = |bus, axis| bus.delete_error(axis);
-        each(bench, &drives, output, confirm, CYCLES)
+        each(bench, &drives, output, DELETE_ERROR, CYCLES)
     })
 }
 
@@ -121,12 +155,12 @@ pub(crate) fn delete_error(
 fn quietly(
     arguments: &SelectArguments,
     output: &mut Output,
-    what: Use,
-    call: Call,
+    order: Order,
 ) -> Result<Exit, Failure> {
-    rig::on(&arguments.rig, what, output, |bench, output| {
+    let as_what = Use::look(order.what);
+    rig::on(&arguments.rig, as_what, output, |bench, output| {
         let drives = axes::select(&arguments.drives, &bench.bus.axes())?;
-        each(bench, &drives, output, call, CYCLES)
+        each(bench, &drives, output, order, CYCLES)
     })
 }
 
@@ -134,15 +168,14 @@ fn quietly(
 fn with_leave(
     arguments: &MoveArguments,
     output: &mut Output,
-    what: &'static str,
-    call: Call,
+    order: Order,
     wait: Span,
 ) -> Result<Exit, Failure> {
-    let as_what = leave_to(arguments, what);
+    let as_what = leave_to(arguments, order.what);
     rig::on(&arguments.select.rig, as_what, output, |bench, output| {
         let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
-        warn(arguments, &drives, what, output)?;
-        each(bench, &drives, output, call, wait)
+        warn(arguments, &drives, order.what, output)?;
+        each(bench, &drives, output, order, wait)
     })
 }
 
@@ -168,16 +201,16 @@ fn warn(
 }
 
 /// Sends the command to every drive first, and then reports the state of each. A drive that does not answer does not prevent the others
-/// from being stopped.
+/// from being stopped. One that is not as it was asked to be has failed.
 fn each(
     bench: &OpenBench,
     drives: &[Axis],
     output: &mut Output,
-    call: Call,
+    order: Order,
     wait: Span,
 ) -> Result<Exit, Failure> {
     let bus = &bench.bus;
-    let done: Vec<_> = drives.iter().map(|axis| call(bus, *axis)).collect();
+    let done: Vec<_> = drives.iter().map(|axis| (order.call)(bus, *axis)).collect();
     bus.run(wait);
     let mut exit = Exit::Passed;
     for (axis, done) in drives.iter().zip(done) {
@@ -189,6 +222,18 @@ fn each(
                 let error = error.map_or(String::new(), |error| format!(", error {error}"));
                 let mode = after.mode();
                 output.result(&format!("drive {axis} is in {mode}{error}\n"))?;
+                if !(order.reached)(&after) {
+                    let what = order.what;
+                    // Only a stop and a block can fail so.
+                    let remedy = match mode {
+                        "go" => "; use the emergency stop",
+                        _ => "",
+                    };
+                    output.complain(&format!(
+                        "drive {axis}: `{what}` was sent, and it is in {mode} (ND21 11.8){remedy}"
+                    ));
+                    exit = exit.max(Exit::Failed);
+                }
             }
         }
     }

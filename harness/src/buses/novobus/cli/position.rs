@@ -3,8 +3,8 @@
 use super::args::PositionArguments;
 use super::axes;
 use super::rig::{self, OpenBench, Use};
-use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::find;
+use crate::buses::novobus::driver::{Axis, Error, OpenRings};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -25,8 +25,8 @@ struct Run {
     speed: Option<u16>,
     reference: bool,
     init: bool,
-    /// What it is, in words.
-    words: String,
+    /// Where it ends, in words; none of a referencing run alone.
+    words: Option<String>,
 }
 
 /// Takes a drive to a position.
@@ -58,9 +58,16 @@ fn turn(
             None => run.cell(bench, "ps_v0")?,
         },
     ];
+    let mut words = Vec::new();
+    if run.reference {
+        // Their directions and speeds have nothing to do with ps_v0 (13.1.4).
+        let [first, second] = [run.cell(bench, "RefV1")?, run.cell(bench, "RefV2")?];
+        words.push(format!("a referencing run (RefV1 {first}, RefV2 {second})"));
+    }
+    words.extend(run.words.clone());
+    let words = words.join(", then ");
     let warning = format!(
-        "drive {axis} stands at {place} and will turn: {}, at most at {speed} (ps_v0)",
-        run.words
+        "drive {axis} stands at {place} and will turn: {words}, at most at {speed} (ps_v0)"
     );
     if !arguments.leave {
         return Err(Failure::refused(format!(
@@ -116,8 +123,6 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Resul
     if speed.is_some_and(|speed| speed <= 0) {
         return Err(Failure::refused("--speed must be more than 0 rpm"));
     }
-    let first = arguments.reference.then(|| "a referencing run".to_owned());
-    let words: Vec<_> = first.into_iter().chain(words).collect();
     Ok(Run {
         axis,
         units,
@@ -125,7 +130,7 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Resul
         speed: speed.map(i16::cast_unsigned),
         reference: arguments.reference,
         init: arguments.init,
-        words: words.join(", then "),
+        words,
     })
 }
 
@@ -174,6 +179,19 @@ impl Run {
     /// Does it; `before` is `ps_v0`, which another speed is for this run only.
     fn play(&self, bench: &OpenBench, bar: &ProgressBar, before: u16) -> Result<(), Failure> {
         let (bus, axis) = (&bench.bus, self.axis);
+        if let Some(speed) = self.speed {
+            bus.write_word(axis, ram::PS_V0, speed)?;
+        }
+        let end = self.turn(bus, bar);
+        let restored = match self.speed {
+            Some(_) => bus.restore_ps_v0(axis, before).map(|_| ()),
+            None => Ok(()),
+        };
+        Ok(end.and(restored)?)
+    }
+
+    fn turn(&self, bus: &OpenRings<'_>, bar: &ProgressBar) -> Result<(), Error> {
+        let axis = self.axis;
         if self.reference {
             bus.reference_showing(axis, |flags2| show(bar, ram::FLAGS2, flags2))?;
         }
@@ -183,20 +201,9 @@ impl Run {
         let Some(target) = self.target else {
             return Ok(());
         };
-        if let Some(speed) = self.speed {
-            bus.write_word(axis, ram::PS_V0, speed)?;
-        }
-        let end = bus
-            .write_ps(axis, target)
-            .and_then(|()| bus.start_ps(axis))
-            .and_then(|()| {
-                bus.wait_for_end_showing(axis, |status| show(bar, ram::PS_STATUS, status))
-            });
-        let restored = match self.speed {
-            Some(_) => bus.restore_ps_v0(axis, before).map(|_| ()),
-            None => Ok(()),
-        };
-        Ok(end.and(restored)?)
+        bus.write_ps(axis, target)?;
+        bus.start_ps(axis)?;
+        bus.wait_for_end_showing(axis, |status| show(bar, ram::PS_STATUS, status))
     }
 
     /// A raw `ps_v0` in words.

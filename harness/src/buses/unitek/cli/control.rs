@@ -108,6 +108,9 @@ pub(super) fn block(
     )
 }
 
+/// What `delete-error` sends.
+const CANCELLED: &str = "the command that clears errors was sent";
+
 /// Clears errors.
 pub(super) fn delete_error(
     bench: PortBench<'_, UnitekDrives>,
@@ -126,7 +129,7 @@ pub(super) fn delete_error(
         refuse_denied(&mut session.driver(), &orders)?;
         each(session, &drives, output, |driver, axis| {
             let _never_answered = driver.write(axis, CANCEL.0, Data::Short(CANCEL.1))?;
-            Ok("errors cleared")
+            Ok(CANCELLED)
         })
     })
 }
@@ -159,6 +162,12 @@ fn each(
                 };
                 let node = axis.node;
                 output.result(&format!("drive {node}: {done}; {ready}{errors}\n"))?;
+                if done == CANCELLED && !errors.is_empty() {
+                    output.complain(&format!(
+                        "drive {node}: its errors stay: their causes are there"
+                    ));
+                    exit = exit.max(Exit::Failed);
+                }
             }
         }
     }
