@@ -25,6 +25,12 @@ impl Trouble {
         !matches!(self, Self::Denied(_))
     }
 
+    /// Whether the bench itself has failed, or may not go on: neither a denial nor an interruption.
+    #[must_use]
+    pub fn is_of_the_bench(&self) -> bool {
+        matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interlock(_))
+    }
+
     /// Whether nothing arrives any more. After a denial or a failed interlock, what was sent before still comes round.
     #[must_use]
     pub fn stops_the_line(&self) -> bool {

@@ -543,6 +543,16 @@ pub struct Deviation {
     pub reason: String,
 }
 
+impl Deviation {
+    /// Whether it explains a difference from this rule in a ring, counted from 0. Of which drive that is may not be known.
+    #[must_use]
+    pub fn explains(&self, rule: &str, ring: usize, drive: Option<u8>) -> bool {
+        self.rule == rule
+            && usize::from(self.ring) == ring + 1
+            && (self.drives.is_empty() || drive.is_none_or(|own| self.drives.contains(&own)))
+    }
+}
+
 const fn yes() -> bool {
     true
 }
@@ -561,4 +571,31 @@ fn tenth() -> Time {
 
 fn three_milliseconds() -> Time {
     Time(std::time::Duration::from_millis(3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A known deviation of one drive excuses no other one, and no other ring.
+    #[test]
+    fn a_known_deviation_is_of_its_drives() {
+        let known = |drives: &[u8]| Deviation {
+            name: "an-old-quirk".to_owned(),
+            ring: 1,
+            drives: drives.to_vec(),
+            rule: "manual 10.2".to_owned(),
+            scenario: None,
+            expected: None,
+            received: None,
+            reason: "it has always done so".to_owned(),
+        };
+        let own = known(&[0, 3]);
+        assert!(own.explains("manual 10.2", 0, Some(3)));
+        assert!(own.explains("manual 10.2", 0, None));
+        assert!(!own.explains("manual 10.2", 0, Some(2)));
+        assert!(!own.explains("manual 10.2", 1, Some(3)));
+        assert!(!own.explains("manual 10.3", 0, Some(3)));
+        assert!(known(&[]).explains("manual 10.2", 0, Some(2)));
+    }
 }

@@ -91,7 +91,7 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
 
     fn sound(&mut self) -> Result<(), ExploreError> {
         match self.session.link().trouble() {
-            Some(trouble @ (Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_))) => {
+            Some(trouble) if trouble.is_of_the_bench() => {
                 Err(ExploreError::Lost(trouble.to_string()))
             }
             _ => Ok(()),

@@ -231,14 +231,10 @@ impl Target for OnRig<'_, '_> {
         let mut tried: Tried = Tried::default();
         if let Some(trouble) = self.run.session().link().trouble() {
             self.stale = true;
-            match trouble {
-                Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) => {
-                    return Err(ExploreError::Lost(trouble.to_string()));
-                }
-                Trouble::Denied(_) | Trouble::Interrupted => {
-                    tried.not_played = Some(trouble.to_string());
-                }
+            if trouble.is_of_the_bench() {
+                return Err(ExploreError::Lost(trouble.to_string()));
             }
+            tried.not_played = Some(trouble.to_string());
         } else {
             let times = self.times(&said);
             let received: Vec<_> = said.received.iter().map(|(_, byte)| *byte).collect();
@@ -260,7 +256,9 @@ impl Target for OnRig<'_, '_> {
             let deviations = &self.run.session().rig().file.deviation;
             let known = tried.difference.take_if(|found| {
                 let rule = format!("nd21 {}", found.section);
-                deviations.iter().any(|entry| entry.rule == rule)
+                let drive = found.drive.or(found.meant);
+                let mut known = deviations.iter();
+                known.any(|entry| entry.explains(&rule, found.ring, drive))
             });
             tried.before = (tried.difference.is_some() && !before.is_empty()).then_some(before);
             self.history[ring].push(answered.clone());

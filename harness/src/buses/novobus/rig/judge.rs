@@ -114,15 +114,8 @@ fn diverged(
 ) -> Option<Explanation> {
     let rule = format!("nd21 {}", divergence.role.rule().0);
     let mut known = facts.rig.file.deviation.iter();
-    let explains = |entry: &&Deviation| {
-        let drives = &entry.drives;
-        let may_be = divergence.drive.or(divergence.role.drive());
-        entry.rule == rule
-            && by_hand(entry)
-            && usize::from(entry.ring) == divergence.ring + 1
-            && (drives.is_empty() || may_be.is_none_or(|drive| drives.contains(&drive)))
-    };
-    match known.find(explains) {
+    let may_be = divergence.drive.or(divergence.role.drive());
+    match known.find(|entry| by_hand(entry) && entry.explains(&rule, divergence.ring, may_be)) {
         Some(entry) => {
             if outcome.verdict != Verdict::Inconclusive {
                 outcome.verdict = Verdict::Passed;
