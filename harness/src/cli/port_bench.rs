@@ -3,9 +3,9 @@
 use super::exit::Exit;
 use super::failure::Failure;
 use super::output::Output;
-use super::rig_failure::{alarm, exit_of, tell_end};
+use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use crate::buses::commands::{Axes, RigArguments, Use};
-use crate::link::{Line, Trouble};
+use crate::link::Line as _;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::source::Source;
@@ -81,17 +81,8 @@ fn give_back<D: PortDrives>(
         }
         Err(failure) => (failure.tell(output), as_what.looks_only()),
     };
-    let trouble = session.link().trouble().cloned();
-    let exit = match trouble.clone() {
-        Some(Trouble::Interrupted) => Exit::Interrupted,
-        // It may have shown behind the last call of a command that went well.
-        Some(Trouble::Interlock(why)) if exit != Exit::Interlock => {
-            output.complain(&why);
-            Exit::Interlock
-        }
-        _ => exit,
-    };
-    let end = match leave && trouble.is_none() {
+    let exit = exit_of_end(session.link().trouble(), exit, output);
+    let end = match leave {
         true => session.release(),
         false => session.close(matches!(exit, Exit::RigError | Exit::Interlock)),
     };

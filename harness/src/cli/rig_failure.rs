@@ -87,8 +87,11 @@ pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -
 pub(crate) fn exit_of_end(trouble: Option<&Trouble>, exit: Exit, output: &mut Output) -> Exit {
     match trouble {
         Some(Trouble::Interrupted) => Exit::Interrupted,
+        // It may have shown behind the last call of a command that went well.
         Some(Trouble::Interlock(why)) => {
-            output.complain(why);
+            if exit != Exit::Interlock {
+                output.complain(why);
+            }
             Exit::Interlock
         }
         // It may have come behind the last scenario, which has judged everything by then; the bench has failed all the same.

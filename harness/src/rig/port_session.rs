@@ -102,7 +102,7 @@ impl<D: PortDrives> PortSession<D> {
             drives,
             deadline,
             listen_only: port.listen_only,
-            // Nothing has been sent: there is nothing to make safe.
+            // Nothing has been moved: there is nothing to make safe while the drives have not been found ready.
             ended: true,
             watchdog: None,
             _locks: locks,
@@ -113,6 +113,7 @@ impl<D: PortDrives> PortSession<D> {
         }
         match D::ready(&mut session, options.ill_as_well) {
             Err(_) if session.link.trouble() == Some(&Trouble::Interrupted) => {
+                session.ended = session.listen_only;
                 let end = Some(Box::new(session.end(false)));
                 let rig = rig.id().to_owned();
                 return Err(SessionError::Interrupted { rig, end });
@@ -273,11 +274,14 @@ impl<D: PortDrives> PortSession<D> {
         self.end(error)
     }
 
-    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn.
+    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn. Where trouble has ended
+    /// that, they are taken to their safe state all the same.
     #[must_use]
     pub fn release(mut self) -> End {
-        self.ended = true;
-        self.end(false)
+        let trouble = self.link.trouble();
+        self.ended |= trouble.is_none();
+        let error = trouble.is_some_and(Trouble::is_of_the_bench);
+        self.end(error)
     }
 
     fn end(&mut self, error: bool) -> End {

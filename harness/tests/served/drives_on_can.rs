@@ -283,9 +283,9 @@ fn a_program_that_hangs_is_watched() {
     desk.shows("write 1 SPEED_CMD=10% --move --hold", "0CCD");
     let line = "watch all all --every 1ms --for 500s --rig desk.toml";
     let mut child = desk.command(line).spawn().expect("the program");
-    // Nobody reads its output, so that the pipe is full soon.
+    // Its output is not read, so that the pipe is full soon, if it is not by now.
     let pipe = child.stdout.as_ref().expect("its output");
-    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
+    let _fuller = rustix::pipe::fcntl_setpipe_size(pipe, 4_096);
     let mut said = String::new();
     let mut err = child.stderr.take().expect("a pipe");
     std::io::Read::read_to_string(&mut err, &mut said).expect("text");
@@ -296,21 +296,24 @@ fn a_program_that_hangs_is_watched() {
     ended(&commands, 0, "31   SPEED_CMD  0000");
 }
 
-/// A signal while drives are asked for the first time ends the program, and nothing was changed.
+/// A signal while drives are asked for the first time ends the program: a motor that was left turning stops, and the drive that does not
+/// answer is named.
 #[test]
 fn a_signal_while_the_bench_is_opened() {
     let desk = Desk::new("slcan", MOTION);
+    desk.shows("go 1 --move --hold", "drive 1: released");
+    desk.shows("write 1 SPEED_CMD=10% --move --hold", "0CCD");
     let path = desk.path("desk.toml");
     let text = std::fs::read_to_string(&path).expect("a rig");
-    let text = text
+    let other = text
         .replace("{ node = 2 }", "{ node = 9 }")
-        .replace("2s", "100s");
-    std::fs::write(&path, text).expect("room");
+        .replace("2s", "5s");
+    std::fs::write(&path, other).expect("room");
     let mut other = connect(&desk.slcan);
     other.write_all(b"S6\rO\r").expect("sent");
     let mut heard = BufReader::new(other.try_clone().expect("a socket"));
     let child = desk
-        .command("read 1 MODE --rig desk.toml")
+        .heeding("read 1 MODE --rig desk.toml")
         .spawn()
         .expect("the program");
     // The request to the drive that is not there.
@@ -320,10 +323,14 @@ fn a_signal_while_the_bench_is_opened() {
         heard.read_until(b'\r', &mut frame).expect("a frame");
     }
     let id = child.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &id]).status();
+    let sent = Command::new("kill").args(["-HUP", &id]).status();
     assert!(sent.expect("kill").success());
     let output = child.wait_with_output().expect("its end");
-    ended(&output, 130, "interrupted");
+    ended(&output, 7, "interrupted; ");
+    ended(&output, 7, "the safe state is NOT confirmed");
+    ended(&output, 7, "drive 9");
+    std::fs::write(&path, text).expect("room");
+    desk.shows("read 1 MODE", "0004");
 }
 
 /// Drives behind an adapter are explored: right ones are not accused, whatever the manual leaves open; a wrong one is found.

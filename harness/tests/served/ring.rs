@@ -3,7 +3,7 @@
 use harness::port::PortAddress;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 /// The process and where its rings are; it ends with this value.
 pub(crate) struct Served {
@@ -108,4 +108,17 @@ impl Drop for Served {
         let _gone = self.child.kill();
         let _gone = self.child.wait();
     }
+}
+
+/// What comes of a run in real time, or of the next one, four at most: a computer that stands still in its middle shows no wrong drive,
+/// but it shows no right one either.
+pub(crate) fn in_the_end(code: i32, mut run: impl FnMut() -> Output) -> Output {
+    let mut output = run();
+    for _ in 1..4 {
+        if output.status.code() == Some(code) {
+            break;
+        }
+        output = run();
+    }
+    output
 }

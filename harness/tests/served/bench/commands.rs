@@ -1,8 +1,8 @@
 //! The commands on drives, on a ring that another process serves: one process a command, as a person types them.
 
-use super::{Desk, finish, playing, signal};
+use super::{CHECK, Desk, finish, playing, signal};
 use crate::program::{ended, said};
-use crate::ring::Served;
+use crate::ring::{Served, in_the_end};
 use harness::port::PortAddress;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt as _;
@@ -23,10 +23,21 @@ pub(crate) fn desk(quiet: bool) -> (Served, Desk) {
     (served, desk)
 }
 
+/// The command goes well and says this. Behind a standstill of the computer the bench recovers the ring, and its drives are in error
+/// (ND21 9.8): then the errors are confirmed, and it is given again.
 #[track_caller]
 pub(crate) fn shows(desk: &Desk, command: &str, words: &str) {
     let arguments: Vec<_> = command.split(' ').collect();
-    ended(&desk.run(&arguments), 0, words);
+    let mut output = desk.run(&arguments);
+    for _ in 1..4 {
+        let text = said(&output);
+        if text.contains(words) || !text.contains("error 0504") {
+            break;
+        }
+        let _confirmed = desk.run(&["delete-error", "all", "--move"]);
+        output = desk.run(&arguments);
+    }
+    ended(&output, 0, words);
 }
 
 /// What only looks leaves drives as they are; what changes them ends in the safe state (ND21 11.8).
@@ -306,8 +317,8 @@ fn an_interlock_trips() {
         std::fs::write(&scenario, FASTER.replace("{}", speed)).expect("room");
         desk.run(&["run", name, "--allow-motion"])
     };
-    ended(&run("0200"), 0, "1 passed");
-    let fast = run("075F");
+    ended(&in_the_end(0, || run("0200")), 0, "1 passed");
+    let fast = in_the_end(6, || run("075F"));
     let words = "interlock on nist of drive 0 (the belt comes off):";
     ended(&fast, 6, words);
     ended(&fast, 6, "at least -300 and at most 300 is required");
@@ -321,7 +332,12 @@ fn an_interlock_trips() {
     // An input that is not as it must be lets nothing begin.
     let input = "[[interlock]]\ndrive = 1\ninput = \"GPIN4\"\nlevel = \"high\"\n";
     std::fs::write(&path, text + input).expect("room");
-    for arguments in [&["run", "9.2-synco"][..], &["read", "0", "nist"]] {
+    for arguments in [
+        &["run", "9.2-synco"][..],
+        &["read", "0", "nist"],
+        &["recover"],
+        &CHECK,
+    ] {
         let output = desk.run(arguments);
         ended(
             &output,
@@ -372,9 +388,9 @@ fn a_program_that_hangs_is_watched() {
     ]
     .concat();
     let mut child = desk.command(&watch).spawn().expect("the program");
-    // Soon full.
+    // Soon full, if it is not by now.
     let pipe = child.stdout.as_ref().expect("its output");
-    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
+    let _fuller = rustix::pipe::fcntl_setpipe_size(pipe, 4_096);
     let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
     let status = loop {
         if let Some(status) = child.try_wait().expect("a process") {

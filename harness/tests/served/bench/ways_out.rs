@@ -1,7 +1,7 @@
 //! Every way out of a command on a rig: signals, a bench that is still being opened, and output that cannot be written.
 
 use super::commands::{SAFE, desk, shows};
-use super::{Desk, finish, playing, signal};
+use super::{CHECK, Desk, finish, playing, signal};
 use crate::program::{ended, said};
 use crate::ring::Served;
 use harness::port::PortAddress;
@@ -209,8 +209,14 @@ fn a_hook_that_fails_shows_in_the_exit_code() {
         "[limits]\n",
         "[hooks.after]\ncommand = [\"false\"]\n[limits]\n",
     );
-    ended(&desk.run(&["read", "0", "nist"]), 3, "`false` failed");
-    ended(&desk.run(&["run", "9.2-synco"]), 3, "`false` failed");
+    for command in [
+        &["read", "0", "nist"][..],
+        &["recover"],
+        &CHECK,
+        &["run", "9.2-synco"],
+    ] {
+        ended(&desk.run(command), 3, "`false` failed");
+    }
 }
 
 /// A drive's `ps_v0` after a reset is its maximum speed (ND21 13.1.4), which a rig with `max_speed` does not let be written back.
@@ -227,6 +233,26 @@ fn a_positioning_ends_under_a_maximum_speed() {
     ended(&output, 0, SAFE);
 }
 
+/// A referencing run is allowed where `ps_v0` and its own speeds are (ND21 13.1.4): `--speed` is for it, too.
+#[test]
+fn a_referencing_run_ends_under_a_maximum_speed() {
+    let cam = ["drive 0 cam GPIN4 1turns..1.5turns"];
+    let served = Served::start_with("nd21", &[2], "tcp", true, &[], &cam);
+    let desk = Desk::of(&served);
+    edit(
+        &desk,
+        "[limits]\n",
+        "[health]\nquiet = true\n[limits]\nmax_speed = \"300rpm\"\n",
+    );
+    shows(&desk, "delete-error all --move", "drive 0 is in");
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    let position = "position 0 --reference --to 1turns --speed 100rpm --move";
+    let output = desk.run(&position.split(' ').collect::<Vec<_>>());
+    ended(&output, 0, "drive 0 stands at");
+    ended(&output, 0, "a referencing run (RefV1 200.01 rpm,");
+    ended(&output, 0, SAFE);
+}
+
 /// The cause of an early end is reported once, and so is whether the drives stand.
 #[test]
 fn a_positioning_that_is_interrupted_ends_in_the_safe_state() {
@@ -239,7 +265,8 @@ fn a_positioning_that_is_interrupted_ends_in_the_safe_state() {
     let mut said = std::io::BufReader::new(child.stderr.take().expect("its messages"));
     let mut text = String::new();
     while !text.contains("will turn") {
-        said.read_line(&mut text).expect("a line");
+        let read = said.read_line(&mut text).expect("a line");
+        assert_ne!(read, 0, "{text}");
     }
     signal(&child, "-INT");
     said.read_to_string(&mut text).expect("its messages");
@@ -260,7 +287,7 @@ fn a_denied_scenario_is_not_played() {
         "write-word 0 nsoll = 100rpm",
         "drive 0 memory FF6C = 01 00",
     ] {
-        let text = format!("title Denied\nring 2\n{line}\nwait 1ms\n");
+        let text = format!("title Denied\nring 2\n{line}\n> 80\n");
         std::fs::write(&path, text).expect("room");
         let output = desk.run(&["run", path.to_str().expect("a name")]);
         ended(&output, 2, "needs `allow_motion` in the rig's [limits]");

@@ -7,6 +7,7 @@ use crate::buses::novobus::driver::{self, Axis, Recovery};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
+use crate::cli::rig_failure::tell_end;
 use crate::counted::counted;
 use crate::link::Line;
 use serde_json::json;
@@ -29,13 +30,13 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
         }
     }
     let trouble = session.link().trouble().cloned();
-    for remark in session.release().remarks {
-        output.complain(&remark);
-    }
-    match trouble {
+    let end = session.release();
+    let exit = match trouble {
         Some(trouble) => Err(driver::Error::Link(trouble).into()),
         None => show(arguments, &found, output),
-    }
+    };
+    let exit = exit.unwrap_or_else(|failure| failure.tell(output));
+    Ok(tell_end(&end, exit, output))
 }
 
 pub(super) fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {

@@ -10,9 +10,9 @@ use crate::buses::novobus::rig::named::sizes_of_rings;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
+use crate::cli::rig_failure::{alarm, exit_of, exit_of_end, find_rig, tell_end};
 use crate::counted::counted;
-use crate::link::{Line, Link, Trouble};
+use crate::link::{Line, Link};
 use crate::medium::{Heard, Medium, Out};
 use crate::rig::find::{or_meant, simulated_port};
 use crate::rig::{self, Rig, Session, Shared};
@@ -350,7 +350,6 @@ fn give_back(
     let trouble = rig
         .with(|session| session.link().trouble().cloned())
         .flatten();
-    let sound = trouble.is_none();
     let (exit, leave) = match result {
         Ok(exit) => (exit, as_what.holds),
         // Impossible requests and missing permissions are refused before anything is done.
@@ -359,16 +358,8 @@ fn give_back(
         }
         Err(failure) => (failure.tell(output), false),
     };
-    let exit = match trouble {
-        Some(Trouble::Interrupted) => Exit::Interrupted,
-        // It may have shown behind the last call of a command that went well.
-        Some(Trouble::Interlock(why)) if exit != Exit::Interlock => {
-            output.complain(&why);
-            Exit::Interlock
-        }
-        _ => exit,
-    };
-    let end = if leave && sound {
+    let exit = exit_of_end(trouble.as_ref(), exit, output);
+    let end = if leave {
         rig.release()
     } else {
         rig.close(matches!(exit, Exit::RigError | Exit::Interlock))

@@ -2,12 +2,12 @@
 
 use crate::buses::novobus::driver::Error;
 use crate::cli::exit::Exit;
+use crate::cli::failure::exit_of_trouble;
 use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
 use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::run::progress_bar;
 use crate::counted::counted;
-use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
 use crate::rig::{Rig, Session, UseOptions};
 use crate::signals::interrupt_flag;
@@ -73,8 +73,8 @@ pub(crate) fn check(
         Ok(figures) => figures,
         Err(error) => {
             output.complain(&format!("failed to read the drives: {error}"));
-            let exit = match error {
-                Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+            let exit = match &error {
+                Error::Link(trouble) => exit_of_trouble(trouble),
                 _ => Exit::RigError,
             };
             return Ok(ended(exit, output));

@@ -2,7 +2,7 @@
 
 use super::line_test::{self, RingPace};
 use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, State};
-use crate::link::Octets;
+use crate::link::{Line as _, Octets};
 use crate::rig::Rig;
 use crate::rig::shared::Shared;
 use crate::rig::stated_rate;
@@ -87,7 +87,14 @@ pub fn measure(
     let rings: Vec<_> = rings.collect();
     let rig = session.rig().clone();
     let shared = Shared::new(session);
-    match drives(&shared, &rig, &sizes, told) {
+    let read = drives(&shared, &rig, &sizes, told);
+    // It may have shown behind the last answer.
+    let trouble = shared.with(|session| session.link().trouble().cloned());
+    let read = match trouble.flatten() {
+        Some(trouble) => Err(driver::Error::Link(trouble)),
+        None => read,
+    };
+    match read {
         Ok((drives, corrected)) => {
             let figures = Figures {
                 rings,

@@ -74,11 +74,12 @@ impl Session {
                 Self::with_damaged_ff(rig, options, error)
             }
             Err(error @ SessionError::Ill { .. }) => {
-                let mut neighbours = cause::neighbours(rig).into_iter();
-                match neighbours.find(|(_, other)| Self::opens(other, options) == Some(true)) {
-                    Some((cause, _)) => Err(error.because(cause)),
-                    None => Err(error),
+                for (cause, other) in cause::neighbours(rig) {
+                    if Self::opens(&other, options)? == Some(true) {
+                        return Err(error.because(cause));
+                    }
                 }
+                Err(error)
             }
             Err(other) => Err(other),
         }
@@ -96,7 +97,7 @@ impl Session {
             return Err(error.because(LikelyCause::Marks { right }));
         };
         for _ in 0..PORT_TRIES {
-            match Self::opens(&other, options) {
+            match Self::opens(&other, options)? {
                 Some(false) => {
                     let mut session = Self::open_as_stated(rig, options)?;
                     session.learn();
@@ -109,26 +110,30 @@ impl Session {
         Err(error.because(cause))
     }
 
-    /// Whether a ring opens as this file says; `None` where the port itself is in the way. Nothing more is tried after an interruption.
-    fn opens(other: &Rig, options: &UseOptions) -> Option<bool> {
+    /// Whether a ring opens as this file says; `None` where the port itself is in the way. Nothing more is tried after an interruption, which
+    /// is the error.
+    fn opens(other: &Rig, options: &UseOptions) -> Result<Option<bool>, SessionError> {
         let plain = UseOptions {
             ill_as_well: false,
             allow_motion: false,
             ..options.clone()
         };
         if options.interrupt.load(Ordering::Relaxed) {
-            return Some(false);
+            return Ok(Some(false));
         }
-        match Self::open_as_stated(other, &plain).map(Self::release) {
-            Ok(_) => Some(true),
-            Err(SessionError::Ill { ill, .. }) => match ill {
-                // Its drives have answered.
-                Unhealthy::Slow { .. } | Unhealthy::Late { .. } => Some(true),
-                Unhealthy::Trouble(_) => None,
-                _ => Some(false),
+        Ok(
+            match Self::open_as_stated(other, &plain).map(Self::release) {
+                Ok(_) => Some(true),
+                Err(interrupted @ SessionError::Interrupted { .. }) => return Err(interrupted),
+                Err(SessionError::Ill { ill, .. }) => match ill {
+                    // Its drives have answered.
+                    Unhealthy::Slow { .. } | Unhealthy::Late { .. } => Some(true),
+                    Unhealthy::Trouble(_) => None,
+                    _ => Some(false),
+                },
+                Err(_) => None,
             },
-            Err(_) => None,
-        }
+        )
     }
 
     /// Takes a rig as its file describes it.
@@ -543,9 +548,14 @@ impl Session {
         self.end(true)
     }
 
-    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn.
+    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn. Where trouble has ended
+    /// that, they are taken to their safe state all the same.
     #[must_use]
     pub fn release(mut self) -> End {
+        if let Some(trouble) = self.link.trouble().filter(|_| !self.ended) {
+            let error = trouble.is_of_the_bench();
+            return self.end(error);
+        }
         self.ended = true;
         let mut end = End {
             safe: None,

@@ -70,6 +70,9 @@ pub(crate) fn check(
         ),
         false => text,
     };
-    output.result(&text)?;
+    let exit = match output.result(&text) {
+        Ok(()) => exit,
+        Err(error) => output.unwritable(&error),
+    };
     Ok(tell_end(&end, exit, output))
 }
