@@ -47,8 +47,10 @@ pub(crate) struct PortRow {
     pub(crate) has_rate: fn(u32) -> bool,
     /// See [`PortBus::drive`].
     pub(crate) drive: fn(usize, Node) -> (u8, Vec<u16>),
-    /// The mistakes of `setup` lines.
+    /// The mistakes of a setup, whose steps are ignored.
     pub(crate) setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
+    /// The steps among lines of a header.
+    pub(crate) steps: fn(&Source) -> Option<Problems>,
     /// See [`PortBus::special_register`].
     pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
     /// The key under which an entry of `[[interlock]]` names what it looks at, and what checks the entry.
@@ -136,7 +138,8 @@ impl PortBus {
             name: "setup".to_owned(),
             text: lines.join("\n").into(),
         };
-        let read = (self.row().setup_mistakes)(port, &source);
+        let row = self.row();
+        let read = (row.steps)(&source).or_else(|| (row.setup_mistakes)(port, &source));
         let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
         let problems = read.iter().flat_map(Problems::all);
         let placed = problems.map(|own| (line(own), own.clone()));

@@ -43,6 +43,8 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     const SOURCE: &'static str;
     /// A step and what it does, for messages.
     const EXAMPLE: &'static str;
+    /// A line of a header about a drive, for messages.
+    const HEADER_EXAMPLE: &'static str;
 
     /// The header lines of the bus, as written.
     type Header: Clone + Debug + Default;
@@ -307,6 +309,9 @@ pub trait Settle<L: Language>: Sized {
 
     /// How many pieces a settled step sends and expects.
     fn pieces(act: &L::Act) -> (usize, usize);
+
+    /// Whether a settled step can fail because of what the drives do.
+    fn judges(act: &L::Act) -> bool;
 
     /// What the settled header needs of a rig.
     fn needs(&self, scenario: &Scenario<L>) -> Vec<Capability>;

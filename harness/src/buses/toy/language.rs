@@ -122,6 +122,10 @@ impl Settle<Valves> for Planner {
         }
     }
 
+    fn judges(_: &Own) -> bool {
+        true
+    }
+
     fn needs(&self, _: &Scenario<Valves>) -> Vec<Capability> {
         Vec::new()
     }
@@ -138,6 +142,7 @@ impl Language for Valves {
     const STRICT: bool = true;
     const SOURCE: &'static str = "valves 2.1";
     const EXAMPLE: &'static str = "`> 101 00`: the bench asks valve 1";
+    const HEADER_EXAMPLE: &'static str = "`valve 1 sticks`";
 
     type Header = Vec<(u8, bool)>;
     type Message = Message;

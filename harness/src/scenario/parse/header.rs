@@ -200,6 +200,28 @@ impl<L: Language> Reader<L> {
     }
 }
 
+/// Reads lines of a header, which need not be complete.
+///
+/// # Errors
+/// Every line that cannot be understood, and every step.
+pub(crate) fn header_lines<L: Language>(source: &Source) -> Result<L::Header, Problems> {
+    let scenario: Scenario<L> = read(source, Part::Header)?;
+    let problems: Vec<_> = scenario.steps.iter().map(no_header_line).collect();
+    match problems.is_empty() {
+        true => Ok(scenario.header),
+        false => Err(Problems::new(&source.name, source.text.clone(), problems)),
+    }
+}
+
+fn no_header_line<L: Language>(step: &Step<L>) -> Problem {
+    let what = "this is a step, and only header lines are allowed here";
+    let expected = format!(
+        "a line of a header expected here, such as {}",
+        L::HEADER_EXAMPLE
+    );
+    Problem::new(step.span, what, expected)
+}
+
 fn no_step(example: &str) -> Problem {
     let what = "the scenario has no step";
     let problem = Problem::new(TextSpan::default(), what, "a step expected");

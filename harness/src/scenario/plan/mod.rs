@@ -44,6 +44,17 @@ impl<L: Language> Plan<L> {
         let steps = self.steps.iter();
         steps.map(|step| step.action.pieces().0).sum()
     }
+
+    /// Whether a step judges what the drives do.
+    #[must_use]
+    pub fn judges(&self) -> bool {
+        let judges = |action: &PlannedAction<L>| match action {
+            PlannedAction::Send(..) | PlannedAction::Wait(_) => false,
+            PlannedAction::Receive(..) => true,
+            PlannedAction::Own(act) => L::Planner::judges(act),
+        };
+        self.strict || self.steps.iter().any(|step| judges(&step.action))
+    }
 }
 
 impl<L: Language> Deref for Plan<L> {

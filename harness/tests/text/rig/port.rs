@@ -186,6 +186,10 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             port("slcan = \"/dev/ttyACM0\"").replace("{ node = 1 }", "{ node = 200 }"),
         ),
         (
+            "steps among the lines of a setup",
+            port("[sim]\nbus = \"unitek\"\nsetup = [\"drive 1 input run low\", \"write 1 SPEED_CMD = 10%\", \"wait 1ms\"]"),
+        ),
+        (
             "a highest speed above all",
             port("slcan = \"/dev/ttyACM0\"\n[limits]\nmax_speed = \"120%\""),
         ),

@@ -38,6 +38,7 @@ impl Language for Nordac {
     const ROUND: Span = Span::from_millis(11_000);
     const SOURCE: &'static str = "nordac 3.2.1";
     const EXAMPLE: &'static str = "`> 10 08 02 49 53 16`: the master asks slave 8 for its status";
+    const HEADER_EXAMPLE: &'static str = "`slave 8 ppo 2`";
 
     type Header = Header;
     type Message = Message;

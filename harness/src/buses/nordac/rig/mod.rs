@@ -25,7 +25,7 @@ use crate::cli::port_bench::PortBench;
 use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
-use crate::scenario::parse::header::{Part, read};
+use crate::scenario::parse::header::{Part, header_lines, read};
 use crate::scenario::plan::plan as settle;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
@@ -65,6 +65,7 @@ pub(crate) const PORT: PortRow = PortRow {
     has_rate: |bits| BusRate::from_bits_per_second(bits).is_some(),
     drive: |_, node| (node.address.unwrap_or_default(), Vec::new()),
     setup_mistakes: |port, source| setup(port, source).err(),
+    steps: |source| header_lines::<Nordac>(source).err(),
     special_register: |name| {
         let expected = "no such permission expected on this bus".to_owned();
         Err((format!("`{name}` is no register of a NORDAC"), expected))

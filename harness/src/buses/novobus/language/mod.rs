@@ -36,6 +36,7 @@ impl Language for Novobus {
     const STRICT: bool = false;
     const SOURCE: &'static str = "nd21 9.7";
     const EXAMPLE: &'static str = "`> 80`: the master sends SYNCO";
+    const HEADER_EXAMPLE: &'static str = "`drive 1 input GPIN3 high`";
 
     type Header = Header;
     type Message = Pattern;

@@ -40,6 +40,7 @@ impl Language for Unitek {
     const ROUND: Span = Span::from_millis(11_000);
     const SOURCE: &'static str = "unitek 5.4 ex 8";
     const EXAMPLE: &'static str = "`> 201 3D 40 00`: the master asks drive 1 for STATUS";
+    const HEADER_EXAMPLE: &'static str = "`drive 1 input run low`";
 
     type Header = Header;
     type Message = Message;

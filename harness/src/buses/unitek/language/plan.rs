@@ -599,6 +599,15 @@ impl Settle<Unitek> for Planner {
         }
     }
 
+    fn judges(act: &Act) -> bool {
+        match act {
+            Act::Frame(..) | Act::Harm(..) | Act::Outside(..) | Act::Restart(_) | Act::Send(_) => {
+                false
+            }
+            Act::Quiet | Act::Register(..) | Act::Read { .. } | Act::Driver(..) => true,
+        }
+    }
+
     fn needs(&self, scenario: &Scenario<Unitek>) -> Vec<Capability> {
         let lines = scenario.header.drives.iter();
         let needs = lines.filter_map(|line| match &line.what {

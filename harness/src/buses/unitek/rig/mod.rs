@@ -26,6 +26,7 @@ use crate::cli::port_bench::PortBench;
 use crate::cli::shell::HeldPort;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::rig::segment::run::{PortJudge, PortRun};
+use crate::scenario::parse::header::header_lines;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
@@ -53,6 +54,7 @@ pub(crate) const PORT: PortRow = PortRow {
         (number, vec![rx, tx])
     },
     setup_mistakes: |port, source| setup(port, source).err(),
+    steps: |source| header_lines::<Unitek>(source).err(),
     special_register,
     interlock: ("register", interlock::checked),
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),

@@ -463,6 +463,16 @@ impl Settle<Nordac> for Planner {
         }
     }
 
+    fn judges(act: &PlannedAct) -> bool {
+        match act {
+            PlannedAct::Fault(_)
+            | PlannedAct::Power(..)
+            | PlannedAct::Outside(..)
+            | PlannedAct::Restart(_) => false,
+            PlannedAct::Quiet | PlannedAct::Parameter(..) | PlannedAct::Job(..) => true,
+        }
+    }
+
     fn needs(&self, scenario: &Scenario<Nordac>) -> Vec<Capability> {
         let lines = scenario.header.slaves.iter();
         let needs = lines.filter_map(|line| match &line.what {

@@ -3,13 +3,14 @@
 use super::drive::{self, DriveLine};
 use super::step;
 use super::words::master_deviates;
+use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
-use crate::scenario::parse::header::{Part, given_twice, once, read};
+use crate::scenario::parse::header::{Part, given_twice, header_lines, once, read};
 use crate::scenario::parse::step as core;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Scenario, Step};
+use crate::scenario::syntax::Scenario;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 
@@ -121,18 +122,7 @@ pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> 
 /// # Errors
 /// Every line that cannot be understood, and every step.
 pub(crate) fn parse_lines(source: &Source) -> Result<Header, Problems> {
-    let scenario: Scenario = read(source, Part::Header)?;
-    let problems: Vec<_> = scenario.steps.iter().map(no_header_line).collect();
-    match problems.is_empty() {
-        true => Ok(scenario.header),
-        false => Err(Problems::new(&source.name, source.text.clone(), problems)),
-    }
-}
-
-fn no_header_line(step: &Step) -> Problem {
-    let what = "this is a step, and only header lines are allowed here";
-    let expected = "a line of a header expected here, such as `drive 1 input GPIN3 high`";
-    Problem::new(step.span, what, expected)
+    header_lines::<Novobus>(source)
 }
 
 /// The mistake in the `ring` line of a header that is not for rings of these sizes.

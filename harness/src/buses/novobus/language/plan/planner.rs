@@ -186,6 +186,18 @@ impl Settle<Novobus> for Planner {
         }
     }
 
+    fn judges(act: &RingAct) -> bool {
+        match act {
+            RingAct::Fault(..) | RingAct::Influence(..) | RingAct::Record(_) => false,
+            RingAct::Check(_)
+            | RingAct::Telegram(..)
+            | RingAct::Recover(_)
+            | RingAct::Master(..)
+            | RingAct::Count(..)
+            | RingAct::Until(..) => true,
+        }
+    }
+
     fn needs(&self, scenario: &Scenario<Novobus>) -> Vec<Capability> {
         let two = (self.rings.len() > 1).then_some(Capability::TwoRings);
         let setups = self.setups.iter().filter_map(|setup| setup.what.needs());
