@@ -11,9 +11,9 @@ use std::sync::atomic::AtomicBool;
 #[test]
 fn an_interrupted_scenario_is_aborted() {
     for text in [
-        "ring 3\nwait 1s\n",
-        "bus unitek\ndrive 1\nwait 1s\n",
-        "bus nordac\nslave 8\nwait 1s\n",
+        "ring 3\nwait 1s\n? sent 0 bytes\n",
+        "bus unitek\ndrive 1\nwait 1s\n? quiet\n",
+        "bus nordac\nslave 8\nwait 1s\n? quiet\n",
     ] {
         let source = Source::from_bytes("waits".to_owned(), text.as_bytes().to_vec());
         let entry = Entry::fitting(source.expect("text"), None).expect("a scenario");

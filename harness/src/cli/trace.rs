@@ -13,6 +13,7 @@ use crate::report::table::{LEGEND, TablePart, table, wires};
 use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
 use crate::scenario::run::{AtMismatch, CellRecord};
+use crate::scenario::verdict::Verdict;
 use clap::ValueEnum as _;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
@@ -66,7 +67,11 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
         return Ok(Exit::RigError);
     }
     output.say(&details(&entry, &played.outcome, &played.traces));
-    Ok(Exit::of(&[played.outcome.verdict], false))
+    Ok(match played.outcome.verdict {
+        // It shows what there is, also where nothing is judged.
+        Verdict::Inconclusive => Exit::Passed,
+        verdict => Exit::of(&[verdict], false),
+    })
 }
 
 /// A run that is to be shown.

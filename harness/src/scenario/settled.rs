@@ -8,11 +8,16 @@ use super::run::player::play_until;
 use super::run::{AtMismatch, Outcome};
 use super::source::Source;
 use super::syntax::Scenario;
+use super::verdict::Verdict;
 use crate::link::{Capability, Link};
 use crate::traffic::SegmentReport;
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+/// A rig's drives are compared with a model beside the scenario; the simulated ones of a scenario's own are not.
+const NOTHING_JUDGED: &str =
+    "nothing was judged: no step says what must come back; add a line such as `<`";
 
 /// A settled scenario, and what every bus can do with it.
 pub trait Settled: Debug + Send + Sync {
@@ -34,7 +39,7 @@ pub trait Settled: Debug + Send + Sync {
     /// A simulated bench for it.
     fn simulate(&self) -> Box<dyn Link>;
 
-    /// Plays it on a link.
+    /// Plays it on a simulated bench of its own. Where no step judges anything, it has not passed.
     fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
         self.play_until(link, at_mismatch, &AtomicBool::new(false))
     }
@@ -79,7 +84,12 @@ impl<L: Language> Settled for Plan<L> {
         at_mismatch: AtMismatch,
         interrupt: &AtomicBool,
     ) -> Outcome {
-        play_until(self, link, at_mismatch, interrupt)
+        let mut outcome = play_until(self, link, at_mismatch, interrupt);
+        if outcome.verdict == Verdict::Passed && !self.judges() {
+            outcome.verdict = Verdict::Inconclusive;
+            outcome.remarks.push(NOTHING_JUDGED.to_owned());
+        }
+        outcome
     }
 }
 

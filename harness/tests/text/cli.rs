@@ -39,6 +39,28 @@ fn text(path: &Path) -> &str {
 
 const GOOD: &str = "title good\nring 2\n> 80\n< 80\n";
 
+/// Exit 0 means that something was judged.
+#[test]
+fn a_scenario_that_judges_nothing_does_not_pass() {
+    for (text_of_it, exit, words) in [
+        ("ring 2\n> 80\n", 5, "nothing was judged"),
+        (
+            "ring 2\n! 1->0 byte 1: drop\n> 80\n",
+            5,
+            "nothing was judged",
+        ),
+        ("ring 2\nwait 1ms\n", 5, "nothing was judged"),
+        ("bus unitek\ndrive 1\n> 201 31 00 00\n", 0, ""),
+        ("bus nordac\nslave 8\n! slave 8: off\n", 0, ""),
+    ] {
+        let scenario = file("judges-nothing", "s.scn", text_of_it);
+        let output = drivebench(&["run", text(&scenario)]);
+        let said = stdout(&output) + &stderr(&output);
+        assert_eq!(code(&output), exit, "{text_of_it}{said}");
+        assert!(said.contains(words), "{text_of_it}{said}");
+    }
+}
+
 #[test]
 fn without_arguments_all_built_in_scenarios_pass_from_any_folder() {
     let output = drivebench(&[]);

@@ -9,6 +9,7 @@ mod watch;
 
 use super::exit::Exit;
 use super::output::Output;
+use crate::explore::{FuzzCase, FuzzRun};
 use clap::Subcommand;
 
 pub(crate) use line::LineFuzz;
@@ -30,6 +31,17 @@ pub enum FuzzCommand {
     Coverage(crate::buses::commands::coverage::CoverageArguments),
     /// Add the inputs of a grown corpus that reach something new to the kept ones.
     Distil(crate::buses::commands::distil::DistilArguments),
+}
+
+/// The exit code of cases that were played.
+fn exit_of_cases<C: FuzzCase>(campaign: &FuzzRun<C>) -> Exit {
+    let progress = campaign.progress();
+    match campaign.findings() {
+        (0, 0) if progress.not_sent < progress.cases => Exit::Passed,
+        // Something differed once, or no case was judged.
+        (0, _) => Exit::Incomplete,
+        _ => Exit::Failed,
+    }
 }
 
 /// Does it.

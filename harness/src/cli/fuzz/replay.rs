@@ -1,5 +1,6 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
+use super::exit_of_cases;
 use super::rig::{on_ports, rings, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::buses::line_fuzz;
@@ -166,11 +167,7 @@ pub(super) fn play<C: FuzzCase>(
         Err(error) => return Ok(tell(&error, output)),
     };
     output.result(&summary(&campaign, &end))?;
-    Ok(match campaign.findings() {
-        (0, 0) => Exit::Passed,
-        (0, _) => Exit::Incomplete,
-        _ => Exit::Failed,
-    })
+    Ok(exit_of_cases(&campaign))
 }
 
 /// The cases that a run has kept in its folder.

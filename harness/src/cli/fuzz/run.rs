@@ -1,5 +1,6 @@
 //! `drivebench fuzz run`.
 
+use super::exit_of_cases;
 use super::rig::{on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::buses::{Bus, deviations, line_fuzz};
@@ -381,8 +382,9 @@ pub(crate) fn explore<C: FuzzCase>(
     }
     output.say(&format!("the run is in {}\n", folder.display()));
     if let Some(Err(error)) = arguments.sign.as_deref().map(|key| seal(&folder, key)) {
+        // That the key can sign was tried before anything was played.
         output.complain(&error.to_string());
-        return Ok(Exit::of_evidence(&error));
+        return Ok(exit_of_cases(&campaign).with_rig_error());
     }
     if let Some(path) = &arguments.html {
         match page(&folder) {
@@ -391,13 +393,7 @@ pub(crate) fn explore<C: FuzzCase>(
             Err(error) => return Ok(tell(&error, output)),
         }
     }
-    let progress = campaign.progress();
-    Ok(match campaign.findings() {
-        (0, 0) if progress.not_sent < progress.cases => Exit::Passed,
-        // Something differed once, or no case was judged.
-        (0, _) => Exit::Incomplete,
-        _ => Exit::Failed,
-    })
+    Ok(exit_of_cases(&campaign))
 }
 
 /// Why a run that was resumed played nothing, and how to go on.

@@ -305,6 +305,26 @@ fn nothing_judged_has_not_passed() {
         let run = ["fuzz", "run", bound[0], bound[1], "--out", name(&out)];
         ended(&drivebench(&run), 5, "0 cases");
     }
+    let out = folder.path().join("run");
+    let run = ["fuzz", "run", "--cases", "60", "--out", name(&out)];
+    ended(&drivebench(&run), 0, "60 cases");
+    let replay = |time: &str, code| {
+        let replay = [
+            "fuzz",
+            "replay",
+            name(&out),
+            "--rig",
+            "sim:3",
+            "--wire-time",
+        ];
+        ended(
+            &drivebench(&[&replay[..], &[time]].concat()),
+            code,
+            " 0 found",
+        );
+    };
+    replay("1ms", 5);
+    replay("1h", 0);
 }
 
 /// Two processes never work on one run.

@@ -128,7 +128,11 @@ fn captures_are_judged_compared_and_played_again() {
     assert!(stdout(&other).starts_with("first difference: link "));
     // Where neither side has a byte, nothing is the same.
     let silent = file("silent.scn");
-    std::fs::write(&silent, "title silent\nring 2\nwait 1ms\n").expect("a file");
+    std::fs::write(
+        &silent,
+        "title silent\nring 2\nwait 1ms\ndrive 0 input GPIN3 high\n",
+    )
+    .expect("a file");
     let silent = silent.to_str().expect("a plain path");
     let nothing = drivebench(&["diff", silent, silent]);
     assert_eq!(code(&nothing), 5, "{}", stdout(&nothing));

@@ -38,6 +38,11 @@ fn parameters_are_saved_loaded_and_compared() {
         ok("params load 0 p.toml --yes"),
         "drive 0: nothing to change\n"
     );
+    let head = text.find("[nd21]").expect("a table") + "[nd21]\n".len();
+    std::fs::write(folder.join("none.toml"), &text[..head]).expect("a file");
+    let (code, _, stderr) = run("params diff 0 none.toml");
+    assert_eq!(code, 2);
+    assert!(stderr.contains("the file has no parameters"), "{stderr}");
     let other = text
         .replace("3000.1 rpm", "1500rpm")
         .replace("\"0 turns\"        # FD90", "\"7turns\" # FD90")

@@ -148,7 +148,6 @@ fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Wri
         .map(|cell| cell.printed)
         .collect();
     let mut written = Vec::new();
-    let mut there = false;
     for (key, value) in document.get_ref() {
         let span = place(key.span());
         let table = match value.get_ref() {
@@ -159,7 +158,6 @@ fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Wri
                 continue;
             }
         };
-        there = true;
         for (key, value) in table {
             let span = place(key.span());
             let Some(at) = names.iter().position(|name| *name == key.get_ref()) else {
@@ -176,12 +174,12 @@ fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Wri
             }
         }
     }
-    if !there && problems.is_empty() {
+    if written.is_empty() && problems.is_empty() {
         let message = "the file has no parameters";
         problems.push(Problem::new(
             TextSpan::default(),
             message,
-            "`[nd21]` expected",
+            "a table [nd21] with names and values expected",
         ));
     }
     written.sort_by_key(|(at, ..)| *at);
