@@ -162,11 +162,15 @@ impl Listing {
                 folder => format!("{folder}/{name}"),
             };
             // The sums are read, and the two folders looked at, elsewhere.
-            if [SUMS, SIGNATURE, SCENARIOS, CAPTURES].contains(&file.as_str()) {
+            if [SUMS, SCENARIOS, CAPTURES].contains(&file.as_str()) {
                 continue;
             }
             if !kind.is_file() {
                 self.refused.push(refused(&file, kind));
+                continue;
+            }
+            // A signature has no sum: it is of the sums.
+            if file == SIGNATURE {
                 continue;
             }
             match read(path, &file) {

@@ -170,19 +170,25 @@ impl ReadPart {
     }
 }
 
+/// Refuses what is no folder of its own: a link would let what is elsewhere be checked.
+fn is_folder(path: &Path) -> Result<(), EvidenceError> {
+    match fs::symlink_metadata(path).map_err(failed(path))?.is_dir() {
+        true => Ok(()),
+        false => Err(EvidenceError::Merge(format!(
+            "{} is not a folder",
+            path.display()
+        ))),
+    }
+}
+
 /// The parts of a merged folder.
 pub(super) fn parts_of(path: &Path) -> Result<Vec<ReadPart>, EvidenceError> {
     let folder = path.join(PARTS);
+    is_folder(&folder)?;
     let names = entries(&folder)?;
     let all: Vec<_> = names.iter().map(|name| folder.join(name)).collect();
-    if let Some(link) = all
-        .iter()
-        .find(|own| !fs::symlink_metadata(own).is_ok_and(|own| own.is_dir()))
-    {
-        return Err(EvidenceError::Merge(format!(
-            "{} is not a folder",
-            link.display()
-        )));
+    for own in &all {
+        is_folder(own)?;
     }
     let parts = read(&all)?;
     match parts

@@ -132,6 +132,11 @@ fn a_missing_part_is_never_passed() {
     let desk = desk(&right);
     let folders = parts(&desk, "sim:3", "slice", 3);
     ended(&merge(&desk, &folders, "all-of-it", &[]), 0, "3 of 3 parts");
+    // What a link leads to is not the folder that was merged.
+    let place = desk.path("all-of-it/parts");
+    fs::rename(&place, desk.path("elsewhere")).expect("a folder");
+    std::os::unix::fs::symlink(desk.path("elsewhere"), &place).expect("a link");
+    ended(&desk.run(&["verify", "all-of-it"]), 2, "is not a folder");
     ended(
         &merge(&desk, &folders, "strict", &["--require-all"]),
         5,

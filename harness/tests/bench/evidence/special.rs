@@ -48,6 +48,14 @@ fn what_is_no_file_in_evidence_is_refused() {
             assert!(said.contains(why) && said.contains(name), "{name}: {said}");
         }
     }
+    // A signature has no sum, and is no link either.
+    let desk = kept();
+    symlink("/etc/hostname", desk.path("kept/SHA256SUMS.sig")).expect("a link");
+    ended(
+        &desk.run(&["verify", "kept"]),
+        1,
+        "SHA256SUMS.sig is a symbolic link",
+    );
     let desk = kept();
     std::fs::rename(desk.path("kept/scenarios"), desk.path("there")).expect("a folder");
     symlink(desk.path("there"), desk.path("kept/scenarios")).expect("a link");
