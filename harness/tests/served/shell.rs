@@ -31,6 +31,12 @@ fn says(tty: &Tty, words: &str) {
     tty.see(words, |seen| seen.first.contains(words));
 }
 
+/// Waits for the prompt: before it, Ctrl-D is no end.
+#[track_caller]
+fn asks(tty: &Tty) {
+    tty.see("a prompt", |seen| seen.first.trim_end().ends_with('>'));
+}
+
 fn signal(tty: &Tty, signal: Signal) {
     kill_process(Pid::from_child(&tty.child), signal).expect("a process");
 }
@@ -55,9 +61,10 @@ fn people_type_complete_and_stop() {
     tty.see("the mistake again", |seen| {
         seen.first.matches("did you mean `read`?").count() == 2
     });
-    tty.keys("fault 2->1: flip 0\r");
-    tty.keys("read 1 nist\r");
+    // Lines that come at once, as from a clipboard, are obeyed one behind the other.
+    tty.keys("fault 2->1: flip 0\rread 1 nist\r");
     says(&tty, "the link from drive 2 to drive 1 is damaged");
+    asks(&tty);
     tty.keys("\x04");
     assert_eq!(tty.ended().code(), Some(0));
     tty.has_its_modes();
@@ -88,7 +95,8 @@ fn signals_end_in_the_safe_state() {
         let mut tty = at_desk(&desk);
         says(&tty, "desk.toml> ");
         tty.keys("go all\r");
-        says(&tty, "drive 1 is in go");
+        // Behind a standstill of the computer the bench recovers the ring, and its drives are in error (ND21 9.8).
+        says(&tty, "drive 1 is in ");
         signal(&tty, how);
         assert_eq!(tty.ended().code(), Some(130));
         says(&tty, "safe state");

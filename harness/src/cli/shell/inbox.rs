@@ -9,10 +9,10 @@ use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::AsFd;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::spawn;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The longest line of input, in bytes. The rest of a longer one is skipped.
 pub(crate) const LONGEST: usize = 1 << 20;
@@ -310,9 +310,18 @@ impl LineWriter {
 
     /// Waits until all is written, for at most a second.
     pub(crate) fn wait(&self) {
+        self.wait_while(|| std::thread::sleep(Duration::from_millis(1)));
+    }
+
+    /// The same, and does something meanwhile, again and again: a bus must not stand still because a terminal does.
+    pub(crate) fn wait_while(&self, mut meanwhile: impl FnMut()) {
         let (done, written) = sync_channel(1);
-        if self.lines.try_send(Unwritten::Mark(done)).is_ok() {
-            let _too_late = written.recv_timeout(Duration::from_secs(1));
+        if self.lines.try_send(Unwritten::Mark(done)).is_err() {
+            return;
+        }
+        let end = Instant::now() + Duration::from_secs(1);
+        while written.try_recv() == Err(TryRecvError::Empty) && Instant::now() < end {
+            meanwhile();
         }
     }
 

@@ -275,7 +275,13 @@ impl HeldSession {
             _ => String::new(),
         };
         let text = format!("{}{moving}> ", self.name);
-        self.out.wait();
+        match self.rig.is_simulated() {
+            true => self.out.wait(),
+            // Trouble is seen behind the prompt.
+            false => self.out.wait_while(|| {
+                let _seen_later = self.bench.pass(KEPT);
+            }),
+        }
         if let Asker::People { turn, awaited, .. } = &mut self.asker {
             *awaited = false;
             let _reader_has_ended = turn.send(text);
