@@ -219,3 +219,20 @@ fn registers_are_listed() {
         &["--eeprom is for the bus novobus"],
     );
 }
+
+/// An error whose cause is there stays, and the command has failed (unitek dump, register 8E).
+#[test]
+fn an_error_that_stays_is_not_cleared() {
+    let folder = folder("an-error-stays");
+    std::fs::write(
+        folder.join("setup.scn"),
+        "drive 1\ndrive 1 input dc-bus low\n",
+    )
+    .expect("a file");
+    let line = "delete-error 1 --move --rig sim:unitek:1 --setup setup.scn";
+    let arguments: Vec<_> = line.split(' ').collect();
+    let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
+    assert_eq!(code, 1, "{stdout}{stderr}");
+    assert!(stdout.contains("errors POWERVOLTAGE"), "{stdout}");
+    assert!(stderr.contains("drive 1: its errors stay"), "{stderr}");
+}

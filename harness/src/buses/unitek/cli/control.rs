@@ -108,9 +108,6 @@ pub(super) fn block(
     )
 }
 
-/// What `delete-error` sends.
-const CANCELLED: &str = "the command that clears errors was sent";
-
 /// Clears errors.
 pub(super) fn delete_error(
     bench: PortBench<'_, UnitekDrives>,
@@ -127,11 +124,33 @@ pub(super) fn delete_error(
         let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
         let orders: Vec<_> = drives.iter().map(order).collect();
         refuse_denied(&mut session.driver(), &orders)?;
-        each(session, &drives, output, |driver, axis| {
+        let exit = each(session, &drives, output, |driver, axis| {
             let _never_answered = driver.write(axis, CANCEL.0, Data::Short(CANCEL.1))?;
-            Ok(CANCELLED)
-        })
+            Ok("the command that clears errors was sent")
+        })?;
+        Ok(exit.max(with_errors(session, &drives, output)?))
     })
+}
+
+/// Has failed where a drive still has errors (unitek dump, registers 8E and 8F).
+fn with_errors(
+    session: &mut Session,
+    drives: &[Axis],
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let mut exit = Exit::Passed;
+    for axis in drives {
+        // A drive that does not answer has been reported.
+        let errors = session.driver().read(*axis, 0x8F);
+        if errors.is_ok_and(|read| read.data.bits() != 0) {
+            let node = axis.node;
+            output.complain(&format!(
+                "drive {node}: its errors stay: their causes are there"
+            ));
+            exit = Exit::Failed;
+        }
+    }
+    Ok(exit)
 }
 
 /// Does it to every drive first, and then reports the state of each. A drive that does not answer does not keep the others from it.
@@ -162,12 +181,6 @@ fn each(
                 };
                 let node = axis.node;
                 output.result(&format!("drive {node}: {done}; {ready}{errors}\n"))?;
-                if done == CANCELLED && !errors.is_empty() {
-                    output.complain(&format!(
-                        "drive {node}: its errors stay: their causes are there"
-                    ));
-                    exit = exit.max(Exit::Failed);
-                }
             }
         }
     }
