@@ -56,8 +56,8 @@ fn handles_signals(child: &Child) {
 }
 
 /// A socket between a bench and a served ring. It sends a signal to the program of the receiver when the bench connects, or when the bench
-/// has sent its first bytes.
-fn between(served: &Served, on_connect: bool, program: Receiver<String>) -> String {
+/// has sent this number of bytes.
+fn between(served: &Served, bytes: usize, program: Receiver<String>) -> String {
     let PortAddress::Tcp(ring) = served.endpoints[0].clone() else {
         panic!("a socket");
     };
@@ -73,24 +73,37 @@ fn between(served: &Served, on_connect: bool, program: Receiver<String>) -> Stri
             bench.try_clone().expect("one"),
         );
         std::thread::spawn(move || std::io::copy(&mut from, &mut to));
-        let interrupt = || {
-            let id = program.recv().expect("its id");
-            let sent = Command::new("kill").args(["-HUP", &id]).status();
-            assert!(sent.expect("kill").success());
-        };
-        if on_connect {
-            interrupt();
+        let mut passed = 0;
+        let mut piece = [0; 4096];
+        while passed < bytes {
+            let count = bench.read(&mut piece).expect("bytes");
+            assert_ne!(count, 0, "it has ended after {passed} bytes");
+            ring.write_all(&piece[..count]).expect("the ring");
+            passed += count;
         }
-        let mut bytes = [0; 4096];
-        let count = bench.read(&mut bytes).expect("bytes");
-        if !on_connect {
-            interrupt();
-        }
-        let _gone = ring.write_all(&bytes[..count]);
+        let id = program.recv().expect("its id");
+        let sent = Command::new("kill").args(["-HUP", &id]).status();
+        assert!(sent.expect("kill").success());
         let _gone = std::io::copy(&mut bench, &mut ring);
         let _gone = ring.shutdown(std::net::Shutdown::Both);
     });
     address
+}
+
+/// A command that is interrupted when it has sent this number of bytes says these words, and the motor stands then.
+#[track_caller]
+fn interrupted((served, desk): (&Served, &Desk), command: &[&str], bytes: usize, words: &str) {
+    let (id, program) = channel();
+    let address = between(served, bytes, program);
+    let PortAddress::Tcp(ring) = &served.endpoints[0] else {
+        panic!("a socket");
+    };
+    edit(desk, ring, &address);
+    let child = heeding(desk, command).spawn().expect("the program");
+    id.send(child.id().to_string()).expect("the socket waits");
+    ended(&finish(child), 130, words);
+    edit(desk, &address, ring);
+    shows(desk, "watch 0 nist Flags --for 1ms", "nist 0 rpm  Flags");
 }
 
 #[test]
@@ -123,22 +136,30 @@ fn interrupted_before_the_ports_are_open() {
 /// Whether the bench listens, or brings the ring back, or asks drives that were left at rest: a motor that was left turning stops.
 #[test]
 fn interrupted_while_the_rig_is_opened() {
-    for (quiet, on_connect) in [(false, false), (true, false), (true, true)] {
+    for (quiet, bytes) in [(false, 1), (true, 1), (true, 0)] {
         let (served, desk) = desk(quiet);
         turn(&desk);
-        let (id, program) = channel();
-        let address = between(&served, on_connect, program);
-        let PortAddress::Tcp(ring) = &served.endpoints[0] else {
-            panic!("a socket");
-        };
-        edit(&desk, ring, &address);
-        let child = heeding(&desk, &["read", "0", "nist"]).spawn();
-        let child = child.expect("the program");
-        id.send(child.id().to_string()).expect("the socket waits");
-        let output = finish(child);
-        ended(&output, 130, &format!("interrupted; safe state: {SAFE}"));
-        edit(&desk, &address, ring);
-        shows(&desk, "watch 0 nist Flags --for 1ms", "nist 0 rpm  Flags");
+        let words = format!("interrupted; safe state: {SAFE}");
+        interrupted((&served, &desk), &["read", "0", "nist"], bytes, &words);
+    }
+}
+
+/// What plays, explores and measures, and what changes drives.
+#[test]
+fn every_command_ends_in_the_safe_state() {
+    let (served, desk) = desk(true);
+    let file = |name: &str| desk.path(name).to_str().expect("a name").to_owned();
+    let [kept, found, saved] = ["kept", "found", "saved.toml"].map(file);
+    for command in [
+        format!("qualify --allow-motion --evidence {kept}"),
+        format!("fuzz run --allow-motion --wire-time 100s --out {found}"),
+        "scope 0 nist --move".to_owned(),
+        format!("params save 0 {saved}"),
+        "reset all --move".to_owned(),
+    ] {
+        turn(&desk);
+        let words: Vec<_> = command.split(' ').collect();
+        interrupted((&served, &desk), &words, 300, SAFE);
     }
 }
 
