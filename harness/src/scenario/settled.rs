@@ -8,16 +8,11 @@ use super::run::player::play_until;
 use super::run::{AtMismatch, Outcome};
 use super::source::Source;
 use super::syntax::Scenario;
-use super::verdict::Verdict;
 use crate::link::{Capability, Link};
 use crate::traffic::SegmentReport;
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// A rig's drives are compared with a model beside the scenario; the simulated ones of a scenario's own are not.
-const NOTHING_JUDGED: &str =
-    "nothing was judged: no step says what must come back; add a line such as `<`";
 
 /// A settled scenario, and what every bus can do with it.
 pub trait Settled: Debug + Send + Sync {
@@ -85,9 +80,9 @@ impl<L: Language> Settled for Plan<L> {
         interrupt: &AtomicBool,
     ) -> Outcome {
         let mut outcome = play_until(self, link, at_mismatch, interrupt);
-        if outcome.verdict == Verdict::Passed && !self.judges() {
-            outcome.verdict = Verdict::Inconclusive;
-            outcome.remarks.push(NOTHING_JUDGED.to_owned());
+        // A rig's drives are compared with a model beside the scenario; the simulated ones of a scenario's own are not.
+        if !self.judges() {
+            outcome.judged_nothing();
         }
         outcome
     }

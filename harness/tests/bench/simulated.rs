@@ -364,6 +364,23 @@ fn a_run_that_judges_nothing_is_incomplete() {
             );
         }
     }
+    let quiet = folder.path().join("quiet.scn");
+    let lines = "title x\nring 2\ndrive 1 memory FE13 = 88\nwait 5ms\n";
+    std::fs::write(&quiet, lines).expect("room");
+    let quiet = [quiet.to_str().expect("a name")];
+    for text in [
+        rig(2, true, "", ""),
+        rig(2, true, "", ", \"drive 0 memory FE97 = 00\""),
+    ] {
+        for more in [&[][..], &evidence] {
+            let _none_yet = std::fs::remove_dir_all(&kept);
+            let output = run(folder.path(), &text, &[&quiet[..], more].concat());
+            ended(&output, 5, "nothing was judged");
+        }
+        let mut verify = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        verify.arg("verify").arg(&kept);
+        ended(&verify.output().expect("the program"), 0, "");
+    }
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
     command.args(["qualify", "--filter", "8.2-exchange-4", "--rig"]);
     command.arg(folder.path().join("rig.toml"));

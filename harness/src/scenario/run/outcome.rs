@@ -9,6 +9,10 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time::{self, Span};
 
+/// Why what plays to its end has not passed.
+const NOTHING_JUDGED: &str =
+    "nothing was judged: no step says what must come back; add a line such as `<`";
+
 /// The outcome of a scenario.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -71,6 +75,14 @@ impl Outcome {
             finding: None,
             remarks: own.into_iter().chain(found).chain(self.remarks).collect(),
             ..self
+        }
+    }
+
+    /// The same where nothing was judged: it has not passed.
+    pub(crate) fn judged_nothing(&mut self) {
+        if self.verdict == Verdict::Passed {
+            self.verdict = Verdict::Inconclusive;
+            self.remarks.push(NOTHING_JUDGED.to_owned());
         }
     }
 

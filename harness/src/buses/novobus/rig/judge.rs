@@ -70,6 +70,11 @@ pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<E
         }
         _ => {}
     }
+    // Where its steps send something, each byte that comes back was compared with the twin's.
+    let sends = |own: &Conversation| own.has_steps() && own.sends();
+    if !facts.plan.judges() && !facts.conversations.iter().any(sends) {
+        outcome.judged_nothing();
+    }
     if facts.unplaced > 0
         && matches!(
             outcome.verdict,

@@ -146,6 +146,12 @@ impl Conversation {
         self.done.iter().any(step)
     }
 
+    /// Whether the bench sent something.
+    pub(crate) fn sends(&self) -> bool {
+        let sent = |(_, done): &(usize, Done)| matches!(done, Done::Sent(..));
+        self.done.iter().any(sent)
+    }
+
     /// The bytes received from a ring.
     pub(crate) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
         let own = self.received.iter().filter(|(at, ..)| *at == ring);

@@ -9,7 +9,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::locate::MAX_ZEROS;
 use crate::buses::novobus::rig::health::sounds_timed_out;
 use crate::buses::novobus::twin::unknowable;
-use crate::link::{Line, Link, Octets, Trouble};
+use crate::link::{Line, Link, Octets};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
 use crate::scenario::run::outcome::{Outcome, Unready};
@@ -194,7 +194,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) 
         return Outcome::skipped(lacks);
     }
     let mut before = Vec::new();
-    let outcome = match set_up(plan, link, &mut before) {
+    let mut outcome = match set_up(plan, link, &mut before) {
         Ok(()) => {
             link.begin();
             play(plan, link, at_mismatch)
@@ -206,22 +206,15 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) 
     }
     link.begin();
     let restored = restore(link, &before).or_else(|_| restore(link, &before));
-    // The contents of cells are known only after a read, so a denial does not change the verdict.
-    let denied = link
-        .trouble()
-        .filter(|why| matches!(why, Trouble::Denied(_)));
-    let why = denied.map(ToString::to_string);
-    let why = why.or(restored.err().map(|why| why.to_string()));
-    let remark = why.map(|why| format!("not set back: {why}"));
-    let outcome = Outcome {
-        remarks: outcome.remarks.into_iter().chain(remark).collect(),
-        ..outcome
-    };
-    match link.trouble() {
-        // What was judged before it is kept as a remark: the drives may be left in any state.
-        Some(trouble) if !matches!(trouble, Trouble::Denied(_)) => outcome.ended_by(trouble),
-        _ => outcome,
+    if let Some(trouble) = link.trouble() {
+        let left = "cells of the header may not be set back";
+        outcome.remarks.push(left.to_owned());
+        // What was judged before it is kept as a remark: drives may be left otherwise than they were found.
+        return outcome.ended_by(trouble);
     }
+    let left = restored.err().map(|why| format!("not set back: {why}"));
+    outcome.remarks.extend(left);
+    outcome
 }
 
 /// Why a drive is not ready: which of its cells, and what of it is wrong.
