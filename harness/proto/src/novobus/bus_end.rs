@@ -156,6 +156,12 @@ impl BusEnd {
             && self.rules == other.rules
     }
 
+    /// What it does where the manual leaves that open.
+    #[must_use]
+    pub const fn properties(&self) -> &Properties {
+        &self.properties
+    }
+
     /// The same with other properties and rules, now and after every reset; for wrong drives.
     pub fn amend(&mut self, amend: impl FnOnce(&mut Properties, &mut Rules)) {
         amend(&mut self.properties, &mut self.rules);

@@ -5,7 +5,7 @@ use crate::link::{Capability, Line, Link, Moment, Octets, PlacedFault, link_name
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::error::BusError;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use harness_sim::nd21::{Mode, OutputLevels, Stimulus};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
@@ -131,6 +131,15 @@ impl SimulatedLink {
     #[must_use]
     pub fn drive(&self, ring: usize, drive: u8) -> Option<&Drive> {
         self.ring(ring)?.drive(drive)
+    }
+
+    /// The shortest silence after which one of its drives detects a time-out, if it monitors the line (ND21 9.9).
+    pub(crate) fn earliest_time_out(&self) -> Span {
+        let rings = 0..self.bench.rings().len();
+        let drives = rings.flat_map(|ring| (0..self.drives(ring)).map(move |drive| (ring, drive)));
+        let own = drives.filter_map(|(ring, drive)| self.drive(ring, drive));
+        let own = own.map(|drive| drive.bus_end().properties().time_out);
+        own.min().unwrap_or(Span::MAX)
     }
 
     /// Listens on a link from now on, counted from the master's outgoing one: [`Self::fetch`] gives what arrives there.

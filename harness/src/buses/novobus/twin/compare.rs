@@ -28,6 +28,8 @@ pub(crate) struct Comparer<'a> {
     pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
     pub(crate) recording: BTreeSet<(usize, u8)>,
+    /// How long a drive that monitors hears nothing at least before it detects a time-out.
+    pub(crate) earliest_time_out: Span,
     pub(crate) comparison: Comparison,
 }
 
@@ -70,6 +72,7 @@ impl Comparer<'_> {
             answered: &answered_at,
             all: &starts,
             way,
+            earliest: self.earliest_time_out,
         };
         let race = || times.judge(size, (answer, received), self.exactness.tolerance);
         let unasked = real_time.then(race).flatten();

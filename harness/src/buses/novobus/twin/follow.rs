@@ -3,6 +3,7 @@
 use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
+use super::unasked::EARLIEST_TIME_OUT;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::link::{Line, Link, LinkEvent, Moment, Octets, PlacedFault};
@@ -232,6 +233,7 @@ impl Twin {
             byte_time: self.link.byte_time(),
             knowledge: &mut self.knowledge,
             recording,
+            earliest_time_out: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
             comparison: Comparison {
                 monitored,
                 left_out: !left_out.is_empty(),

@@ -21,4 +21,4 @@ pub use comparison::{
 pub use follow::{Conversation, Done, Twin};
 pub use harness_proto::novobus::role::Role;
 pub(crate) use places::{answered, answering, what_of};
-pub(crate) use unasked::{SILENCED, Sent};
+pub(crate) use unasked::{EARLIEST_TIME_OUT, SILENCED, Sent};

@@ -19,9 +19,9 @@ use harness_proto::time::{Instant, Span};
 /// How long behind the last byte a drive that monitors detects a time-out at the latest (ND21 9.9, 14.10.2).
 const LATEST_TIME_OUT: Span = Span::from_millis(20);
 
-/// How long a drive that monitors hears nothing at least before it detects a time-out: 10 ms (ND21 9.9), and 8 ms where a rig says that its
-/// drives are wrong. A byte comes back more than half a millisecond later than a drive hears it.
-const EARLIEST_TIME_OUT: Span = Span::from_micros(8_500);
+/// How long a drive that monitors hears nothing at least before it detects a time-out (ND21 9.9). A drive of the model that is wrong on
+/// purpose may detect one earlier.
+pub(crate) const EARLIEST_TIME_OUT: Span = Span::from_millis(10);
 
 /// How long in front of unasked bytes the silence may have begun that they come from: it lasts 20 ms at most, and a drive waits for 10 ms
 /// more. Twice as long is certain.
@@ -56,6 +56,8 @@ pub(crate) struct Sent<'a> {
     pub(crate) all: &'a [Instant],
     /// How long behind the start of a byte its answer comes.
     pub(crate) way: Span,
+    /// How long a drive that monitors hears nothing at least before it detects a time-out.
+    pub(crate) earliest: Span,
 }
 
 impl Sent<'_> {
@@ -88,8 +90,9 @@ impl Sent<'_> {
     }
 
     /// Whether the bytes came back so close together, up to the first that differs, that no drive can have missed one. On a line no byte leaves
-    /// before the bench sends it, and none comes back before a drive hears it. A computer that is late makes these spans longer, and never
-    /// shorter. A ring behind a socket may take bytes before their time; they come back early then.
+    /// before the bench sends it, and none comes back before it has been round the ring. So no drive is without a byte for longer than from the
+    /// start of one to the return of the next, less the way round. A computer that is late makes these spans longer, and never shorter. A ring
+    /// behind a socket may take bytes before their time; they come back early then.
     fn nothing_was_missed(&self, expected: &[Heard], received: &[Heard], right: usize) -> bool {
         let value = |heard: &[Heard], index: usize| heard.get(index).map(|own| own.1);
         let same = |index: usize| index < right || value(expected, index) == value(received, index);
@@ -99,7 +102,8 @@ impl Sent<'_> {
         let from = received[first].0 - BEFORE_ZEROS;
         let close = |index: usize| {
             let before = index.checked_sub(1).and_then(|own| self.answered.get(own));
-            before.is_some_and(|start| received[index].0.since(*start) < EARLIEST_TIME_OUT)
+            let silence = |start: &Instant| received[index].0.since(*start + self.way);
+            before.is_some_and(|start| silence(start) + EARLY < self.earliest)
         };
         let due = |index: usize| {
             let start = self.answered.get(index);
@@ -314,6 +318,7 @@ mod tests {
             answered: &starts,
             all: &starts,
             way,
+            earliest: EARLIEST_TIME_OUT,
         };
         let excused = |right: usize| {
             let excused = sent.excused_from(size, (&expected, &received, right), (true, false));
@@ -323,15 +328,15 @@ mod tests {
         assert!(excused(0), "a zero that is not expected stands before it");
     }
 
-    /// ND21 9.9: no drive detects a time-out after 5 ms. A zero in the place of an answer that comes so soon behind the byte before it is
+    /// ND21 9.9: no drive detects a time-out before 10 ms. A zero in the place of an answer that comes so soon behind the byte before it is
     /// wrong; behind a longer silence, or a byte that came late, it may be a drive's that has missed its master.
     #[test]
     fn a_zero_behind_a_short_silence_is_not_excused() {
         let byte = Span::from_micros(286);
         let size = RingSize::new(3).expect("a size");
         let way = byte * 4;
-        // The bytes in front of the silence, how long it is, and how late each byte comes back.
-        let excused = |before: u64, silence: Span, (early, late): (Span, Span)| {
+        // The earliest time-out, the bytes in front of the silence, how long it is, and how late each byte comes back.
+        let excused = |earliest: Span, before: u64, silence: Span, (early, late): (Span, Span)| {
             let start = |place: u64| {
                 let gap = if place < before { Span::ZERO } else { silence };
                 Instant::START + byte * place + gap
@@ -348,6 +353,7 @@ mod tests {
                 answered: &starts,
                 all: &starts,
                 way,
+                earliest,
             };
             let (expected, received) = (
                 heard(SYNCO, (Span::ZERO, Span::ZERO)),
@@ -359,11 +365,22 @@ mod tests {
         };
         let ms = Span::from_millis;
         let on_time = (ms(0), ms(0));
-        assert!(!excused(250, ms(6), on_time));
-        assert!(excused(250, ms(8), on_time));
-        assert!(excused(20, ms(6), on_time), "silence before them");
-        assert!(excused(250, ms(6), (ms(0), ms(2))), "a late computer");
-        assert!(excused(250, ms(6), (ms(2), ms(0))), "no times of a line");
+        let right = EARLIEST_TIME_OUT;
+        assert!(!excused(right, 250, ms(6), on_time));
+        assert!(!excused(right, 250, ms(8), on_time));
+        assert!(excused(right, 250, ms(9), on_time), "within a millisecond");
+        assert!(excused(right, 20, ms(6), on_time), "silence before them");
+        assert!(
+            excused(right, 250, ms(8), (ms(0), ms(2))),
+            "a late computer"
+        );
+        assert!(
+            excused(right, 250, ms(6), (ms(2), ms(0))),
+            "no times of a line"
+        );
+        // A drive of the model that detects a time-out after 8 ms.
+        assert!(!excused(ms(8), 250, ms(6), on_time));
+        assert!(excused(ms(8), 250, ms(8), on_time));
     }
 
     /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
@@ -385,6 +402,7 @@ mod tests {
                 answered: &[],
                 all: &[],
                 way: Span::ZERO,
+                earliest: EARLIEST_TIME_OUT,
             };
             let answer = TwinBytes {
                 bytes: heard(model),
