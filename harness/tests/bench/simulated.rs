@@ -94,6 +94,27 @@ fn probes_settle_the_bus_without_resets() {
     }
 }
 
+/// ND21 9.8: one answer to the byte that breaks a check sequence off does not show which of the drives has passed it on. The probe tells the
+/// first sixteen behind the master from each other. Of two others none is named.
+#[test]
+fn the_drive_that_differs_is_named_or_none_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let two = "the bytes received do not tell which: answered, but drive 0 forwarded, or answered, but drive 1 forwarded";
+    for (drives, drive, words) in [
+        (3, 1, "answered, but drive 1 forwarded"),
+        (3, 2, "answered, but drive 2 forwarded"),
+        (18, 0, two),
+    ] {
+        let setup = format!(", \"drive {drive} property broken-sequence = forwarded\"");
+        let name = format!("{drives}-{drive}");
+        let output = ask(folder.path(), &name, &rig(drives, false, "", &setup));
+        let text = said(&output);
+        let settled = format!("broken-sequence (nd21 9.8): {words}\n");
+        assert!(text.contains(&settled), "{name}: {text}");
+        assert!(!text.contains("deviation: "), "{name}: {text}");
+    }
+}
+
 /// A simulated rig obeys its `[limits]` and `[retry]`, and evidence changes neither a verdict nor what is skipped.
 #[test]
 fn limits_and_attempts_hold_with_and_without_evidence() {

@@ -484,6 +484,9 @@ impl Qualification {
             Answer::NoDifference => Asking::Open(
                 "every value explains the bytes received: the drive was not in a state that shows the property".to_owned(),
             ),
+            Answer::Several(values) => Asking::Open(format!(
+                "the bytes received do not tell which: {values}"
+            )),
             Answer::NotDone(time) => Asking::NotDone(format!(
                 "longer than {time}: not finished when asked for the last time"
             )),

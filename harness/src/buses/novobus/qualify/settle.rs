@@ -13,6 +13,9 @@ use harness_sim::nd21::PROPERTIES;
 /// Maximum number of settings in a hypothesis about the bus.
 const MOST_SETTINGS: usize = 3;
 
+/// How many hypotheses are named at most.
+const MOST_TOLD: usize = 3;
+
 /// How late or early the bench sees the first unasked byte of a drive (ND21 9.9) in real time: its clock and the drive's differ, the
 /// computer may be busy, and a ring behind a socket is not bound to the times of a line.
 const LATENESS: Span = Span::from_millis(2);
@@ -31,6 +34,8 @@ pub enum Answer {
     },
     /// Every value explains every byte.
     NoDifference,
+    /// Several values explain every byte, one drive being different from the others in each: these, for people.
+    Several(String),
     /// The drive was not done at its last poll, after this time.
     NotDone(String),
     /// No value does.
@@ -61,6 +66,10 @@ pub fn answer<E>(
             let own = all.iter().filter(simple).cloned();
             let own: Vec<_> = own.collect();
             let found = explaining_all(own, conversations, exactness, twin)?;
+            // A time is the one that fits best. No byte tells one drive from another one.
+            if settings > 1 && found.len() > 1 && all.iter().all(is_of_words) {
+                return Ok(Answer::Several(one_of(&found)));
+            }
             if let Some(hypothesis) = best(&found, lateness) {
                 return Ok(Answer::Settled {
                     value: hypothesis.name.clone(),
@@ -89,6 +98,26 @@ pub fn answer<E>(
         Answer::Unexplained if !probe.assumed.is_empty() => asked(&Header::default()),
         answer => Ok(answer),
     }
+}
+
+/// Whether its settings are words.
+fn is_of_words(hypothesis: &Hypothesis) -> bool {
+    let mut setups = hypothesis.header.setups.iter();
+    setups.all(|own| matches!(own.what, SetupKind::Word(..)))
+}
+
+/// The hypotheses, for people.
+fn one_of(found: &[(Hypothesis, Fit)]) -> String {
+    let names = found
+        .iter()
+        .take(MOST_TOLD)
+        .map(|(own, _)| own.name.as_str());
+    let names: Vec<_> = names.collect();
+    let more = match found.len().saturating_sub(MOST_TOLD) {
+        0 => String::new(),
+        more => format!(", or one of {more} more"),
+    };
+    format!("{}{more}", names.join(", or "))
 }
 
 /// What the conversations show of a property of one drive.
