@@ -205,7 +205,7 @@ impl Knowledge {
         self.cells
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
-        self.programs.entry((ring, drive)).or_default().begin();
+        self.programs.entry((ring, drive)).or_default().reset();
         self.working.remove(&(ring, drive));
         self.ordered.retain(|place, _| !of_it(place));
         self.trusting.remove(&(ring, drive));

@@ -30,7 +30,9 @@ const LOW: u8 = 2;
 pub(super) struct Program {
     /// The master has confirmed all errors.
     confirmed: bool,
-    /// Which bytes of `errorcode` were read as 0 since then.
+    /// The master has reset the drive since the attempt began.
+    reset: bool,
+    /// Which bytes of `errorcode` were read as 0 since the errors were confirmed.
     zeros: u8,
     /// Whether the last byte read was the high one of `errorcode`, and right.
     high_is_right: bool,
@@ -48,12 +50,18 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// An attempt begins, or the drive was reset: what the EEPROM holds stays.
+    /// An attempt begins: what the EEPROM holds stays.
     pub(super) fn begin(&mut self) {
         *self = Self {
             eeprom: std::mem::take(&mut self.eeprom),
             ..Self::default()
         };
+    }
+
+    /// The master has reset the drive (ND21 10.5).
+    pub(super) fn reset(&mut self) {
+        self.begin();
+        self.reset = true;
     }
 
     /// The master has written to a cell.
@@ -103,6 +111,10 @@ impl Program {
             ram::ERRORCODE => {
                 // There is no error in the drive, and one of the bus in its model.
                 if self.confirmed && (wanted, value) == (OF_THE_BUS, 0) {
+                    return Some(false);
+                }
+                // An error of the bus is over with a check sequence, which is one in the model too; what was before the reset is lost (10.5).
+                if self.reset && (wanted, value) == (0, OF_THE_BUS) {
                     return Some(false);
                 }
                 self.zeros |= if is_zero { HIGH } else { 0 };
@@ -222,6 +234,20 @@ mod tests {
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), Some(false));
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x02), None);
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), None);
+    }
+
+    /// ND21 10.5: what is not in the EEPROM is lost with a reset, and so is the code of an error of the bus. A drive may find an error of its own.
+    #[test]
+    fn no_code_of_the_bus_outlives_a_reset() {
+        let mut drive = Program::default();
+        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), None);
+        drive.reset();
+        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), Some(false));
+        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x02), None);
+        // An error of the bus behind the reset.
+        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), None);
+        drive.begin();
+        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), None);
     }
 
     /// ND21 14.10.5: what was written to a cell of the customer's is read back, once the drive says that it has read.
