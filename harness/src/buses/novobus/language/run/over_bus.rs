@@ -209,7 +209,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) 
     if let Some(trouble) = link.trouble() {
         let left = "cells of the header may not be set back";
         outcome.remarks.push(left.to_owned());
-        // What was judged before it is kept as a remark: drives may be left otherwise than they were found.
+        // The verdict of the steps becomes a remark, because a drive may hold other values than before the scenario.
         return outcome.ended_by(trouble);
     }
     let left = restored.err().map(|why| format!("not set back: {why}"));
