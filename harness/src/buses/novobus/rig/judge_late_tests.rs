@@ -254,3 +254,16 @@ fn the_code_of_a_time_out_is_judged() {
         assert_ne!(verdict, Failed, "{monitoring}, {silence}, {between}");
     }
 }
+
+/// ND21 9.4, 9.9, 14.10.3: process data are not written where a time-out has cut their low byte off. The zero that comes in its place is none.
+#[test]
+fn process_data_that_a_time_out_cuts_are_judged() {
+    let scenario = "drive 0..last memory Flags2 = 04\nwrite-byte 1 DataIn = 4E\nwrite-word 1 FF4E = 1234\n> 80*20 85 FE A5\nwait 80ms\n\
+         > 00*17 FF 44 72 4C 41\n> 88 FE C0 4E FF 0D 88 FE C0 4F FF 0E\n> 80*2\n";
+    let verdict = |ring: &str| judged_with(ring, "", scenario, &|_, _| {}).verdict;
+    assert_eq!(verdict(""), Passed);
+    assert_eq!(
+        verdict("drive 1 deviates process-data-high-byte-early"),
+        Failed
+    );
+}
