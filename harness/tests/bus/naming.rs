@@ -612,21 +612,33 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
     }
 }
 
-/// ND21 10.1: what stands in ROM is the drive's choice. A qualification compares what is read with what was read before.
+/// What a conversation shows of a ring of ND21 drives, with this line or as the manual says: which drive is meant, and the section of the
+/// byte that differs.
+fn sighted(name: &str, line: &str) -> Option<(Meant, &'static str)> {
+    let right = ["drive 0..last model nd21", STANDS].map(str::to_owned);
+    let drives = [right.as_slice(), &[line.to_owned()]].concat();
+    let link = twin(&drives).expect("a ring").into_link();
+    let all = played_in_time(&named_plan(name), &link);
+    let model = twin(&right).expect("a ring");
+    let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
+    sighting.map(|own| (own.meant, own.section))
+}
+
+/// What these conversations are made for: ND21 10.1 (ROM is compared with itself, and longs go over the ends of pages), 14.4.1 and 14.10.1
+/// (`Status` behind an error of the bus).
 #[test]
-fn rom_is_compared_with_itself() {
-    let right = [STANDS.to_owned()];
-    let wrong = [
-        right[0].clone(),
-        "drive 1 deviates rom-cell-wrong-at-times".to_owned(),
-    ];
-    let found = |lines: &[String]| {
-        let link = twin(lines).expect("a ring").into_link();
-        let all = played_in_time(&named_plan("qualify-rom"), &link);
-        let model = twin(&right).expect("a ring");
-        let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
-        sighting.map(|own| (own.meant, own.section))
-    };
-    assert_eq!(found(&right), None);
-    assert_eq!(found(&wrong), Some((Meant::Own(1), "10.1")));
+fn conversations_find_their_deviations() {
+    for (name, wrong) in [
+        ("qualify-rom", "rom-cell-wrong-at-times"),
+        ("qualify-long-reads", "read-long-stays-in-its-page"),
+        ("qualify-errors", "errors-stop"),
+        ("qualify-errors", "status-without-wrong-sums"),
+    ] {
+        assert_eq!(sighted(name, ""), None, "{name}");
+        let found = sighted(name, &format!("drive 1 deviates {wrong}"));
+        assert_eq!(found.map(|own| own.0), Some(Meant::Own(1)), "{name}");
+    }
+    // Which errors of the bus set the error bit is left open (11.8).
+    let rule = "drive 1 property bus-errors = time-out-only";
+    assert_eq!(sighted("qualify-errors", rule), None);
 }

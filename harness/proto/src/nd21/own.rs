@@ -91,14 +91,16 @@ pub struct Kept {
 }
 
 /// The bits of a cell, where a master has read `value`, that the manual does not let the drive change by itself. A drive that reports an
-/// error or a reset in `Status` may block and stop itself (ND21 14.4.1).
+/// error in `Status` blocks its regulator (ND21 11.8) and may show it; one that reports a reset may show anything. A software stop is the
+/// master's alone (11.8, 14.4.1).
 #[must_use]
 pub fn kept(address: u16, value: u8) -> Kept {
     use crate::nd21::bits::{flags2, ps_status, status};
     let kept = |bits, unless| Kept { bits, unless };
     let positioning = Some(Worker::Positioning);
     match address {
-        ram::STATUS if value & (status::ERROR | status::RESET) != 0 => kept(0, None),
+        ram::STATUS if value & status::RESET != 0 => kept(0, None),
+        ram::STATUS if value & status::ERROR != 0 => kept(status::STOP, None),
         ram::STATUS => kept(status::BLOCK | status::STOP, None),
         // 14.4.3, 14.10.2: the drive ends what these bits have started, and never switches the monitoring.
         ram::FLAGS2 => kept(flags2::MONITORING, None),

@@ -2,12 +2,16 @@
 
 use super::how::{Deviation, How, Moment, Write};
 use harness_proto::nd21::bits::status;
+use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::bus_end::{Parameter, Place};
 use harness_proto::novobus::command::{Field, Kind};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::memory::{Memory, in_range};
 use harness_proto::time::Span;
+
+/// The code of a wrong checking byte (ND21 14.11.14).
+const WRONG_SUM: [u8; 2] = ErrorCode::NbChecksum.code().to_be_bytes();
 
 /// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
@@ -392,6 +396,28 @@ pub(super) static OF_QUALIFICATIONS: &[Deviation] = &[
         "10.1",
         "bit 0 of the ROM cell 2F33 is wrong where every 9th command reads it",
         How::Misreads(|nth, address, data| data ^ u8::from(address == 0x2F33 && nth % 9 == 0)),
+    ),
+    wrong(
+        "status-without-wrong-sums",
+        "14.10.1",
+        "a wrong checking byte does not set the error bit of Status",
+        How::Reads(|peek, address| {
+            let byte = peek(address);
+            let is_sum = [peek(ram::ERRORCODE), peek(ram::ERRORCODE + 1)] == WRONG_SUM;
+            match address {
+                ram::STATUS if is_sum => byte & !status::ERROR,
+                _ => byte,
+            }
+        }),
+    ),
+    wrong(
+        "errors-stop",
+        "14.4.1",
+        "an error sets the software stop in Status",
+        How::Reads(|peek, address| match (address, peek(address)) {
+            (ram::STATUS, value) if value & status::ERROR != 0 => value | status::STOP,
+            (_, value) => value,
+        }),
     ),
     wrong(
         "reset-keeps-the-recording",

@@ -3,7 +3,8 @@
 //! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
-use super::program::{OF_THE_BUS, Program, READ, READ_BYTE, READY};
+use super::error_mode::OF_THE_BUS;
+use super::program::{Program, READ, READ_BYTE, READY};
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
@@ -133,7 +134,7 @@ const LONGEST_ORDER: Span = Span::from_millis(4_000);
 
 /// How long a drive may take to delete its error once the master has confirmed it. The manual gives no time; the cycle control works in
 /// cycles of 432 us (4.1).
-const LONGEST_CONFIRMATION: Span = Span::from_millis(500);
+pub(super) const LONGEST_CONFIRMATION: Span = Span::from_millis(500);
 
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
@@ -192,16 +193,23 @@ impl Knowledge {
     /// (14.10.5).
     pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
         let of_it = |place: &CellByte| (place.0, place.1) == (ring, drive);
+        // The bits of a cell that are lost, all of them written in the present attempt.
         let lost = |place: &CellByte, own: &Known| {
-            own.now == 0xFF && !self.saved.contains(&(ring, drive)) && is_lost(place.2)
+            match place.2 {
+                OUTPUTS => Some(self.outputs_of_the_bus(ring, drive)),
+                address => is_lost(address).then_some(0xFF),
+            }
+            .filter(|bits| *bits != 0 && own.now & bits == *bits)
+            .map(|bits| own.value & bits)
         };
-        let cells = self.cells.iter();
+        let cells = self.cells.iter().filter(|(place, _)| of_it(place));
         let lost: Vec<_> = cells
-            .filter(|(place, own)| of_it(place) && lost(place, own))
-            .map(|(place, own)| (*place, own.value))
+            .filter_map(|(place, own)| Some((*place, lost(place, own)?)))
             .collect();
         self.before_reset.retain(|place, _| !of_it(place));
-        self.before_reset.extend(lost);
+        if !self.saved.contains(&(ring, drive)) {
+            self.before_reset.extend(lost);
+        }
         self.cells
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
@@ -265,7 +273,7 @@ impl Knowledge {
             self.trusting.remove(&(ring, drive));
         }
         let program = self.programs.entry((ring, drive)).or_default();
-        program.write(address, write);
+        program.write(address, write, self.now);
         let own = self.cells.entry(place).or_default();
         own.written |= write.bits();
         own.now |= write.bits();
@@ -371,6 +379,25 @@ impl Knowledge {
         late && ended(wanted) && !self.disturbed
     }
 
+    /// Whether these bits of a cell, which was read for the first time since a reset, have come out of several resets with what was written
+    /// before each (ND21 10.5).
+    fn outlives_resets(&mut self, place: CellByte, (kept, value): (u8, u8)) -> bool {
+        let own = self.cells.get(&place).copied().unwrap_or_default();
+        if kept == 0 || own.written & kept != 0 || own.learned {
+            return false;
+        }
+        let Some(before) = self.before_reset.remove(&place) else {
+            return false;
+        };
+        let survived = self.survived.entry(place).or_default();
+        if before == value & kept {
+            survived.insert(before);
+        } else {
+            survived.clear();
+        }
+        survived.len() >= SURVIVALS
+    }
+
     /// The checking byte behind a byte that was read was right: where that byte was 00, the cell holds it.
     pub(crate) fn confirm_zero(&mut self, place: CellByte) {
         if let Some(own) = self.cells.get_mut(&place).filter(|own| own.zero) {
@@ -392,7 +419,8 @@ impl Knowledge {
             };
         }
         let program = self.programs.entry((place.0, place.1)).or_default();
-        match program.read(place.2, wanted, value) {
+        let now = (!self.disturbed).then_some(self.now);
+        match program.read(place.2, (wanted, value), now) {
             Some(true) => return ByteRead::Right,
             Some(false) => return ByteRead::Wrong,
             None => {}
@@ -404,6 +432,9 @@ impl Knowledge {
             return ByteRead::Wrong;
         }
         let kept = self.kept(place, value);
+        if self.outlives_resets(place, (kept, value)) {
+            return ByteRead::Wrong;
+        }
         let own = self.cells.entry(place).or_default();
         let written = own.written & kept;
         // Process data went where the drive's own DataIn says, which the model's may not. The model's outputs may serve another purpose.
@@ -419,19 +450,6 @@ impl Knowledge {
                 (0, _) => ByteRead::Own,
                 _ => ByteRead::Wrong,
             };
-        }
-        if own.written == 0 && !own.learned {
-            let before = self.before_reset.remove(&place);
-            let survived = self.survived.entry(place).or_default();
-            match before {
-                Some(before) if before == value => {
-                    survived.insert(value);
-                }
-                _ => survived.clear(),
-            }
-            if survived.len() >= SURVIVALS {
-                return ByteRead::Wrong;
-            }
         }
         if own.learned {
             differ |= (value ^ own.value) & !written;

@@ -1,6 +1,7 @@
 //! Tests of what is known of drives.
 
 use super::*;
+use harness_proto::nd21::bits::hw_version2;
 
 const CELL: CellByte = (0, 1, 0xFF74);
 
@@ -159,11 +160,15 @@ fn own_cells_hold_what_was_written_until_their_part_starts() {
     known.write(flags, Write::Or(flags2::MONITORING));
     assert_eq!(known.read(flags, 0x04, 0x00), ByteRead::Wrong);
     assert_eq!(known.read(flags, 0x04, 0xFF), ByteRead::Own);
-    // A drive in error may block itself.
+    // A drive in error may block itself, and does not stop itself.
     let status = (0, 1, ram::STATUS);
+    known.write(status, Write::Set(0x80));
+    assert_eq!(known.read(status, 0x80, 0x81), ByteRead::Wrong);
+    assert_eq!(known.read(status, 0x80, 0xA1), ByteRead::Own);
     known.write(status, Write::Set(0x01));
     assert_eq!(known.read(status, 0x01, 0x80), ByteRead::Wrong);
-    assert_eq!(known.read(status, 0x01, 0xA0), ByteRead::Own);
+    assert_eq!(known.read(status, 0x01, 0xA1), ByteRead::Wrong);
+    assert_eq!(known.read(status, 0x01, 0x20), ByteRead::Own);
     assert_eq!(known.read(status, 0x01, 0x05), ByteRead::Own);
 }
 
@@ -252,4 +257,36 @@ fn an_output_of_the_bus_keeps_its_level() {
     // Also where the model, whose output shows something else, agrees.
     assert_eq!(known.read(outputs, 0x20, 0x00), ByteRead::Wrong);
     assert_eq!(known.read(outputs, 0x00, 0x00), ByteRead::Wrong);
+}
+
+/// ND21 10.4, 10.5: the levels of outputs that only `WriteIO` sets are lost with a reset. One of them may be what the drive sets then.
+#[test]
+fn outputs_that_outlive_three_resets_were_not_reset() {
+    let outputs = (0, 1, OUTPUTS);
+    let last = |hardware2: u8, after: &dyn Fn(u8) -> u8| {
+        let mut known = Knowledge::default();
+        known.begin();
+        let mut last = ByteRead::Own;
+        for level in [0x00, GPO1, GPO2] {
+            let configure = |known: &mut Knowledge| {
+                for (cell, value) in [(ram::HW_VERSION, 0x00), (ram::HW_VERSION2, hardware2)] {
+                    known.read((0, 1, cell), value, value);
+                    known.confirm_zero((0, 1, cell));
+                }
+            };
+            configure(&mut known);
+            known.write(outputs, Write::And(!(GPO1 | GPO2)));
+            known.write(outputs, Write::Or(level));
+            known.reset(0, 1);
+            configure(&mut known);
+            // The other bits are the drive's.
+            last = known.read(outputs, 0x00, after(level) | 0x01);
+        }
+        last
+    };
+    let both = hw_version2::NO_ANALOGUE_OUTPUT;
+    assert_eq!(last(both, &|level| level), ByteRead::Wrong);
+    assert_eq!(last(both, &|_| GPO2), ByteRead::Own);
+    // The analogue output has GPO1 (14.7.4).
+    assert_eq!(last(0x00, &|level| level), ByteRead::Own);
 }

@@ -7,6 +7,7 @@
 
 mod compare;
 mod comparison;
+mod error_mode;
 mod follow;
 mod known;
 mod places;

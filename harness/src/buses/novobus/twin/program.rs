@@ -1,13 +1,12 @@
-//! What the manual determines of cells that a drive's own program writes: the code of an error provoked by a telegram (ND21 14.11.14), and
-//! the data read back from cells of the EEPROM (14.10.5).
+//! What the manual determines of cells that a drive's own program writes: `Status` and `errorcode` behind an error of the bus
+//! ([`ErrorMode`]), and the data read back from cells of the EEPROM (ND21 14.10.5).
 
+use super::error_mode::ErrorMode;
 use super::known::Write;
-use harness_proto::nd21::{CONFIRM_ERROR, ram};
+use harness_proto::nd21::ram;
+use harness_proto::time::Instant;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-
-/// The high byte of the codes of the bus.
-pub(super) const OF_THE_BUS: u8 = 0x05;
 
 /// Commands of `EEPROMcontrol` (14.10.5.1), and its bit that says that a byte has been read.
 pub(super) const READ_BYTE: u8 = 0x81;
@@ -21,21 +20,11 @@ pub(super) const READY: u8 = 1 << 4;
 /// the cycle control. The drive itself counts its hours, notes errors and dates, and may note its reference point.
 const STEADY: [RangeInclusive<u8>; 4] = [0x20..=0x4B, 0x50..=0x57, 0x5A..=0x5F, 0x60..=0xFF];
 
-/// A byte of `errorcode`: bits of [`Program::zeros`].
-const HIGH: u8 = 1;
-const LOW: u8 = 2;
-
 /// What is known of one drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Program {
-    /// The master has confirmed all errors.
-    confirmed: bool,
-    /// The master has reset the drive since the attempt began.
-    reset: bool,
-    /// Which bytes of `errorcode` were read as 0 since the errors were confirmed.
-    zeros: u8,
-    /// Whether the last byte read was the high one of `errorcode`, and right.
-    high_is_right: bool,
+    /// Its `Status` and `errorcode`.
+    errors: ErrorMode,
     /// What the master has written to the ports of the EEPROM, while it stands there.
     address: Option<u8>,
     data: Option<u8>,
@@ -52,7 +41,9 @@ pub(super) struct Program {
 impl Program {
     /// An attempt begins: what the EEPROM holds stays.
     pub(super) fn begin(&mut self) {
+        self.errors.begin();
         *self = Self {
+            errors: std::mem::take(&mut self.errors),
             eeprom: std::mem::take(&mut self.eeprom),
             ..Self::default()
         };
@@ -61,18 +52,14 @@ impl Program {
     /// The master has reset the drive (ND21 10.5).
     pub(super) fn reset(&mut self) {
         self.begin();
-        self.reset = true;
+        self.errors.reset();
     }
 
     /// The master has written to a cell.
-    pub(super) fn write(&mut self, cell: u16, write: Write) {
+    pub(super) fn write(&mut self, cell: u16, write: Write, now: Instant) {
         let Write::Set(data) = write else { return };
-        self.high_is_right = false;
+        self.errors.write(cell, data, now);
         match cell {
-            ram::ERRORCODE => {
-                self.confirmed = data == CONFIRM_ERROR;
-                self.zeros = 0;
-            }
             ram::EEPROM_BUFFER => {
                 self.address = Some(data);
                 self.reading = None;
@@ -103,37 +90,16 @@ impl Program {
         }
     }
 
-    /// Whether a byte that was read is right, where the model holds `wanted`; `None` where it is the drive's choice.
-    pub(super) fn read(&mut self, cell: u16, wanted: u8, value: u8) -> Option<bool> {
-        let high_is_right = std::mem::take(&mut self.high_is_right);
-        let is_zero = self.confirmed && (wanted, value) == (0, 0);
+    /// Whether a byte that was read is right, where the model holds `wanted`; `None` where it is the drive's choice. The time is that of the
+    /// byte, where the drive's power was on all the time.
+    pub(super) fn read(
+        &mut self,
+        cell: u16,
+        (wanted, value): (u8, u8),
+        now: Option<Instant>,
+    ) -> Option<bool> {
+        let of_the_error = self.errors.read(cell, (wanted, value), now);
         match cell {
-            ram::ERRORCODE => {
-                // There is no error in the drive, and one of the bus in its model.
-                if self.confirmed && (wanted, value) == (OF_THE_BUS, 0) {
-                    return Some(false);
-                }
-                // An error of the bus is over with a check sequence, which is one in the model too; what was before the reset is lost (10.5).
-                if self.reset && (wanted, value) == (0, OF_THE_BUS) {
-                    return Some(false);
-                }
-                self.zeros |= if is_zero { HIGH } else { 0 };
-                if self.zeros != HIGH | LOW {
-                    return None;
-                }
-                if ![0, OF_THE_BUS].contains(&value) {
-                    // The drive has an error of its own.
-                    self.confirmed = false;
-                    self.zeros = 0;
-                    return None;
-                }
-                self.high_is_right = value == wanted;
-                Some(value == wanted)
-            }
-            _ if cell == ram::ERRORCODE + 1 => {
-                self.zeros |= if is_zero { LOW } else { 0 };
-                (high_is_right && self.zeros == HIGH | LOW).then_some(value == wanted)
-            }
             ram::EEPROM_CONTROL => {
                 let shown = value & (READ | READY);
                 self.ready |= shown != 0;
@@ -155,7 +121,7 @@ impl Program {
                     }
                 }
             }
-            _ => None,
+            _ => of_the_error,
         }
     }
 }
@@ -168,28 +134,30 @@ fn is_steady(address: u8) -> bool {
 mod tests {
     use super::*;
 
+    const NOW: Instant = Instant::START;
+
     /// ND21 14.2.2, 14.10.5: a cell that only a master changes holds what was read before, whatever was written to other cells.
     #[test]
     fn the_eeprom_holds_what_was_read() {
         let mut drive = Program::default();
         let read = |drive: &mut Program, address, value| {
-            drive.write(ram::EEPROM_BUFFER, Write::Set(address));
-            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE));
-            drive.read(ram::EEPROM_CONTROL, 0x01, READ);
-            drive.read(ram::EEPROM_BUFFER, address, value)
+            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
+            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
+            drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
         };
         assert_eq!(read(&mut drive, 0xDC, 0x77), None);
-        drive.write(ram::EEPROM_CONTROL, Write::Set(0x10));
+        drive.write(ram::EEPROM_CONTROL, Write::Set(0x10), NOW);
         assert_eq!(read(&mut drive, 0x05, 0x01), None);
-        drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C));
-        drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5));
-        drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE));
+        drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C), NOW);
+        drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5), NOW);
+        drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE), NOW);
         assert_eq!(read(&mut drive, 0xDC, 0xA5), Some(false));
         assert_eq!(read(&mut drive, 0xDC, 0x77), Some(true));
         // The operating hours, which the drive counts.
         assert_eq!(read(&mut drive, 0x05, 0x02), None);
         // The parameters are copied into it.
-        drive.write(ram::EEPROM_CONTROL, Write::Set(0x84));
+        drive.write(ram::EEPROM_CONTROL, Write::Set(0x84), NOW);
         assert_eq!(read(&mut drive, 0xDC, 0x78), None);
     }
 
@@ -200,54 +168,20 @@ mod tests {
         let control = ram::EEPROM_CONTROL;
         let mut drive = Program::default();
         let order = |drive: &mut Program, command| {
-            drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C));
-            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5));
-            drive.write(control, Write::Set(command));
+            drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C), NOW);
+            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5), NOW);
+            drive.write(control, Write::Set(command), NOW);
         };
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, READ, READY), None);
+        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), None);
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, READ, READ_BYTE), None);
-        assert_eq!(drive.read(control, READ, READY), Some(false));
-        assert_eq!(drive.read(control, READ, READ), None);
+        assert_eq!(drive.read(control, (READ, READ_BYTE), Some(NOW)), None);
+        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), Some(false));
+        assert_eq!(drive.read(control, (READ, READ), Some(NOW)), None);
         order(&mut drive, WRITE_BYTE);
-        assert_eq!(drive.read(control, READ, WRITE_BYTE), None);
+        assert_eq!(drive.read(control, (READ, WRITE_BYTE), Some(NOW)), None);
         order(&mut drive, READ_BYTE);
-        assert_eq!(drive.read(control, READ, READY), None);
-    }
-
-    /// ND21 14.10.1, 14.11.14: behind a confirmed error the code of the bus's next one is decided, and no other code.
-    #[test]
-    fn codes_are_judged_behind_a_confirmation() {
-        let mut drive = Program::default();
-        let low = ram::ERRORCODE + 1;
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), None);
-        drive.write(ram::ERRORCODE, Write::Set(CONFIRM_ERROR));
-        // A drive that does not delete its error is none that has deleted it.
-        assert_eq!(drive.clone().read(ram::ERRORCODE, 0x05, 0x00), Some(false));
-        assert_eq!(drive.read(low, 0, 0), None);
-        assert_eq!(drive.read(ram::ERRORCODE, 0, 0), Some(true));
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), Some(true));
-        assert_eq!(drive.read(low, 0x07, 0x06), Some(false));
-        // After other bytes it is unknown whether this is still the same code.
-        assert_eq!(drive.read(low, 0x07, 0x06), None);
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), Some(false));
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x02), None);
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), None);
-    }
-
-    /// ND21 10.5: what is not in the EEPROM is lost with a reset, and so is the code of an error of the bus. A drive may find an error of its own.
-    #[test]
-    fn no_code_of_the_bus_outlives_a_reset() {
-        let mut drive = Program::default();
-        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), None);
-        drive.reset();
-        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), Some(false));
-        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x02), None);
-        // An error of the bus behind the reset.
-        assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), None);
-        drive.begin();
-        assert_eq!(drive.read(ram::ERRORCODE, 0x00, 0x05), None);
+        assert_eq!(drive.read(control, (READ, READY), Some(NOW)), None);
     }
 
     /// ND21 14.10.5: what was written to a cell of the customer's is read back, once the drive says that it has read.
@@ -255,21 +189,36 @@ mod tests {
     fn the_eeprom_holds_what_was_written() {
         let mut drive = Program::default();
         let ports = |drive: &mut Program, address, data| {
-            drive.write(ram::EEPROM_BUFFER, Write::Set(address));
-            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(data));
+            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
+            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(data), NOW);
         };
         ports(&mut drive, 0x5C, 0xA5);
-        drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE));
+        drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE), NOW);
         drive.begin();
-        drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C));
-        drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE));
-        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0x5C, 0x5C), None);
-        assert_eq!(drive.read(ram::EEPROM_CONTROL, 0x01, READ), None);
-        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0x5C, 0xA5), Some(true));
-        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0xA5, 0xA4), Some(false));
+        drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C), NOW);
+        drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+        assert_eq!(
+            drive.read(ram::EEPROM_BUFFER, (0x5C, 0x5C), Some(NOW)),
+            None
+        );
+        assert_eq!(
+            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW)),
+            None
+        );
+        assert_eq!(
+            drive.read(ram::EEPROM_BUFFER, (0x5C, 0xA5), Some(NOW)),
+            Some(true)
+        );
+        assert_eq!(
+            drive.read(ram::EEPROM_BUFFER, (0xA5, 0xA4), Some(NOW)),
+            Some(false)
+        );
         // A second order takes the byte that was read for an address.
-        drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE));
-        drive.read(ram::EEPROM_CONTROL, READ, READ);
-        assert_eq!(drive.read(ram::EEPROM_BUFFER, 0xA5, 0x00), None);
+        drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+        drive.read(ram::EEPROM_CONTROL, (READ, READ), Some(NOW));
+        assert_eq!(
+            drive.read(ram::EEPROM_BUFFER, (0xA5, 0x00), Some(NOW)),
+            None
+        );
     }
 }
