@@ -71,12 +71,12 @@ fn evidence_changes_no_verdict_on_a_port() {
     ];
     for (run, scenarios) in runs {
         let line = format!("run {scenarios} --allow-motion --rig desk.toml");
-        let without = run(&line);
-        let with = run(&format!("{line} --evidence kept"));
+        let without = settled(|_| run(&line));
+        let with = settled(|time| run(&format!("{line} --evidence kept{time}")));
         assert_eq!(verdicts(&with), verdicts(&without), "{}", said(&with));
         ended(&without, 1, " failed");
         ended(&with, 1, " failed");
-        let verified = run("verify kept");
+        let verified = run("verify kept0");
         assert!(matches!(verified.status.code(), Some(0 | 5)));
         ended(
             &verified,
@@ -84,6 +84,17 @@ fn evidence_changes_no_verdict_on_a_port() {
             "0 things wrong",
         );
     }
+}
+
+/// A computer that stands still makes an attempt inconclusive: the scenarios are then played again, five times at most.
+fn settled(run: impl Fn(usize) -> Output) -> Output {
+    let runs = (0..5).map(&run);
+    let mut left = runs.skip_while(|own| {
+        verdicts(own)
+            .iter()
+            .any(|own| own.starts_with("inconclusive"))
+    });
+    left.next().unwrap_or_else(|| run(5))
 }
 
 /// The verdict of each scenario, with its name.

@@ -10,8 +10,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) const SAFE: &str = "safe state: the output of every inverter is off";
 
-/// A computer that stands still for longer than the slot time of the master, 131 ms, loses the slave: the command is then given again, five
-/// times at most.
+/// A computer that stands still for longer than the rig's patience, 1 s, loses the slave: the command is then given again, five times at most.
 pub(crate) fn while_the_slave_is_lost(mut run: impl FnMut() -> Output) -> Output {
     let is_lost = |output: &Output| {
         let said = said(output);

@@ -73,17 +73,21 @@ fn between(served: &Served, bytes: usize, program: Receiver<String>) -> String {
             bench.try_clone().expect("one"),
         );
         std::thread::spawn(move || std::io::copy(&mut from, &mut to));
-        let mut passed = 0;
+        let mut held = Vec::new();
+        let mut read = 0;
         let mut piece = [0; 4096];
-        while passed < bytes {
+        // The last piece waits for the signal: what the bench does behind it needs an answer.
+        while read < bytes {
+            ring.write_all(&held).expect("the ring");
             let count = bench.read(&mut piece).expect("bytes");
-            assert_ne!(count, 0, "it has ended after {passed} bytes");
-            ring.write_all(&piece[..count]).expect("the ring");
-            passed += count;
+            assert_ne!(count, 0, "it has ended after {read} bytes");
+            held = piece[..count].to_vec();
+            read += count;
         }
         let id = program.recv().expect("its id");
         let sent = Command::new("kill").args(["-HUP", &id]).status();
         assert!(sent.expect("kill").success());
+        ring.write_all(&held).expect("the ring");
         let _gone = std::io::copy(&mut bench, &mut ring);
         let _gone = ring.shutdown(std::net::Shutdown::Both);
     });
