@@ -267,3 +267,21 @@ fn process_data_that_a_time_out_cuts_are_judged() {
         Failed
     );
 }
+
+/// ND21 9.9, 14.10.2: a drive that alone monitors has detected a time-out "no later than 20 ms" behind the last byte, whichever drives are behind it.
+#[test]
+fn a_time_out_that_does_not_come_is_the_drives_fault() {
+    let verdict = |ring: &str, silence: &str| {
+        let scenario = format!(
+            "drive 1 memory Flags2 = 04\nread-byte 0 Flags2\nread-byte 2 Flags2\n> 80*20\nwait {silence}\n> 80*2\nwait 80ms\n\
+             > 00*17 FF 44 72 4C 41\n> 8A FE 82 00 57 FF D8 80*2\n"
+        );
+        judged_with(ring, "", &scenario, &|_, _| {}).verdict
+    };
+    for right in ["", "drive 1 property time-out = 20ms"] {
+        assert_eq!(verdict(right, "22.5ms"), Passed, "{right}");
+    }
+    let late = "drive 1 deviates time-out-after-25ms";
+    assert_eq!(verdict(late, "22.5ms"), Failed);
+    assert_ne!(verdict(late, "20ms"), Failed);
+}

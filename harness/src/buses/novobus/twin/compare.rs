@@ -74,7 +74,9 @@ impl Comparer<'_> {
             way,
             earliest: self.earliest_time_out,
         };
-        let race = || times.judge(size, (answer, received), self.exactness.tolerance);
+        let monitors = self.monitoring(ring, size).any(|own| own == Some(true));
+        let judged_with = (self.exactness.tolerance, monitors);
+        let race = || times.judge(size, (answer, received), judged_with);
         let unasked = real_time.then(race).flatten();
         let may = self.comparison.monitored || self.knowledge.may_monitor(ring, size);
         let monitored = self.comparison.monitored;
@@ -192,6 +194,11 @@ impl Comparer<'_> {
         }
     }
 
+    /// Whether each drive of a ring monitors time-outs, where that is known.
+    fn monitoring(&self, ring: usize, size: RingSize) -> impl Iterator<Item = Option<bool>> {
+        (0..size.drives()).map(move |drive| self.knowledge.monitors(ring, drive))
+    }
+
     /// Compares what comes behind a check sequence that ends a race of clocks, if one does.
     fn behind_a_race(
         &mut self,
@@ -200,12 +207,12 @@ impl Comparer<'_> {
         conversation: &Conversation,
         answer: &TwinBytes,
     ) {
-        let known = |drive| self.knowledge.monitors(ring, drive).is_some();
-        if !(0..size.drives()).all(known) {
+        if self.monitoring(ring, size).any(|own| own.is_none()) {
             return;
         }
-        let tolerance = self.exactness.tolerance;
-        let rest = behind_a_race(conversation, (ring, size), answer, tolerance);
+        let monitor = self.monitoring(ring, size).filter(|own| *own == Some(true));
+        let silence = (self.exactness.tolerance, monitor.count() == 1);
+        let rest = behind_a_race(conversation, (ring, size), answer, silence);
         if let Some((conversation, answer, left)) = rest {
             if let Some(race) = self.comparison.unasked.last_mut() {
                 race.until = conversation.received.first().map(|(_, at, _)| *at);

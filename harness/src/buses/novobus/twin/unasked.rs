@@ -30,6 +30,9 @@ const BEFORE_ZEROS: Span = Span::from_millis(60);
 /// How much earlier than on a line a byte may come back over a socket that keeps the times of a line.
 const EARLY: Span = Span::from_millis(1);
 
+/// How inexact the clocks of the bench and of a drive may be over the time of a time-out.
+const CLOCKS: Span = Span::from_micros(500);
+
 /// A byte and when it came.
 type Heard = (Instant, Received);
 
@@ -176,12 +179,12 @@ impl Sent<'_> {
     }
 
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
-    /// `None` where the model sends none: no drive may then (ND21 9.9).
+    /// `None` where the model sends none: no drive may then (ND21 9.9). A drive may be known to monitor.
     pub(crate) fn judge(
         &self,
         size: RingSize,
         (answer, received): (&TwinBytes, &[Heard]),
-        tolerance: Span,
+        (tolerance, monitored): (Span, bool),
     ) -> Option<Race> {
         let expected = &answer.bytes[..];
         let model = answer.unasked?;
@@ -214,11 +217,31 @@ impl Sent<'_> {
                 |(_, byte): &Heard| byte.error.is_some() || !spelled[usize::from(byte.byte)];
             Some((first + race.iter().position(foreign)?, Symptom::Value))
         };
+        let overdue = monitored && first == model && self.is_overdue(received, model);
+        let overdue = overdue.then_some((model, Symptom::Value));
+        let here = here.map(|what| (first, what));
         Some(Race {
             first,
             in_both,
-            fault: here.map(|what| (first, what)).or_else(foreign),
+            fault: overdue.or(here).or_else(foreign),
         })
+    }
+
+    /// Whether a drive that monitors has let the latest time-out pass: the first byte behind a silence that was longer than that answers one of
+    /// the master's, and is not the zero of a drive in error (ND21 9.7, 9.9). A silence that the drive hears is no shorter than from the
+    /// return of the byte before it to the start of the next one.
+    fn is_overdue(&self, received: &[Heard], first: usize) -> bool {
+        let behind = || {
+            let before = first.checked_sub(1)?;
+            let start = self.answered.get(before)?;
+            let next = self.all.partition_point(|own| own <= start);
+            let (next, (back, _)) = (self.all.get(next)?, received.get(before)?);
+            let silence = next.since((*start + self.way).max(*back));
+            let (at, byte) = received.get(first)?;
+            let is_zero = *byte == Received::good(0);
+            Some(silence > LATEST_TIME_OUT + CLOCKS && at >= next && !is_zero)
+        };
+        behind() == Some(true)
     }
 }
 
@@ -229,7 +252,7 @@ pub(super) fn behind_a_race(
     conversation: &Conversation,
     (ring, size): (usize, RingSize),
     answer: &TwinBytes,
-    tolerance: Span,
+    (tolerance, one_monitors): (Span, bool),
 ) -> Option<(Conversation, TwinBytes, usize)> {
     let fault = |(_, done): &(usize, Done)| matches!(done, Done::Fault(..));
     let (due, _) = answer.bytes[answer.unasked?];
@@ -241,7 +264,7 @@ pub(super) fn behind_a_race(
     // No drive sends a zero until every drive has detected the time-out.
     let unasked = due.since(starts[last]) + tolerance;
     let all_missed = silence >= LATEST_TIME_OUT + tolerance && unasked >= LATEST_TIME_OUT;
-    if !all_missed || conversation.done.iter().any(fault) {
+    if !(all_missed || one_monitors) || conversation.done.iter().any(fault) {
         return None;
     }
     let behind: Vec<u8> = sent[last + 1..].iter().map(|(byte, _)| *byte).collect();
@@ -249,6 +272,11 @@ pub(super) fn behind_a_race(
         .windows(SEQUENCE.len())
         .position(|own| own == SEQUENCE)?;
     if !behind[..place].iter().all(|byte| [0, SYNCO].contains(byte)) {
+        return None;
+    }
+    // A drive that alone monitors has missed its bytes behind the longest silence in front of the sequence, too.
+    let missed = |gap: &[Instant]| gap[1].since(gap[0]) >= LATEST_TIME_OUT + tolerance;
+    if !all_missed && !starts[last..=last + 1 + place].windows(2).any(missed) {
         return None;
     }
     let end = last + 1 + place + SEQUENCE.len();
@@ -409,7 +437,11 @@ mod tests {
                 unasked: Some(0),
             };
             let size = RingSize::new(3).expect("a size");
-            let race = sent.judge(size, (&answer, &heard(ring)), Span::from_millis(20));
+            let race = sent.judge(
+                size,
+                (&answer, &heard(ring)),
+                (Span::from_millis(20), false),
+            );
             race.expect("a race").fault
         };
         assert_eq!(race(&[0, 0, 1, 2], &[0, 1, 1, 2]), None);
