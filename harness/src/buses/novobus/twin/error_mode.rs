@@ -268,8 +268,7 @@ mod tests {
         assert_eq!(with_code(501, 0), Some(false));
         assert_eq!(with_code(500, 0), None);
         assert_eq!(with_code(501, 0x0305), None);
-        let mut drive = Drive::default();
-        drive.1 = 501;
+        let mut drive = Drive(ErrorMode::default(), 501);
         // Nothing was confirmed: the model does not know of the error.
         drive.code(0, 0);
         assert_eq!(drive.read(ram::STATUS, 0x00, status::ERROR), None);

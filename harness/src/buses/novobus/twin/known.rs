@@ -152,6 +152,8 @@ pub(crate) struct Knowledge {
     before_reset: BTreeMap<CellByte, u8>,
     /// The values with which cells came out of resets, as long as they came out of each with the value that was written before it.
     survived: BTreeMap<CellByte, BTreeSet<u8>>,
+    /// The values with which cells of the model came out of resets although the drive had lost them: they were written before.
+    not_lost: BTreeMap<CellByte, BTreeSet<u8>>,
     /// Drives whose EEPROM may have been written in the present attempt.
     saved: BTreeSet<(usize, u8)>,
     /// When the byte in hand is due.
@@ -170,6 +172,7 @@ impl Knowledge {
         self.programs.values_mut().for_each(Program::begin);
         self.before_reset.clear();
         self.survived.clear();
+        self.not_lost.clear();
         self.saved.clear();
         self.working.clear();
     }
@@ -380,8 +383,8 @@ impl Knowledge {
     }
 
     /// Whether these bits of a cell, which was read for the first time since a reset, have come out of several resets with what was written
-    /// before each (ND21 10.5).
-    fn outlives_resets(&mut self, place: CellByte, (kept, value): (u8, u8)) -> bool {
+    /// before each (ND21 10.5), in the drive or in a model that deviates, and not in both.
+    fn outlives_resets(&mut self, place: CellByte, kept: u8, (wanted, value): (u8, u8)) -> bool {
         let own = self.cells.get(&place).copied().unwrap_or_default();
         if kept == 0 || own.written & kept != 0 || own.learned {
             return false;
@@ -392,10 +395,15 @@ impl Knowledge {
         let survived = self.survived.entry(place).or_default();
         if before == value & kept {
             survived.insert(before);
-        } else {
-            survived.clear();
+            return survived.len() >= SURVIVALS;
         }
-        survived.len() >= SURVIVALS
+        survived.clear();
+        let not_lost = self.not_lost.entry(place).or_default();
+        if before == wanted & kept {
+            not_lost.insert(before);
+        }
+        // One value may be what the model loads.
+        not_lost.len() > 1
     }
 
     /// The checking byte behind a byte that was read was right: where that byte was 00, the cell holds it.
@@ -432,7 +440,7 @@ impl Knowledge {
             return ByteRead::Wrong;
         }
         let kept = self.kept(place, value);
-        if self.outlives_resets(place, (kept, value)) {
+        if self.outlives_resets(place, kept, (wanted, value)) {
             return ByteRead::Wrong;
         }
         let own = self.cells.entry(place).or_default();

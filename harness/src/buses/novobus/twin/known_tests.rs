@@ -259,6 +259,23 @@ fn an_output_of_the_bus_keeps_its_level() {
     assert_eq!(known.read(outputs, 0x00, 0x00), ByteRead::Wrong);
 }
 
+/// ND21 10.5: a model that ignores resets does not explain a drive that has lost its data.
+#[test]
+fn a_model_that_ignores_resets_is_refuted() {
+    let readings = |values: [u8; 2]| {
+        let mut known = Knowledge::default();
+        known.begin();
+        values.map(|value| {
+            known.write(CELL, Write::Set(value));
+            known.reset(0, 1);
+            known.read(CELL, value, 9)
+        })
+    };
+    assert_eq!(readings([1, 2]), [ByteRead::Learned, ByteRead::Wrong]);
+    // One value may be what the model loads.
+    assert_eq!(readings([1, 1]), [ByteRead::Learned, ByteRead::Learned]);
+}
+
 /// ND21 10.4, 10.5: the levels of outputs that only `WriteIO` sets are lost with a reset. One of them may be what the drive sets then.
 #[test]
 fn outputs_that_outlive_three_resets_were_not_reset() {
