@@ -30,6 +30,9 @@ const LEAD: Span = Span::from_millis(16);
 /// Minimum of [`Lead::near`] on a line with an adapter, which transfers bytes in blocks of a millisecond and may hold them for longer.
 const ADAPTER: Span = Span::from_millis(4);
 
+/// How late an adapter may give back what was sent: it collects octets for some 16 ms, and its computer may stand still.
+const ECHO: Span = Span::from_millis(500);
+
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
 pub(crate) const SLACK: Span = Span::from_millis(30);
 
@@ -153,7 +156,7 @@ impl<A: Accounting> Pump<A> {
     pub(crate) fn send(&mut self, port: usize, octets: &[u8]) -> Instant {
         let now = self.now();
         let rest = !self.port_busy(port, now);
-        let octet_time = self.octet_time;
+        let (octet_time, looked) = (self.octet_time, self.looked);
         let sound = self.trouble.is_none();
         let Some(own) = self.ports.get_mut(port).filter(|_| sound) else {
             return now;
@@ -164,11 +167,12 @@ impl<A: Accounting> Pump<A> {
             inner.for_each(InnerLink::rest);
         }
         if !octets.is_empty() {
+            let echo_is_due = looked >= own.free + ECHO;
             own.pause(now);
             let silent = own
                 .echo
                 .as_ref()
-                .is_some_and(|echo| rest && echo.owed() > 0);
+                .is_some_and(|echo| rest && echo_is_due && echo.owed() > 0);
             if silent {
                 let name = own.wire.name();
                 let text = format!(

@@ -22,15 +22,14 @@ use profirust::time;
 pub struct Timing {
     /// The rate of the segment.
     pub rate: BusRate,
-    /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it. At
-    /// most [`Timing::MOST_BITS`] bits of the rate.
+    /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it.
     pub patience: Span,
     /// How often the master looks at the line while nothing arrives; a line in virtual time needs no more than the default.
     pub step: Span,
 }
 
 impl Timing {
-    /// The longest slot time that the master counts.
+    /// The longest slot time that the master counts. Where the patience is longer, its clock runs slower while it waits for a reply.
     pub const MOST_BITS: u16 = u16::MAX;
 
     /// That of a line in virtual time: the slave's longest delay and its longest reply.
@@ -53,6 +52,16 @@ impl Timing {
 
     pub(super) fn slot_time(self) -> Span {
         self.rate.bit_time() * u64::from(self.slot_bits())
+    }
+
+    /// How much of the time for which a reply is awaited the clock of the master leaves out: it counts no more than its slot time.
+    fn left_out(self, waited: Span) -> Span {
+        let (slot, patience) = (self.slot_time().units(), self.patience.units());
+        if patience <= slot {
+            return Span::ZERO;
+        }
+        let counted = u128::from(waited.units()) * u128::from(slot) / u128::from(patience);
+        waited.saturating_sub(Span::from_units(u64::try_from(counted).unwrap_or(u64::MAX)))
     }
 
     /// The time between two looks: a little more than the idle time in front of a request.
@@ -80,6 +89,8 @@ pub(super) struct Wire<'l> {
     reply: Vec<u8>,
     /// How far the master's clock is ahead of the line's.
     ahead: Span,
+    /// What it has left out while it waited for replies that are there.
+    behind: Span,
     /// What cannot go on: the line does not carry a telegram, or belongs to another master.
     failed: Option<Error>,
     /// The last diagnosis, and the last service that its slave has answered with RS.
@@ -99,6 +110,7 @@ impl<'l> Wire<'l> {
             begun: Vec::new(),
             reply: Vec::new(),
             ahead: Span::ZERO,
+            behind: Span::ZERO,
             failed: None,
             diagnosis: None,
             not_activated: None,
@@ -126,6 +138,7 @@ impl<'l> Wire<'l> {
             begun: self.begun,
             reply: self.reply,
             ahead: self.ahead,
+            behind: self.behind,
             failed: self.failed,
             diagnosis: self.diagnosis,
             not_activated: self.not_activated,
@@ -134,8 +147,25 @@ impl<'l> Wire<'l> {
 
     /// The master's time.
     pub(super) fn clock(&self) -> time::Instant {
-        let micros = (self.line.now().since_start() + self.ahead).as_nanos() / 1000;
+        let now = self.line.now();
+        let left_out = self.behind + self.left_out(now);
+        let time = (now.since_start() + self.ahead).saturating_sub(left_out);
+        let micros = time.as_nanos() / 1000;
         time::Instant::from_micros(i64::try_from(micros).unwrap_or(i64::MAX))
+    }
+
+    /// What the master's clock leaves out of the time since the present request.
+    fn left_out(&self, now: Instant) -> Span {
+        match self.asked {
+            Some(_) if now > self.left => self.timing.left_out(now.since(self.left)),
+            _ => Span::ZERO,
+        }
+    }
+
+    /// The reply that is awaited is there, or no longer awaited.
+    fn answered(&mut self) {
+        self.behind = self.behind + self.left_out(self.line.now());
+        self.asked = None;
     }
 
     /// The station whose reply is awaited.
@@ -145,7 +175,7 @@ impl<'l> Wire<'l> {
 
     /// Forgets the request that waits.
     pub(super) fn forget(&mut self) {
-        self.asked = None;
+        self.answered();
         self.begun.clear();
         self.reply.clear();
     }
@@ -183,14 +213,14 @@ impl<'l> Wire<'l> {
             self.receive();
         }
         self.send(&Telegram::Pdu(request).encode());
-        let end = self.left + self.timing.slot_time();
+        let end = self.left + self.timing.slot_time().max(self.timing.patience);
         while self.reply.is_empty() && self.line.now() < end {
             self.check()?;
             let _nothing_comes = self.line.wait(end);
             self.receive();
         }
         self.check()?;
-        self.asked = None;
+        self.answered();
         let reply = std::mem::take(&mut self.reply);
         Ok(Telegram::decode(&reply).value())
     }
@@ -209,6 +239,7 @@ impl<'l> Wire<'l> {
             self.ahead = self.ahead + sent + self.timing.slot_time() + Span::from_micros(4);
             return;
         }
+        self.answered();
         self.asked = pdu.filter(|_| function.is_some_and(Function::is_srd));
         self.left = self.line.send(0, Out::Octets(octets));
         if self.line.refused() > 0 && self.line.trouble().is_none() {
@@ -250,7 +281,7 @@ impl<'l> Wire<'l> {
             self.failed = Some(Error::OtherMaster { station });
         } else if let Some(asked) = self.asked.filter(|asked| self.replies(asked, telegram)) {
             self.note(&asked, telegram);
-            self.asked = None;
+            self.answered();
             self.reply = octets;
         }
     }
@@ -303,5 +334,25 @@ impl ProfibusPhy for Wire<'_> {
         let (used, result) = f(&self.reply);
         self.reply.drain(..used);
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The master counts 65,535 bits at most: 131 ms at 500 kbit/s. The patience of a rig may be longer.
+    #[test]
+    fn a_reply_is_awaited_as_long_as_the_patience_says() {
+        let mut timing = Timing::simulated(BusRate::K500);
+        assert_eq!(timing.left_out(Span::from_millis(100)), Span::ZERO);
+        timing.patience = Span::from_millis(1_000);
+        let counted = |ms| {
+            let waited = Span::from_millis(ms);
+            waited.saturating_sub(timing.left_out(waited))
+        };
+        assert_eq!(counted(1_000), timing.slot_time());
+        assert!(counted(999) < timing.slot_time());
+        assert_eq!(counted(0), Span::ZERO);
     }
 }
