@@ -33,6 +33,10 @@ const EARLY: Span = Span::from_millis(1);
 /// How inexact the clocks of the bench and of a drive may be over the time of a time-out.
 const CLOCKS: Span = Span::from_micros(500);
 
+/// How many bytes behind a silence come back at their times where the bench knows when it ended: more than twice [`EARLY`] of the line. A
+/// computer that was late delivers them together.
+const PUNCTUAL: usize = 10;
+
 /// A byte and when it came.
 type Heard = (Instant, Received);
 
@@ -229,7 +233,8 @@ impl Sent<'_> {
 
     /// Whether a drive that monitors has let the latest time-out pass: the first byte behind a silence that was longer than that answers one of
     /// the master's, and is not the zero of a drive in error (ND21 9.7, 9.9). A silence that the drive hears is no shorter than from the
-    /// return of the byte before it to the start of the next one.
+    /// return of the byte before it to the start of the next one, and [`PUNCTUAL`] bytes that come back at their times show that the next one
+    /// started when the bench says.
     fn is_overdue(&self, received: &[Heard], first: usize) -> bool {
         let behind = || {
             let before = first.checked_sub(1)?;
@@ -237,9 +242,13 @@ impl Sent<'_> {
             let next = self.all.partition_point(|own| own <= start);
             let (next, (back, _)) = (self.all.get(next)?, received.get(before)?);
             let silence = next.since((*start + self.way).max(*back));
-            let (at, byte) = received.get(first)?;
-            let is_zero = *byte == Received::good(0);
-            Some(silence > LATEST_TIME_OUT + CLOCKS && at >= next && !is_zero)
+            let starts = self.answered.get(first..first + PUNCTUAL)?;
+            let came = received.get(first..first + PUNCTUAL)?;
+            let punctual =
+                |(start, (at, _)): (&Instant, &Heard)| apart(*at, *start + self.way) <= EARLY;
+            let is_so = starts[0] == *next && starts.iter().zip(came).all(punctual);
+            let is_zero = came[0].1 == Received::good(0);
+            Some(silence > LATEST_TIME_OUT + CLOCKS && is_so && !is_zero)
         };
         behind() == Some(true)
     }
