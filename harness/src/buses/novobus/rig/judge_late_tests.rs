@@ -273,7 +273,7 @@ fn process_data_that_a_time_out_cuts_are_judged() {
 fn a_time_out_that_does_not_come_is_the_drives_fault() {
     let verdict = |ring: &str, silence: &str| {
         let scenario = format!(
-            "drive 1 memory Flags2 = 04\nread-byte 0 Flags2\nread-byte 2 Flags2\n> 80*20\nwait {silence}\n> 80*12\nwait 80ms\n\
+            "drive 1 memory Flags2 = 04\nread-byte 0 Flags2\nread-byte 2 Flags2\n> 80*20\nwait {silence}\n> 80*20\nwait 80ms\n\
              > 00*17 FF 44 72 4C 41\n> 8A FE 82 00 57 FF D8 80*2\n"
         );
         judged_with(ring, "", &scenario, &|_, _| {}).verdict

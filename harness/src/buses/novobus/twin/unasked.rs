@@ -33,9 +33,9 @@ const EARLY: Span = Span::from_millis(1);
 /// How inexact the clocks of the bench and of a drive may be over the time of a time-out.
 const CLOCKS: Span = Span::from_micros(500);
 
-/// How many bytes behind a silence come back at their times where the bench knows when it ended: more than twice [`EARLY`] of the line. A
+/// How many bytes behind a silence come back as they were sent where the bench knows when it ended: they take four times [`EARLY`]. A
 /// computer that was late delivers them together.
-const PUNCTUAL: usize = 10;
+const PUNCTUAL: usize = 16;
 
 /// A byte and when it came.
 type Heard = (Instant, Received);
@@ -233,8 +233,8 @@ impl Sent<'_> {
 
     /// Whether a drive that monitors has let the latest time-out pass: the first byte behind a silence that was longer than that answers one of
     /// the master's, and is not the zero of a drive in error (ND21 9.7, 9.9). A silence that the drive hears is no shorter than from the
-    /// return of the byte before it to the start of the next one, and [`PUNCTUAL`] bytes that come back at their times show that the next one
-    /// started when the bench says.
+    /// return of the byte before it to the start of the next one, and [`PUNCTUAL`] bytes that come back as they were sent, none before its
+    /// time, show that the next one started when the bench says.
     fn is_overdue(&self, received: &[Heard], first: usize) -> bool {
         let behind = || {
             let before = first.checked_sub(1)?;
@@ -244,9 +244,12 @@ impl Sent<'_> {
             let silence = next.since((*start + self.way).max(*back));
             let starts = self.answered.get(first..first + PUNCTUAL)?;
             let came = received.get(first..first + PUNCTUAL)?;
-            let punctual =
-                |(start, (at, _)): (&Instant, &Heard)| apart(*at, *start + self.way) <= EARLY;
-            let is_so = starts[0] == *next && starts.iter().zip(came).all(punctual);
+            let units = |at: Instant| i128::from(at.since_start().units());
+            let late = starts.iter().zip(came);
+            let late = late.map(|(start, (at, _))| units(*at) - units(*start + self.way));
+            let (least, most) = (late.clone().min()?, late.max()?);
+            let [spread, early] = [EARLY * 2, CLOCKS].map(|own| i128::from(own.units()));
+            let is_so = starts[0] == *next && least >= -early && most - least <= spread;
             let is_zero = came[0].1 == Received::good(0);
             Some(silence > LATEST_TIME_OUT + CLOCKS && is_so && !is_zero)
         };
