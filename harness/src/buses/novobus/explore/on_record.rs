@@ -172,6 +172,7 @@ pub(super) fn is_silenced(last: &AnsweredCase, times: &ByteTimes, found: &Differ
         all: &all,
         way,
         earliest: twin::EARLIEST_TIME_OUT,
+        complete: false,
     };
     let excused = sent.excused_from(size, (&expected, &received, index), (true, true));
     excused.is_some_and(|from| received.get(index).is_none_or(|(came, _)| *came >= from))

@@ -58,7 +58,9 @@ impl Comparer<'_> {
         let received = &conversation.received_in(ring);
         let way = self.byte_time * (u64::from(size.drives()) + 1);
         let starts = conversation.sent_at(ring);
-        let (places, roles) = heard(answered(size, &sent), &starts, expected, way);
+        let all = answered(size, &sent);
+        let asked_for = all.0.len();
+        let (places, roles) = heard(all, &starts, expected, way);
         let answered: Vec<u8> = places.iter().map(|place| sent[*place].0).collect();
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
@@ -73,6 +75,7 @@ impl Comparer<'_> {
             all: &starts,
             way,
             earliest: self.earliest_time_out,
+            complete: expected.len() >= asked_for,
         };
         let monitors = self.monitoring(ring, size).any(|own| own == Some(true));
         let judged_with = (self.exactness.tolerance, monitors);

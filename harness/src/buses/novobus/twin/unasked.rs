@@ -65,6 +65,8 @@ pub(crate) struct Sent<'a> {
     pub(crate) way: Span,
     /// How long a drive that monitors hears nothing at least before it detects a time-out.
     pub(crate) earliest: Span,
+    /// Whether the model answers each byte.
+    pub(crate) complete: bool,
 }
 
 impl Sent<'_> {
@@ -90,10 +92,24 @@ impl Sent<'_> {
             return None;
         }
         let missed = may.then(|| self.timed_out(size, (expected, received, right)));
+        let early = (may && self.complete).then(|| self.early(expected, received));
         let late = || (0..received.len()).find(|index| is_late(expected, received, *index));
         let late = does.then(late);
-        let first = missed.into_iter().chain(late).flatten().min()?;
+        let all = missed.into_iter().chain(early).chain(late);
+        let first = all.flatten().min()?;
         Some(received[first].0)
+    }
+
+    /// The first byte that is as expected and came back before the bench says that it was sent: the bench was late, and does not know how long
+    /// the line was silent.
+    fn early(&self, expected: &[Heard], received: &[Heard]) -> Option<usize> {
+        let value = |heard: &[Heard], index: usize| heard.get(index).map(|own| own.1);
+        let same = |index: &usize| value(expected, *index) == value(received, *index);
+        let early = |index: &usize| {
+            let start = self.answered.get(*index);
+            start.is_some_and(|start| received[*index].0 + HARMLESS < *start + self.way)
+        };
+        (0..received.len()).take_while(same).find(early)
     }
 
     /// Whether the bytes came back so close together, up to the first that differs, that no drive can have missed one. On a line no byte leaves
@@ -359,6 +375,7 @@ mod tests {
             all: &starts,
             way,
             earliest: EARLIEST_TIME_OUT,
+            complete: true,
         };
         let excused = |right: usize| {
             let excused = sent.excused_from(size, (&expected, &received, right), (true, false));
@@ -394,6 +411,7 @@ mod tests {
                 all: &starts,
                 way,
                 earliest,
+                complete: true,
             };
             let (expected, received) = (
                 heard(SYNCO, (Span::ZERO, Span::ZERO)),
@@ -423,6 +441,40 @@ mod tests {
         assert!(excused(ms(8), 250, ms(8), on_time));
     }
 
+    /// No byte comes back before it was sent: the bench was late then, and drives that monitor (ND21 9.9) may have heard a longer silence than it
+    /// notes. Where the model loses bytes, each may answer another one.
+    #[test]
+    fn bytes_before_their_time_show_that_the_bench_was_late() {
+        let size = RingSize::new(3).expect("a size");
+        let (byte, way) = (Span::from_micros(286), Span::from_micros(286 * 4));
+        let starts: Vec<_> = (0..100)
+            .map(|place| Instant::START + byte * (100 + place))
+            .collect();
+        let heard = |early: u64, last: u8| -> Vec<Heard> {
+            let values = (0..100).map(|place| if place < 99 { SYNCO } else { last });
+            let came = starts
+                .iter()
+                .map(|start| *start + way - Span::from_millis(early));
+            came.zip(values.map(Received::good)).collect()
+        };
+        let excused = |early: u64, (may, complete): (bool, bool)| {
+            let sent = Sent {
+                answered: &starts,
+                all: &starts,
+                way,
+                earliest: EARLIEST_TIME_OUT,
+                complete,
+            };
+            let (expected, received) = (heard(0, SYNCO), heard(early, 0x33));
+            let excused = sent.excused_from(size, (&expected, &received, 99), (may, false));
+            excused.is_some()
+        };
+        assert!(excused(6, (true, true)));
+        assert!(!excused(4, (true, true)));
+        assert!(!excused(6, (false, true)), "no drive monitors");
+        assert!(!excused(6, (true, false)));
+    }
+
     /// ND21 9.7, 9.9: no order of the clocks explains a number that the ring does not have, unless the drives of the model spell it out too.
     #[test]
     fn a_model_that_deviates_may_spell_out_more_drives_than_there_are() {
@@ -443,6 +495,7 @@ mod tests {
                 all: &[],
                 way: Span::ZERO,
                 earliest: EARLIEST_TIME_OUT,
+                complete: true,
             };
             let answer = TwinBytes {
                 bytes: heard(model),
