@@ -90,8 +90,7 @@ impl Program {
         }
     }
 
-    /// Whether a byte that was read is right, where the model holds `wanted`; `None` where it is the drive's choice. The time is that of the
-    /// byte, where the drive's power was on all the time.
+    /// As [`ErrorMode::read`], of all these cells.
     pub(super) fn read(
         &mut self,
         cell: u16,
