@@ -76,6 +76,7 @@ pub(super) fn driver(session: &mut Session) -> Master<'_> {
     let mut timing = Timing::simulated(rate);
     if !session.rig().is_simulated() {
         timing.patience = timing.patience + session.patience();
+        timing.late = session.patience();
         timing.step = STEP;
     }
     let watchdog = Options::WATCHDOG;

@@ -24,6 +24,8 @@ pub struct Timing {
     pub rate: BusRate,
     /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it.
     pub patience: Span,
+    /// How much later a reply may still come. So long passes behind a request without a reply, or the next one would be given that reply.
+    pub late: Span,
     /// How often the master looks at the line while nothing arrives; a line in virtual time needs no more than the default.
     pub step: Span,
 }
@@ -39,6 +41,7 @@ impl Timing {
         Self {
             rate,
             patience: rate.bit_time() * longest,
+            late: Span::ZERO,
             step: Span::ZERO,
         }
     }
@@ -239,12 +242,26 @@ impl<'l> Wire<'l> {
             self.ahead = self.ahead + sent + self.timing.slot_time() + Span::from_micros(4);
             return;
         }
-        self.answered();
+        self.let_pass_what_is_late();
         self.asked = pdu.filter(|_| function.is_some_and(Function::is_srd));
         self.left = self.line.send(0, Out::Octets(octets));
         if self.line.refused() > 0 && self.line.trouble().is_none() {
             self.failed = Some(Error::NotSent);
         }
+    }
+
+    /// Lets the time pass in which the reply that is still awaited may come. The master's clock leaves it out.
+    fn let_pass_what_is_late(&mut self) {
+        let unanswered = self.asked.is_some();
+        self.answered();
+        let begin = self.line.now();
+        let end = begin + self.timing.late;
+        while unanswered && self.line.now() < end && self.line.trouble().is_none() {
+            let _nothing_comes = self.line.wait(end);
+            self.receive();
+        }
+        self.begun.clear();
+        self.behind = self.behind + self.line.now().since(begin);
     }
 
     pub(super) fn receive(&mut self) {
@@ -305,7 +322,8 @@ impl<'l> Wire<'l> {
             return true;
         };
         let saps = pdu.dsap() == asked.ssap() && pdu.ssap() == asked.dsap();
-        let bare = pdu.dsap().is_none() && pdu.ssap().is_none();
+        // Only a reply without data leaves out the SAPs of its request.
+        let bare = pdu.dsap().is_none() && pdu.ssap().is_none() && pdu.data().is_empty();
         pdu.sa() == asked.da() && pdu.da() == self.master && (saps || bare)
     }
 }
@@ -340,6 +358,10 @@ impl ProfibusPhy for Wire<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::medium::Medium;
+    use harness_proto::profibus::fdl::FrameControl;
+    use harness_proto::profibus::master::Requests;
+    use std::collections::VecDeque;
 
     /// The master counts 65,535 bits at most: 131 ms at 500 kbit/s. The patience of a rig may be longer.
     #[test]
@@ -354,5 +376,73 @@ mod tests {
         assert_eq!(counted(1_000), timing.slot_time());
         assert!(counted(999) < timing.slot_time());
         assert_eq!(counted(0), Span::ZERO);
+    }
+
+    /// A slave behind an adapter that keeps every reply back for 300 ms.
+    struct Slow {
+        now: Instant,
+        asked: u8,
+        kept: VecDeque<(Instant, u8)>,
+    }
+
+    impl Line for Slow {
+        fn medium(&self, _port: usize) -> Medium {
+            harness_proto::line::Rate::default().into()
+        }
+
+        fn now(&self) -> Instant {
+            self.now
+        }
+
+        fn send(&mut self, _port: usize, _what: Out<'_>) -> Instant {
+            self.asked += 1;
+            let fc = FrameControl::reply(Status::DataLow);
+            let reply = Pdu::new(2, 8, fc, &[self.asked]).expect("a reply");
+            let at = self.now + Span::from_millis(300);
+            let octets = Telegram::Pdu(reply).encode();
+            self.kept.extend(octets.iter().map(|octet| (at, *octet)));
+            self.now + Span::from_micros(100)
+        }
+
+        fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
+            let (at, octet) = self.kept.pop_front_if(|(at, _)| *at <= self.now)?;
+            Some((at, Heard::Octet(Received::good(octet))))
+        }
+
+        fn wait(&mut self, until: Instant) -> bool {
+            let next = self.kept.front().map_or(until, |(at, _)| *at);
+            self.now = self.now.max(next.min(until));
+            true
+        }
+    }
+
+    /// The next request is not given the reply to the one before it, which came too late.
+    #[test]
+    fn a_late_reply_is_no_reply_to_the_next_request() {
+        let mut timing = Timing::simulated(BusRate::K500);
+        timing.patience = Span::from_millis(200);
+        timing.late = Span::from_millis(200);
+        let slow = Slow {
+            now: Instant::START,
+            asked: 0,
+            kept: VecDeque::new(),
+        };
+        let mut wire = Wire::new(Box::new(slow), timing, 2);
+        let request =
+            Requests::new(2, 8).and_then(|mut own| own.request(Service::DataExchange, &[0]));
+        let octets = Telegram::Pdu(request.expect("a request")).encode();
+        for wait in [200, 400] {
+            wire.send(&octets);
+            let end = wire.left + Span::from_millis(wait);
+            while wire.reply.is_empty() && wire.line.now() < end {
+                wire.wait(end);
+            }
+        }
+        let reply = Telegram::decode(&wire.reply).value();
+        let reply = reply.as_ref().and_then(Telegram::pdu).expect("a reply");
+        assert_eq!(reply.data(), [2]);
+        // The master's clock has not counted the time in which the late reply came.
+        let counted = wire.clock() - time::Instant::ZERO;
+        assert!(counted < time::Duration::from_millis(520), "{counted}");
     }
 }

@@ -181,18 +181,16 @@ impl<'l> Talk<'l> {
         let mut other = None;
         for _ in 0..TRIES {
             let end = self.send(&octets)?;
-            let Some(telegram) = self.reply(end)? else {
-                continue;
-            };
-            if telegram == Telegram::Pdu(pdu) {
+            let telegram = self.reply(end)?;
+            if telegram == Some(Telegram::Pdu(pdu)) {
                 return Err(TalkError::Echo);
             }
-            match self.requests(slave).take(&telegram) {
+            match telegram.and_then(|telegram| self.requests(slave).take(&telegram)) {
                 Some(SlaveReply::Other(control)) => other = Some(SlaveReply::Other(control)),
                 None => {}
                 fits => return Ok(fits),
             }
-            // A busy computer hands over the reply to a request of before: what is under way passes first.
+            // A busy computer hands over a reply late, and then to a request that came behind: what is under way passes first.
             self.pass(self.patience)?;
         }
         Ok(other)
