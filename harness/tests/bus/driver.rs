@@ -2,8 +2,8 @@
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{
-    Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, Trigger, count_drives,
-    recover,
+    Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, Spelled, Trigger, Why,
+    count_drives, recover,
 };
 use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness::medium::{Heard, Medium, Out};
@@ -369,7 +369,6 @@ fn recovery_of_9_8() {
     let mut link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));
     let fine = Recovery {
         before: None,
-        missed_master: false,
         after: None,
         zeros_unasked: false,
         drives: Some(size(4)),
@@ -383,7 +382,10 @@ fn recovery_of_9_8() {
     );
     link.send_octets(0, &[0x80]);
     let damaged = Recovery {
-        before: Some(2),
+        before: Some(Spelled {
+            drive: 2,
+            why: Why::Fault,
+        }),
         ..fine
     };
     assert_eq!(recover(&mut link, 0), damaged);

@@ -3,7 +3,7 @@
 
 use super::args::{OutputForm, RecoverArguments};
 use super::rig::{self, RigName, Use};
-use crate::buses::novobus::driver::{self, Axis, Recovery};
+use crate::buses::novobus::driver::{self, Axis, Recovery, Spelled, Why};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -24,9 +24,9 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
     let before = session.opening().cloned();
     let mut found = every(session.link(), rings);
     // What drives spelled out before the rig was opened.
-    for (ring, drive) in before.into_iter().flat_map(|health| health.reported) {
+    for (ring, spelled) in before.into_iter().flat_map(|health| health.reported) {
         if let Some(recovery) = found.get_mut(ring).filter(|own| own.fault().is_none()) {
-            (recovery.before, recovery.missed_master) = (Some(drive), false);
+            recovery.before = Some(spelled);
         }
     }
     let trouble = session.link().trouble().cloned();
@@ -58,9 +58,11 @@ fn show(
             let rings: Vec<_> = found
                 .iter()
                 .map(|recovery| {
+                    let drive = |spelled: Option<Spelled>| spelled.map(|spelled| spelled.drive);
+                    let missed = |spelled: &Spelled| spelled.why == Why::MissedMaster;
                     json!({
-                        "reported": recovery.fault(),
-                        "missed_master": recovery.before.filter(|_| recovery.missed_master),
+                        "reported": drive(recovery.fault()),
+                        "missed_master": drive(recovery.before.filter(missed)),
                         "drives": recovery.drives.map(|size| size.drives()),
                         "still": recovery.after,
                         "zeros_unasked": recovery.zeros_unasked,
@@ -86,11 +88,18 @@ pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
         )
     };
     let before = match (recovery.before, recovery.drives) {
-        (Some(drive), _) if recovery.missed_master => format!(
-            "drive {} monitors time-outs and had heard no byte for 10 ms, because no master sent; no fault reported (ND21 9.9, 14.10.2)",
-            name(drive)
-        ),
-        (Some(drive), _) => fault(drive),
+        (Some(Spelled { drive, why }), _) => match why {
+            Why::Fault => fault(drive),
+            Why::FaultOrSilence => format!(
+                "drive {} spells out its address and monitors time-outs: it had heard no byte for 10 ms, because no master sent or the \
+                 computer was held up, or the fault is on its link or in the sender there (ND21 9.7, 9.9)",
+                name(drive)
+            ),
+            Why::MissedMaster => format!(
+                "drive {} monitors time-outs and had heard no byte for 10 ms, because no master sent; no fault reported (ND21 9.9, 14.10.2)",
+                name(drive)
+            ),
+        },
         (None, Some(_)) => "no fault reported".to_owned(),
         (None, None) => "no drive reports".to_owned(),
     };

@@ -119,10 +119,7 @@ pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
     /// The drive that spelled out its address before.
-    pub before: Option<u8>,
-    /// That drive monitors time-outs, and no drive between it and the master does. It names itself whenever no master sends for 10 ms
-    /// (9.9), so its address is no sign of a fault.
-    pub missed_master: bool,
+    pub before: Option<Spelled>,
     /// The drive that does so behind the check sequence: the ring is not back.
     pub after: Option<u8>,
     /// Zeros come without end although nothing is sent, also behind the check sequence. A drive in error mode answers each byte with one
@@ -135,9 +132,31 @@ pub struct Recovery {
 impl Recovery {
     /// The drive that reported a fault in front of it, before the ring was brought back.
     #[must_use]
-    pub fn fault(&self) -> Option<u8> {
-        self.before.filter(|_| !self.missed_master)
+    pub fn fault(&self) -> Option<Spelled> {
+        self.before
+            .filter(|spelled| spelled.why != Why::MissedMaster)
     }
+}
+
+/// A drive that spelled out its address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spelled {
+    /// Which.
+    pub drive: u8,
+    /// What can have made it do so.
+    pub why: Why,
+}
+
+/// What makes a drive spell out its address (9.7, 9.9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Why {
+    /// A fault in front of it.
+    Fault,
+    /// A fault, or no byte for 10 ms: it monitors time-outs, and so does a drive between it and the master. That one names itself where no
+    /// master sends, unless the silence was just long enough for some of the drives.
+    FaultOrSilence,
+    /// No master sent for 10 ms: it monitors time-outs, and no drive between it and the master does.
+    MissedMaster,
 }
 
 /// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
@@ -149,26 +168,36 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
     let own = |drive: &u8| !(zeros_unasked && *drive == 0);
     let (before, after) = (before.filter(own), after.filter(own));
-    let missed_master = before
-        .zip(drives)
-        .is_some_and(|(drive, size)| is_first_to_monitor(link, ring, drive, size));
+    let before = before.map(|drive| Spelled {
+        drive,
+        why: drives.map_or(Why::Fault, |size| why(link, ring, drive, size)),
+    });
     Recovery {
         before,
-        missed_master,
         after,
         zeros_unasked,
         drives,
     }
 }
 
-/// Whether a drive monitors time-outs and no drive between the master and it does (ND21 14.10.2): it is the one that a ring spells out
-/// when no master sends.
-fn is_first_to_monitor(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> bool {
+/// What can have made a drive spell out its address, by which drives monitor time-outs (ND21 14.10.2).
+fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> Why {
     let mut monitors = |drive| {
-        let flags2 = read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
+        let read = |link: &mut dyn Line| read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
+        // Where the computer was held up, drives that monitor have timed out again.
+        let flags2 = read(link).or_else(|| {
+            let _size = count_behind(link, ring, &repair());
+            read(link)
+        });
         flags2.is_some_and(|flags2| flags2 & flags2::MONITORING != 0)
     };
-    monitors(drive) && !(drive + 1..size.drives()).any(monitors)
+    if !monitors(drive) {
+        Why::Fault
+    } else if (drive + 1..size.drives()).any(monitors) {
+        Why::FaultOrSilence
+    } else {
+        Why::MissedMaster
+    }
 }
 
 /// The drive that spells out its address while the master sends SYNCO (9.7, 9.9).

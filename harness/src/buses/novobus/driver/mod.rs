@@ -23,7 +23,7 @@ mod scope;
 pub use access::Width;
 pub use axis::Axis;
 pub(crate) use discovery::{COUNT, count_behind, repair, unasked};
-pub use discovery::{Identity, Recovery, State, count_drives, recover};
+pub use discovery::{Identity, Recovery, Spelled, State, Why, count_drives, recover};
 pub use error::Error;
 /// What a master may send, by the rules of the bus alone.
 pub use harness_sim::novobus::fuzz::jobs::conduct;

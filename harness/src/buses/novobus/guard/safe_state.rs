@@ -300,7 +300,9 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
         if recovery.drives == Some(size) {
             return Ok(());
         }
-        let reported = recovery.after.or(recovery.fault());
+        let reported = recovery
+            .after
+            .or(recovery.fault().map(|spelled| spelled.drive));
         why = match (line.trouble(), recovery.drives, reported) {
             (Some(trouble), ..) => return Err(trouble.to_string()),
             (None, Some(found), _) => format!(
