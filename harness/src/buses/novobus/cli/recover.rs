@@ -91,7 +91,7 @@ pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
         (Some(Spelled { drive, why }), _) => match why {
             Why::Fault => fault(drive),
             Why::FaultOrSilence => format!(
-                "drive {} spells out its address and monitors time-outs: it had heard no byte for 10 ms, because no master sent or the \
+                "drive {} spells out its address: it may monitor time-outs and have heard no byte for 10 ms, because no master sent or the \
                  computer was held up, or the fault is on its link or in the sender there (ND21 9.7, 9.9)",
                 name(drive)
             ),

@@ -153,7 +153,7 @@ pub enum Why {
     /// A fault in front of it.
     Fault,
     /// A fault, or no byte for 10 ms: it monitors time-outs, and so does a drive between it and the master. That one names itself where no
-    /// master sends, unless the silence was just long enough for some of the drives.
+    /// master sends, unless the silence was just long enough for some of the drives. Or it could not be asked.
     FaultOrSilence,
     /// No master sent for 10 ms: it monitors time-outs, and no drive between it and the master does.
     MissedMaster,
@@ -180,23 +180,27 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     }
 }
 
+/// How often it is asked whether a drive monitors time-outs: where the computer is held up, drives that do time out again.
+const TRIES: usize = 4;
+
 /// What can have made a drive spell out its address, by which drives monitor time-outs (ND21 14.10.2).
 fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> Why {
     let mut monitors = |drive| {
-        let read = |link: &mut dyn Line| read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
-        // Where the computer was held up, drives that monitor have timed out again.
-        let flags2 = read(link).or_else(|| {
-            let _size = count_behind(link, ring, &repair());
-            read(link)
+        let flags2 = (0..TRIES).find_map(|_| {
+            let read = read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
+            if read.is_none() {
+                let _size = count_behind(link, ring, &repair());
+            }
+            read
         });
-        flags2.is_some_and(|flags2| flags2 & flags2::MONITORING != 0)
+        flags2.map(|flags2| flags2 & flags2::MONITORING != 0)
     };
-    if !monitors(drive) {
-        Why::Fault
-    } else if (drive + 1..size.drives()).any(monitors) {
-        Why::FaultOrSilence
-    } else {
-        Why::MissedMaster
+    match monitors(drive) {
+        Some(false) => Why::Fault,
+        Some(true) if (drive + 1..size.drives()).all(|other| monitors(other) == Some(false)) => {
+            Why::MissedMaster
+        }
+        _ => Why::FaultOrSilence,
     }
 }
 
