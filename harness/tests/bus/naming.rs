@@ -418,7 +418,7 @@ fn a_march_over_an_eeprom_leaves_what_was_there() {
     };
     let (drive, read) = dumps(DRIVES).swap_remove(1);
     let written = marches(DRIVES, drive, &play(&read));
-    assert_eq!(written.len(), 4);
+    assert_eq!(written.len(), 5);
     let positions = &written[3].source.text;
     for line in ["write-eeprom 1 61 = CB", "write-eeprom 1 61 = 34"] {
         assert!(positions.contains(line), "{positions}");
@@ -615,13 +615,38 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
 /// What a conversation shows of a ring of ND21 drives, with this line or as the manual says: which drive is meant, and the section of the
 /// byte that differs.
 fn sighted(name: &str, line: &str) -> Option<(Meant, &'static str)> {
+    sighted_by(&[line], |_| named_plan(name))
+}
+
+/// The same of a conversation that may depend on what the drives hold.
+fn sighted_by(
+    lines: &[&str],
+    plan: impl Fn(&SimulatedLink) -> Plan,
+) -> Option<(Meant, &'static str)> {
     let right = ["drive 0..last model nd21", STANDS].map(str::to_owned);
-    let drives = [right.as_slice(), &[line.to_owned()]].concat();
+    let mut drives = right.to_vec();
+    drives.extend(lines.iter().map(|line| (*line).to_owned()));
     let link = twin(&drives).expect("a ring").into_link();
-    let all = played_in_time(&named_plan(name), &link);
+    let all = played_in_time(&plan(&link), &link);
     let model = twin(&right).expect("a ring");
     let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
     sighting.map(|own| (own.meant, own.section))
+}
+
+/// ND21 14.10.5.4: `ProgParam` copies the parameters into the EEPROM, whatever they are.
+#[test]
+fn a_copy_of_parameters_that_is_not_made_is_found() {
+    let copied = |link: &SimulatedLink| {
+        let (drive, read) = dumps(DRIVES).swap_remove(1);
+        let read = played_in_time(&read.plan.expect("novobus"), link);
+        let mut written = marches(DRIVES, drive, &read);
+        written.pop().and_then(|own| own.plan).expect("the copy")
+    };
+    let held = "drive 1 eeprom 3E = 12 34";
+    assert_eq!(sighted_by(&[held], copied), None);
+    let wrong = "drive 1 deviates prog-param-copies-nothing";
+    let found = sighted_by(&[held, wrong], copied);
+    assert_eq!(found, Some((Meant::Own(1), "14.10.5")));
 }
 
 /// What these conversations are made for: ND21 10.1 (ROM is compared with itself, and longs go over the ends of pages), 14.4.1 and 14.10.1

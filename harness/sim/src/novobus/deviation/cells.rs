@@ -322,6 +322,18 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
             }),
         )
     },
+    Deviation {
+        behind_the_bus: true,
+        ..wrong(
+            "prog-param-copies-nothing",
+            "14.10.5.4",
+            "ProgParam reports at once that it is completed, and copies nothing",
+            How::Writes(|w| {
+                let copies = (w.address, w.data) == (ram::EEPROM_CONTROL, 0x84);
+                Some((w.address, if copies { 0x10 } else { w.data }))
+            }),
+        )
+    },
     // Rare events.
     wrong(
         "every-64th-write-lost",

@@ -1,11 +1,11 @@
 //! A march over the EEPROM of each drive (ND21 14.10.5): every cell is written with the complement of what it holds, read, and written with
-//! the old value again. What a cell holds is read first, so the scenarios depend on the drive.
+//! the old value again. What a cell holds is read first, so the scenarios depend on the drive. Then `ProgParam` is to copy the parameters.
 
 use super::exchange::EEPROM;
 use crate::buses::novobus::twin::Conversation;
 use crate::library::Entry;
 use crate::scenario::source::Source;
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{EE_PARAMETERS, PARAMETERS, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use std::collections::BTreeMap;
@@ -21,6 +21,10 @@ const GROUPS: [(&str, RangeInclusive<u8>); 4] = [
     ("customer", 0x5A..=0x5F),
     ("positions", 0x60..=0xFF),
 ];
+
+/// The cells of the parameters that show whether `ProgParam` copies all of them: the ends, and the middle. No more of them are changed at a
+/// time, as the power may fail meanwhile.
+const COPIED: [u8; 6] = [0x20, 0x21, 0x2F, 0x30, 0x3E, 0x3F];
 
 /// The largest ring that is marched over.
 const MOST_DRIVES: u8 = 16;
@@ -68,7 +72,36 @@ pub fn marches(drives: u8, drive: u8, read: &[Conversation]) -> Vec<Entry> {
         }
         entry(group, drives, drive, text)
     };
-    GROUPS.into_iter().filter_map(of).collect()
+    let copied = || entry("copied", drives, drive, copy(drives, drive, &held)?);
+    GROUPS.into_iter().filter_map(of).chain(copied()).collect()
+}
+
+/// `ProgParam` behind a reset (ND21 14.10.5.4), by which RAM holds what the EEPROM does (10.5): it writes what some cells of the EEPROM held
+/// before they were changed.
+fn copy(drives: u8, drive: u8, held: &BTreeMap<u8, u8>) -> Option<String> {
+    let mut text = header("ProgParam copies the parameters", drives);
+    text.push_str(&format!(
+        "reset {drive}\nrecover\nuntil drive {drive} Status & 40 = 00 within 10s\n"
+    ));
+    let mut jobs = [String::new(), String::new(), String::new(), String::new()];
+    for cell in COPIED {
+        let old = held.get(&cell)?;
+        let ram = u16::from(cell - EE_PARAMETERS) + PARAMETERS;
+        let lines = [
+            format!("write-byte {drive} {ram:04X} = {old:02X}\n"),
+            format!("master write-eeprom {drive} {cell:02X} = {:02X}\n", !old),
+            format!("master read-eeprom {drive} {cell:02X} = xx\n"),
+            format!("master write-eeprom {drive} {cell:02X} = {old:02X}\n"),
+        ];
+        jobs.iter_mut()
+            .zip(lines)
+            .for_each(|(job, line)| job.push_str(&line));
+    }
+    let [write, change, read, restore] = jobs;
+    let copy = format!(
+        "write-byte {drive} EEPROMcontrol = 84\nuntil drive {drive} EEPROMcontrol & 10 = 10 within 33s\n"
+    );
+    Some(text + &write + &change + &copy + &read + &restore + &read)
 }
 
 fn header(title: &str, drives: u8) -> String {

@@ -4,7 +4,7 @@
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
 use super::error_mode::OF_THE_BUS;
-use super::program::{Program, READ, READ_BYTE, READY};
+use super::program::{PROG_PARAM, Program, READ, READ_BYTE, READY};
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
@@ -277,6 +277,14 @@ impl Knowledge {
         }
         let program = self.programs.entry((ring, drive)).or_default();
         program.write(address, write, self.now);
+        if (address, write) == (ram::EEPROM_CONTROL, Write::Set(PROG_PARAM)) {
+            let cells = &self.cells;
+            program.copy(|parameter| {
+                let own = cells.get(&(ring, drive, parameter))?;
+                let steady = own::kept(parameter, 0).bits == 0xFF;
+                (steady && (own.learned || own.written == 0xFF)).then_some(own.value)
+            });
+        }
         let own = self.cells.entry(place).or_default();
         own.written |= write.bits();
         own.now |= write.bits();

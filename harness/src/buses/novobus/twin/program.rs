@@ -3,7 +3,7 @@
 
 use super::error_mode::ErrorMode;
 use super::known::Write;
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{EE_PARAMETERS, PARAMETER_COUNT, PARAMETERS, ram};
 use harness_proto::time::Instant;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -11,6 +11,7 @@ use std::ops::RangeInclusive;
 /// Commands of `EEPROMcontrol` (14.10.5.1), and its bit that says that a byte has been read.
 pub(super) const READ_BYTE: u8 = 0x81;
 const WRITE_BYTE: u8 = 0x82;
+pub(super) const PROG_PARAM: u8 = 0x84;
 pub(super) const READ: u8 = 1 << 5;
 
 /// Its bit that says that a byte has been written, or that nothing is going on.
@@ -28,8 +29,10 @@ pub(super) struct Program {
     /// What the master has written to the ports of the EEPROM, while it stands there.
     address: Option<u8>,
     data: Option<u8>,
-    /// What the master has written to cells of the EEPROM, or read from them.
+    /// What the master has written to cells of the EEPROM, or read from them, or what `ProgParam` has copied there.
     eeprom: BTreeMap<u8, u8>,
+    /// `ProgParam` was ordered, and the drive has not said that it is done.
+    copying: bool,
     /// The cell that is read, and whether the drive has said that it is done.
     reading: Option<(u8, bool)>,
     /// Whether `EEPROMcontrol` was read since the last order that writes and showed that nothing is going on.
@@ -41,6 +44,9 @@ pub(super) struct Program {
 impl Program {
     /// An attempt begins: what the EEPROM holds stays.
     pub(super) fn begin(&mut self) {
+        if self.copying {
+            self.copy(|_| None);
+        }
         self.errors.begin();
         *self = Self {
             errors: std::mem::take(&mut self.errors),
@@ -55,8 +61,26 @@ impl Program {
         self.errors.reset();
     }
 
+    /// `ProgParam` copies the parameters from RAM into the EEPROM (ND21 14.10.5.4), as far as it is known what they hold.
+    pub(super) fn copy(&mut self, held: impl Fn(u16) -> Option<u8>) {
+        let cells = PARAMETERS..PARAMETERS + PARAMETER_COUNT;
+        for (address, cell) in (EE_PARAMETERS..).zip(cells) {
+            match held(cell) {
+                Some(held) => self.eeprom.insert(address, held),
+                None => self.eeprom.remove(&address),
+            };
+        }
+        self.copying = true;
+    }
+
     /// The master has written to a cell.
     pub(super) fn write(&mut self, cell: u16, write: Write, now: Instant) {
+        let parameter = cell.checked_sub(PARAMETERS).filter(|_| self.copying);
+        if let Some(parameter) = parameter.filter(|own| *own < PARAMETER_COUNT) {
+            // It may have been copied before, or not.
+            let address = u16::from(EE_PARAMETERS) + parameter;
+            self.eeprom.retain(|own, _| u16::from(*own) != address);
+        }
         let Write::Set(data) = write else { return };
         self.errors.write(cell, data, now);
         match cell {
@@ -84,7 +108,7 @@ impl Program {
                 }
             }
             // The master confirms that it has seen the end of the last order.
-            (0..READ_BYTE, ..) => {}
+            (0..READ_BYTE | PROG_PARAM, ..) => {}
             // It is unknown which cell such a command writes.
             _ => self.eeprom.clear(),
         }
@@ -102,6 +126,7 @@ impl Program {
             ram::EEPROM_CONTROL => {
                 let shown = value & (READ | READY);
                 self.ready |= shown != 0;
+                self.copying &= shown & READY == 0;
                 let (_, done) = self.reading.as_mut()?;
                 *done |= shown & READ != 0;
                 // Reading a byte does not end with the report that one was written.
@@ -155,9 +180,46 @@ mod tests {
         assert_eq!(read(&mut drive, 0xDC, 0x77), Some(true));
         // The operating hours, which the drive counts.
         assert_eq!(read(&mut drive, 0x05, 0x02), None);
-        // The parameters are copied into it.
-        drive.write(ram::EEPROM_CONTROL, Write::Set(0x84), NOW);
+        // The cycle control may write into it (13.1.9.1).
+        drive.write(ram::EEPROM_CONTROL, Write::Set(0x88), NOW);
         assert_eq!(read(&mut drive, 0xDC, 0x78), None);
+    }
+
+    /// ND21 14.10.5.4: `ProgParam` copies FF60 to FF7F into the cells 20 to 3F of the EEPROM, and nothing else.
+    #[test]
+    fn the_eeprom_holds_what_was_copied() {
+        let mut drive = Program::default();
+        let read = |drive: &mut Program, address, value| {
+            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
+            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
+            drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
+        };
+        for address in [0x1F, 0x20, 0x3F, 0x40] {
+            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
+            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5), NOW);
+            drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE), NOW);
+        }
+        let order = |drive: &mut Program| {
+            drive.write(ram::EEPROM_CONTROL, Write::Set(PROG_PARAM), NOW);
+            drive.copy(|cell| (cell != 0xFF61).then_some(0x33));
+        };
+        order(&mut drive);
+        drive.read(ram::EEPROM_CONTROL, (READY, READY), Some(NOW));
+        drive.write(0xFF7F, Write::Set(0x44), NOW);
+        for (address, held) in [(0x20, 0x33), (0x3F, 0x33), (0x40, 0xA5)] {
+            assert_eq!(read(&mut drive, address, held), Some(true), "{address:02X}");
+            assert_eq!(read(&mut drive, address, !held), Some(false));
+        }
+        assert_eq!(read(&mut drive, 0x21, 0xA5), None);
+        // A parameter that is written meanwhile may be copied or not.
+        order(&mut drive);
+        drive.write(0xFF7F, Write::And(0x44), NOW);
+        assert_eq!(read(&mut drive, 0x3F, 0x33), None);
+        // Nor is it known what was copied where an attempt ends before it is done.
+        order(&mut drive);
+        drive.begin();
+        assert_eq!(read(&mut drive, 0x20, 0x34), None);
     }
 
     /// ND21 14.10.5.2, 14.10.5.3: bit 4 of `EEPROMcontrol` does not report that a byte was read, unless an earlier order may still have been
