@@ -101,6 +101,17 @@ fn with(desk: &Desk, name: &str, text: &str) {
 
 /// What a scenario needs follows from its telegrams; what the rig does not permit is skipped, and the limit that it needs is named.
 #[test]
+fn a_scenario_that_only_waits_judges_nothing() {
+    let desk = desk("", "");
+    with(
+        &desk,
+        "wait.scn",
+        "title Wait\nbus nordac\nslave 8\nwait 5ms\n",
+    );
+    ended(&run(&desk, &["wait.scn"]), 5, "nothing was judged");
+}
+
+#[test]
 fn what_a_scenario_needs_follows_from_its_telegrams() {
     let careful = desk("", "");
     for (name, text) in [

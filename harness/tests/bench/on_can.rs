@@ -189,6 +189,21 @@ fn what_a_scenario_needs_follows_from_its_frames() {
     );
 }
 
+/// A scenario that only waits says nothing of the drives, also with evidence.
+#[test]
+fn a_scenario_that_only_waits_judges_nothing() {
+    let desk = desk("", ALL);
+    with(
+        &desk,
+        "wait.scn",
+        "title Wait\nbus unitek\ndrive 1\nwait 5ms\n",
+    );
+    ended(&run(&desk, &["wait.scn"]), 5, "nothing was judged");
+    let kept = run(&desk, &["wait.scn", "--evidence", "kept"]);
+    ended(&kept, 5, "nothing was judged");
+    ended(&desk.run(&["verify", "kept"]), 0, "1 attempt judged again");
+}
+
 /// An edit of any line or file is found: the drives are simulated, so that the run can be played again.
 #[test]
 fn edited_evidence_is_found() {

@@ -45,7 +45,7 @@ impl<L: Language> Plan<L> {
         steps.map(|step| step.action.pieces().0).sum()
     }
 
-    /// Whether a step judges what the drives do.
+    /// Whether a step judges what the drives do. A strict scenario judges what comes unexpected, if it does anything but wait.
     #[must_use]
     pub fn judges(&self) -> bool {
         let judges = |action: &PlannedAction<L>| match action {
@@ -53,7 +53,9 @@ impl<L: Language> Plan<L> {
             PlannedAction::Receive(..) => true,
             PlannedAction::Own(act) => L::Planner::judges(act),
         };
-        self.strict || self.steps.iter().any(|step| judges(&step.action))
+        let acts = |action: &PlannedAction<L>| !matches!(action, PlannedAction::Wait(_));
+        let mut actions = self.steps.iter().map(|step| &step.action);
+        actions.any(|action| judges(action) || self.strict && acts(action))
     }
 }
 

@@ -56,8 +56,11 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the slave.
-    pub(super) fn judged(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    pub(super) fn judged(&mut self, own: &Own, mut outcome: Outcome, left: &Left) -> Outcome {
         if outcome.verdict != Verdict::Failed {
+            if !own.plan.judges() {
+                outcome.judged_nothing();
+            }
             return outcome;
         }
         let way = left.way;
