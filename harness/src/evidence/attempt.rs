@@ -128,7 +128,7 @@ pub(super) fn again(
     if anew && let Ok(fresh) = self::twin(rig, &known(rig)) {
         *twin = fresh;
     }
-    let (comparisons, stale) = twin.follow_all(&conversations, header.exactness);
+    let (comparisons, stale) = twin.follow_all(&conversations, way.exactness(header.exactness));
     let unplaced = recorded
         .verdict
         .as_ref()

@@ -43,6 +43,26 @@ fn right_drives_of_any_ring_have_no_deviations() {
     have_none(&[1, 2, 5, 7], &[true, false]);
 }
 
+/// Drives that are not reset are elsewhere in their cycles of 432 us (4.1) than the model: a speed that changes is their own.
+#[test]
+fn a_right_motor_may_accelerate_without_resets() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let turns = "title x\nring 1\ndelete-error 0\ngo 0\nwrite-word 0 nsoll = 290rpm\n";
+    let reads = "read-word 0 nist\nread-word 0 nist\nread-word 0 nist\n";
+    let until = "until drive 0 nist > 280rpm within 3s\n";
+    for (name, more, code) in [
+        ("reads.scn", reads.to_owned(), 0),
+        ("until.scn", until.to_owned(), 0),
+        ("wrong.scn", format!("{until}read-byte 0 FF08 = 7F\n"), 1),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("{turns}{more}")).expect("room");
+        let path = path.to_str().expect("a name");
+        let output = run(folder.path(), &rig(1, false, "", ""), &[path]);
+        ended(&output, code, "");
+    }
+}
+
 /// Each number of drives puts a drive's cycles of 432 us (4.1) elsewhere in the conversations.
 fn have_none(sizes: &[u8], resets: &[bool]) {
     let folder = tempfile::tempdir().expect("a folder");

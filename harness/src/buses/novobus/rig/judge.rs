@@ -187,7 +187,9 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
         outcome.verdict = Verdict::Passed;
         let known = facts.rig.file.deviation.iter();
         outcome.remarks.extend(known.map(told));
-    } else if let Some(own) = of_the_drive(finding, facts) {
+    } else if let Some(own) = of_the_drive(finding, facts)
+        && !facts.exactness.knows_cells
+    {
         outcome.verdict = Verdict::Inconclusive;
         let what = match own.address {
             Some(address) => format!("cell {address:04X}"),

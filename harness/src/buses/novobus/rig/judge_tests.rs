@@ -307,11 +307,12 @@ fn a_choice_of_the_drives_is_not_blamed() {
 /// ND21 11.8: drives may be silent while they test themselves. The resets before a scenario show it, and the scenario is judged all the same.
 #[test]
 fn a_choice_that_shows_before_the_scenario_leaves_it_judged() {
-    let silent = |drives: &str| {
+    let silent_for = |drives: &str, ms: u64| {
         format!(
-            "drive {drives} property self-test-bus = silent\ndrive 0..last property self-test-time = 81ms\n"
+            "drive {drives} property self-test-bus = silent\ndrive 0..last property self-test-time = {ms}ms\n"
         )
     };
+    let silent = |drives: &str| silent_for(drives, 81);
     let judged = |ring: &str, scenario: &str, expected: Verdict| {
         let plan = plan(format!("title x\nring 3\n{scenario}"));
         let way = Way {
@@ -328,8 +329,16 @@ fn a_choice_that_shows_before_the_scenario_leaves_it_judged() {
         let remarks = judged(&silent(drives), writes, Passed);
         assert!(remarks.contains("self-test-bus = silent"), "{remarks}");
     }
-    let wrong = silent("0..last") + "drive 1 deviates writes-ignored\n";
-    judged(&wrong, writes, Failed);
+    // Where the drives are not heard for long, the times are part of the choice.
+    for ms in [500, 2_000] {
+        let remarks = judged(&silent_for("0..last", ms), writes, Passed);
+        let with = "self-test-bus = silent with self-test-time = ";
+        assert!(remarks.contains(with), "{remarks}");
+    }
+    for ms in [81, 500] {
+        let wrong = silent_for("0..last", ms) + "drive 1 deviates writes-ignored\n";
+        judged(&wrong, writes, Failed);
+    }
     // A scenario that asks for the model's own choice settles nothing.
     let resets = "> 86 FE DD 21 FE 80*3\n< 86 01 DD 21 02 80*3\n";
     judged("", resets, Passed);

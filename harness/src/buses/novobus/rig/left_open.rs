@@ -3,12 +3,12 @@
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
 use super::judge::{AttemptFacts, known};
-use crate::buses::novobus::choice::{Choice, of_drives, of_the_bus};
-use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
+use crate::buses::novobus::choice::{Choice, SELF_TEST_TIME, of_drives, of_self_tests, of_the_bus};
+use crate::buses::novobus::language::syntax::{DriveRange, Header};
 use crate::buses::novobus::language::write::ring_prefix;
-use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
-use crate::rig::check::Rig;
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Done};
 use crate::rig::run::twin;
+use crate::scenario::times::Duration;
 use harness_proto::time::Span;
 
 /// The largest ring of which single drives are tried.
@@ -33,7 +33,7 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
         return None;
     }
     let (mut first, monitored) = compare(&Header::default(), facts).err()?;
-    let mut open = choices(facts.rig);
+    let mut open = choices(facts);
     open.retain(|choice| choice.property != "time-out" || monitored);
     let (mut header, mut chosen) = (Header::default(), Vec::new());
     // Each choice explains more bytes than those before it.
@@ -112,7 +112,6 @@ fn candidates<'c>(
     facts: &AttemptFacts<'_>,
 ) -> Vec<(&'c Choice, String, Header)> {
     let rings = || facts.way.rings.iter().enumerate();
-    let setup = |whom: DriveRange, choice: &Choice| Setup::new(whom, choice.setting.clone());
     let every = |choice: &Choice| choice.in_all(facts.way.rings.len());
     let mut all: Vec<_> = open
         .iter()
@@ -129,9 +128,9 @@ fn candidates<'c>(
         }
         for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
             let single = (0..size.drives()).map(|drive| {
-                let own = setup(DriveRange::one(ring, drive), choice);
+                let own = choice.in_some(DriveRange::one(ring, drive));
                 let words = format!(" in drive {}{drive}", ring_prefix(ring));
-                (choice, words, own.into())
+                (choice, words, own.into_iter().collect())
             });
             all.extend(single);
         }
@@ -140,18 +139,55 @@ fn candidates<'c>(
 }
 
 /// The choices that the rig's file and its profile do not settle.
-fn choices(rig: &Rig) -> Vec<Choice> {
-    let profile = rig.profile.iter().map(|profile| &profile.header);
-    let headers = profile.chain([&rig.setup]);
+fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
+    let profile = facts.rig.profile.iter().map(|profile| &profile.header);
+    let headers = profile.chain([&facts.rig.setup]);
     let settings: Vec<_> = headers.flat_map(|own| &own.setups).collect();
+    let is_settled = |property| settings.iter().any(|own| own.sets() == Some(property));
     let settled = |choice: &Choice| {
-        let mut all = settings.iter();
-        all.any(|own| own.sets() == Some(choice.property))
+        is_settled(choice.property) || choice.with.is_some() && is_settled(SELF_TEST_TIME)
     };
+    let self_tests = silent_for(facts.conversations).map(of_self_tests);
     of_the_bus()
         .chain(of_drives())
+        .chain(self_tests.into_iter().flatten())
         .filter(|choice| !settled(choice))
         .collect()
+}
+
+/// A pause of received bytes that is longer than any between two bytes of drives that answer.
+const PAUSE: Span = Span::from_millis(50);
+
+/// How long drives may have been silent behind their reset (ND21 10.5, 11.8), where the bench has sent bytes to which none came back: the
+/// middle between the longest time for which they certainly were and the shortest for which they can have been.
+fn silent_for(conversations: &[Conversation]) -> Option<Duration> {
+    let (mut least, mut most) = (Span::ZERO, None::<Span>);
+    for own in conversations {
+        for pair in own.received.windows(2) {
+            let [(ring, last, _), (next_ring, next, _)] = pair else {
+                continue;
+            };
+            if ring != next_ring || next.since(*last) < PAUSE {
+                continue;
+            }
+            let unanswered = own.done.iter().filter_map(|(to, done)| match done {
+                Done::Sent(at, _) if to == ring && at > last && *at + PAUSE < *next => Some(*at),
+                _ => None,
+            });
+            if let Some(unanswered) = unanswered.max() {
+                let most_here = next.since(*last);
+                least = least.max(unanswered.since(*last));
+                most = Some(most.map_or(most_here, |most| most.min(most_here)));
+            }
+        }
+    }
+    let most = most.filter(|most| *most > least)?;
+    let middle = (least.as_nanos() + most.as_nanos()) / 2;
+    let whole = middle / 1_000_000;
+    Some(match Span::from_millis(whole) > least {
+        true => Duration::millis(whole),
+        false => Duration::micros(middle / 1_000),
+    })
 }
 
 /// How an attempt compares with drives with this header that have just been switched on, up to a silence of the bench that may be the

@@ -214,7 +214,7 @@ impl<'s> Run<'s> {
         if fresh && let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
             self.twin = twin;
         }
-        let comparisons = self.follow(&conversations);
+        let comparisons = self.follow(&conversations, &way);
         let recorded = (self.exactness.tolerance, capabilities.as_slice());
         let driven = Driven::new(plan, &both.events, &way, recorded, &outcome);
         // In real time a record does not hold every moment at which the master was asked.
@@ -332,8 +332,9 @@ impl<'s> Run<'s> {
         self.as_they_are = true;
     }
 
-    fn follow(&mut self, conversations: &[Conversation]) -> Vec<Comparison> {
-        let (comparisons, stale) = self.twin.follow_all(conversations, self.exactness);
+    fn follow(&mut self, conversations: &[Conversation], way: &Way) -> Vec<Comparison> {
+        let exactness = way.exactness(self.exactness);
+        let (comparisons, stale) = self.twin.follow_all(conversations, exactness);
         if stale {
             // It has heard something else than the drives; another one begins like them.
             if let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
@@ -374,6 +375,15 @@ impl Way {
             // It ends the attempt as it does at a step.
             Ok(_) | Err((_, Unhealthy::Trouble(Trouble::Interlock(_)))) => Ok(()),
             Err(ill) => Err(ill),
+        }
+    }
+
+    /// How exactly an attempt is compared. Only a reset puts the programs of the drives and of the twin at the same place in their cycle.
+    #[must_use]
+    pub fn exactness(&self, rig: Exactness) -> Exactness {
+        Exactness {
+            knows_cells: rig.knows_cells && self.anew,
+            ..rig
         }
     }
 
