@@ -79,12 +79,8 @@ impl<L: Language> Settled for Plan<L> {
         at_mismatch: AtMismatch,
         interrupt: &AtomicBool,
     ) -> Outcome {
-        let mut outcome = play_until(self, link, at_mismatch, interrupt);
         // A rig's drives are compared with a model beside the scenario; the simulated ones of a scenario's own are not.
-        if !self.judges() {
-            outcome.judged_nothing();
-        }
-        outcome
+        play_until(self, link, at_mismatch, interrupt).judged_by(self)
     }
 }
 

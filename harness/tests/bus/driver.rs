@@ -2,8 +2,8 @@
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{
-    Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, Spelled, Trigger, Why,
-    count_drives, recover,
+    Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, SpelledOut, SpellingCause,
+    Trigger, count_drives, recover,
 };
 use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness::medium::{Heard, Medium, Out};
@@ -382,9 +382,9 @@ fn recovery_of_9_8() {
     );
     link.send_octets(0, &[0x80]);
     let damaged = Recovery {
-        before: Some(Spelled {
+        before: Some(SpelledOut {
             drive: 2,
-            why: Why::Fault,
+            why: SpellingCause::Fault,
         }),
         ..fine
     };

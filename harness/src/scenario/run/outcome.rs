@@ -2,7 +2,9 @@
 
 use super::CellRecord;
 use crate::link::Trouble;
+use crate::scenario::language::Language;
 use crate::scenario::pattern::Expected;
+use crate::scenario::plan::Plan;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::skip::Skip;
 use crate::scenario::verdict::Verdict;
@@ -76,6 +78,14 @@ impl Outcome {
             remarks: own.into_iter().chain(found).chain(self.remarks).collect(),
             ..self
         }
+    }
+
+    /// The same, which has not passed where no step of the scenario judges anything.
+    pub(crate) fn judged_by<L: Language>(mut self, plan: &Plan<L>) -> Self {
+        if !plan.judges() {
+            self.judged_nothing();
+        }
+        self
     }
 
     /// The same where nothing was judged: it has not passed.

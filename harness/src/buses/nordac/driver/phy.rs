@@ -379,13 +379,13 @@ mod tests {
     }
 
     /// A slave behind an adapter that keeps every reply back for 300 ms.
-    struct Slow {
+    struct SlowAdapter {
         now: Instant,
         asked: u8,
         kept: VecDeque<(Instant, u8)>,
     }
 
-    impl Line for Slow {
+    impl Line for SlowAdapter {
         fn medium(&self, _port: usize) -> Medium {
             harness_proto::line::Rate::default().into()
         }
@@ -422,7 +422,7 @@ mod tests {
         let mut timing = Timing::simulated(BusRate::K500);
         timing.patience = Span::from_millis(200);
         timing.late = Span::from_millis(200);
-        let slow = Slow {
+        let slow = SlowAdapter {
             now: Instant::START,
             asked: 0,
             kept: VecDeque::new(),

@@ -3,7 +3,7 @@
 
 use super::args::{OutputForm, RecoverArguments};
 use super::rig::{self, RigName, Use};
-use crate::buses::novobus::driver::{self, Axis, Recovery, Spelled, Why};
+use crate::buses::novobus::driver::{self, Axis, Recovery, SpelledOut, SpellingCause};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -58,8 +58,8 @@ fn show(
             let rings: Vec<_> = found
                 .iter()
                 .map(|recovery| {
-                    let drive = |spelled: Option<Spelled>| spelled.map(|spelled| spelled.drive);
-                    let missed = |spelled: &Spelled| spelled.why == Why::MissedMaster;
+                    let drive = |spelled: Option<SpelledOut>| spelled.map(|spelled| spelled.drive);
+                    let missed = |spelled: &SpelledOut| spelled.why == SpellingCause::MissedMaster;
                     json!({
                         "reported": drive(recovery.fault()),
                         "missed_master": drive(recovery.before.filter(missed)),
@@ -88,14 +88,14 @@ pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
         )
     };
     let before = match (recovery.before, recovery.drives) {
-        (Some(Spelled { drive, why }), _) => match why {
-            Why::Fault => fault(drive),
-            Why::FaultOrSilence => format!(
+        (Some(SpelledOut { drive, why }), _) => match why {
+            SpellingCause::Fault => fault(drive),
+            SpellingCause::FaultOrSilence => format!(
                 "drive {} spells out its address: it may monitor time-outs and have heard no byte for 10 ms, because no master sent or the \
                  computer was held up, or the fault is on its link or in the sender there (ND21 9.7, 9.9)",
                 name(drive)
             ),
-            Why::MissedMaster => format!(
+            SpellingCause::MissedMaster => format!(
                 "drive {} monitors time-outs and had heard no byte for 10 ms, because no master sent; no fault reported (ND21 9.9, 14.10.2)",
                 name(drive)
             ),

@@ -1,6 +1,6 @@
 //! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
 
-use crate::buses::novobus::driver::{Error, Spelled, Why};
+use crate::buses::novobus::driver::{Error, SpelledOut, SpellingCause};
 use crate::cli::exit::Exit;
 use crate::cli::failure::exit_of_trouble;
 use crate::cli::output::Output;
@@ -131,12 +131,14 @@ fn text(rig: &Rig, figures: &Figures) -> String {
             late_of(found)
         );
     }
-    for (ring, Spelled { drive, why }) in &figures.reported {
+    for (ring, SpelledOut { drive, why }) in &figures.reported {
         let cause = match why {
-            Why::FaultOrSilence => {
+            SpellingCause::FaultOrSilence => {
                 "a fault in front of it, or no byte for 10 ms, before the check (ND21 9.7, 9.9)"
             }
-            Why::Fault | Why::MissedMaster => "a fault in front of it before the check (ND21 9.7)",
+            SpellingCause::Fault | SpellingCause::MissedMaster => {
+                "a fault in front of it before the check (ND21 9.7)"
+            }
         };
         let _infallible = writeln!(
             text,

@@ -119,7 +119,7 @@ pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
     /// The drive that spelled out its address before.
-    pub before: Option<Spelled>,
+    pub before: Option<SpelledOut>,
     /// The drive that does so behind the check sequence: the ring is not back.
     pub after: Option<u8>,
     /// Zeros come without end although nothing is sent, also behind the check sequence. A drive in error mode answers each byte with one
@@ -132,24 +132,24 @@ pub struct Recovery {
 impl Recovery {
     /// The drive that reported a fault in front of it, before the ring was brought back.
     #[must_use]
-    pub fn fault(&self) -> Option<Spelled> {
+    pub fn fault(&self) -> Option<SpelledOut> {
         self.before
-            .filter(|spelled| spelled.why != Why::MissedMaster)
+            .filter(|spelled| spelled.why != SpellingCause::MissedMaster)
     }
 }
 
 /// A drive that spelled out its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Spelled {
+pub struct SpelledOut {
     /// Which.
     pub drive: u8,
     /// What can have made it do so.
-    pub why: Why,
+    pub why: SpellingCause,
 }
 
 /// What makes a drive spell out its address (9.7, 9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Why {
+pub enum SpellingCause {
     /// A fault in front of it.
     Fault,
     /// A fault, or no byte for 10 ms: it monitors time-outs, and so does a drive between it and the master. That one names itself where no
@@ -168,9 +168,9 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
     let own = |drive: &u8| !(zeros_unasked && *drive == 0);
     let (before, after) = (before.filter(own), after.filter(own));
-    let before = before.map(|drive| Spelled {
+    let before = before.map(|drive| SpelledOut {
         drive,
-        why: drives.map_or(Why::Fault, |size| why(link, ring, drive, size)),
+        why: drives.map_or(SpellingCause::Fault, |size| why(link, ring, drive, size)),
     });
     Recovery {
         before,
@@ -184,7 +184,7 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
 const TRIES: usize = 4;
 
 /// What can have made a drive spell out its address, by which drives monitor time-outs (ND21 14.10.2).
-fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> Why {
+fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> SpellingCause {
     let mut monitors = |drive| {
         let flags2 = (0..TRIES).find_map(|_| {
             let read = read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
@@ -196,11 +196,11 @@ fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> Why {
         flags2.map(|flags2| flags2 & flags2::MONITORING != 0)
     };
     match monitors(drive) {
-        Some(false) => Why::Fault,
+        Some(false) => SpellingCause::Fault,
         Some(true) if (drive + 1..size.drives()).all(|other| monitors(other) == Some(false)) => {
-            Why::MissedMaster
+            SpellingCause::MissedMaster
         }
-        _ => Why::FaultOrSilence,
+        _ => SpellingCause::FaultOrSilence,
     }
 }
 

@@ -23,7 +23,7 @@ mod scope;
 pub use access::Width;
 pub use axis::Axis;
 pub(crate) use discovery::{COUNT, count_behind, repair, unasked};
-pub use discovery::{Identity, Recovery, Spelled, State, Why, count_drives, recover};
+pub use discovery::{Identity, Recovery, SpelledOut, SpellingCause, State, count_drives, recover};
 pub use error::Error;
 /// What a master may send, by the rules of the bus alone.
 pub use harness_sim::novobus::fuzz::jobs::conduct;
@@ -150,7 +150,7 @@ impl<'l> OpenRings<'l> {
             .count()
     }
 
-    /// Why nothing goes on any more, if so: a ring has been stopped (11.5), or the link carries nothing. Time may stand still then.
+    /// SpellingCause nothing goes on any more, if so: a ring has been stopped (11.5), or the link carries nothing. Time may stand still then.
     #[must_use]
     pub fn halted(&self) -> Option<Error> {
         self.lock().halt()

@@ -1,7 +1,7 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::line_test::{self, RingPace};
-use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, Spelled, State};
+use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut, State};
 use crate::link::{Line as _, Octets};
 use crate::rig::Rig;
 use crate::rig::shared::Shared;
@@ -70,7 +70,7 @@ pub struct Figures {
     /// Errors on the rings that were corrected while drives were read (11.5).
     pub corrected: u64,
     /// Drives that reported a fault before the ring was brought back: ring and drive.
-    pub reported: Vec<(usize, Spelled)>,
+    pub reported: Vec<(usize, SpelledOut)>,
 }
 
 /// Measures a rig in use and gives it back with its drives as they are, or, where one does not answer, in its safe state. `told`

@@ -1,7 +1,7 @@
 //! Checks whether a ring is healthy and has the size given in the rig's file.
 
 use super::line_test;
-use crate::buses::novobus::driver::{Recovery, Spelled, count_behind, recover, unasked};
+use crate::buses::novobus::driver::{Recovery, SpelledOut, count_behind, recover, unasked};
 use crate::link::{Link, Octets, Trouble, wait_keeping};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -80,7 +80,7 @@ pub struct RingHealth {
     /// How many drives each ring has.
     pub rings: Vec<RingSize>,
     /// Drives that reported a fault before the ring was brought back: ring and drive.
-    pub reported: Vec<(usize, Spelled)>,
+    pub reported: Vec<(usize, SpelledOut)>,
 }
 
 /// Recovers every ring (9.8), counts its drives and compares the number with the rig's file.
@@ -205,7 +205,7 @@ mod tests {
     use super::super::line_test::RingPace;
     use super::*;
     use crate::buses::SimulatedLink;
-    use crate::buses::novobus::driver::{OpenRings, Options, Why};
+    use crate::buses::novobus::driver::{OpenRings, Options, SpellingCause};
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
@@ -258,15 +258,19 @@ mod tests {
         let size = RingSize::new(3).expect("a size");
         for (monitor, drive) in [("0..last", 2), ("1", 1), ("0..1", 1)] {
             let recovery = recover(&mut monitoring(3, monitor), 0);
-            let why = Why::MissedMaster;
-            assert_eq!(recovery.before, Some(Spelled { drive, why }), "{monitor}");
+            let why = SpellingCause::MissedMaster;
+            assert_eq!(
+                recovery.before,
+                Some(SpelledOut { drive, why }),
+                "{monitor}"
+            );
             assert_eq!((recovery.fault(), recovery.drives), (None, Some(size)));
         }
         // A damaged byte in front of a drive is one, if the drive does not monitor. If it is not the first that does, it may be one.
         for (monitor, drive, why) in [
-            ("0..last", 1, Why::FaultOrSilence),
-            ("0", 1, Why::Fault),
-            ("0", 2, Why::Fault),
+            ("0..last", 1, SpellingCause::FaultOrSilence),
+            ("0", 1, SpellingCause::Fault),
+            ("0", 2, SpellingCause::Fault),
         ] {
             let mut link = Guarded::new(monitoring(3, monitor), Limits::unlimited());
             link.keep_lines();
@@ -275,7 +279,11 @@ mod tests {
             link.inject(0, fault, Moment::Now);
             link.send_octets(0, &[SYNCO]);
             let recovery = recover(&mut link, 0);
-            assert_eq!(recovery.fault(), Some(Spelled { drive, why }), "{monitor}");
+            assert_eq!(
+                recovery.fault(),
+                Some(SpelledOut { drive, why }),
+                "{monitor}"
+            );
             assert_eq!(recovery.drives, Some(size));
         }
     }

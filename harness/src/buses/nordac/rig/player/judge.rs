@@ -56,12 +56,9 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the slave.
-    pub(super) fn judged(&mut self, own: &Own, mut outcome: Outcome, left: &Left) -> Outcome {
+    pub(super) fn judged(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
         if outcome.verdict != Verdict::Failed {
-            if !own.plan.judges() {
-                outcome.judged_nothing();
-            }
-            return outcome;
+            return outcome.judged_by(&own.plan);
         }
         let way = left.way;
         let late = way.late.max(way.longest);

@@ -526,18 +526,9 @@ impl Player {
     }
 
     /// Whether a line that was not met accuses the drive.
-    fn judged(
-        &self,
-        own: &Own,
-        mut outcome: Outcome,
-        way: LinkTimes,
-        unlike: &[(u8, u8)],
-    ) -> Outcome {
+    fn judged(&self, own: &Own, outcome: Outcome, way: LinkTimes, unlike: &[(u8, u8)]) -> Outcome {
         if outcome.verdict != Verdict::Failed {
-            if !own.plan.judges() {
-                outcome.judged_nothing();
-            }
-            return outcome;
+            return outcome.judged_by(&own.plan);
         }
         let asks_for = own.asks_for();
         let unlike = unlike
