@@ -1,7 +1,8 @@
 //! A link that gives again what was recorded.
 //!
 //! The order of the record decides: a byte comes where it came before, behind the same bytes sent. Time is that of the record. A caller
-//! that sends something else finds the link in trouble.
+//! that does something else finds the link in trouble. From then on the record is not read any further: nothing comes, every wait lasts until
+//! its end, and no pause is due, so that every loop of a caller ends, whatever the record holds.
 //!
 //! A record of a ring with ports holds every [`Look`], so that the caller sees the same at each call and must do the same. Records of
 //! schema 1 have no looks: of these only the order is repeated, and a driver that depends on the time may send something else.
@@ -15,6 +16,9 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::{BTreeMap, VecDeque};
+
+/// How many waits in a row may take no event and no time. A caller that fetches what has come, and looks where the record looks, needs a few.
+const IDLE_WAITS: u32 = 16;
 
 /// A record, played back.
 #[derive(Clone, Debug)]
@@ -31,6 +35,10 @@ pub struct Replay {
     /// What was seen on them in this conversation.
     tapped: BTreeMap<(usize, usize), Vec<Received>>,
     trouble: Option<Trouble>,
+    /// The first difference between the record and what the caller does.
+    strayed: Option<String>,
+    /// Waits since the last event that was taken, or since time has passed.
+    idle: (u32, usize),
     /// The state as of the last look; `None` where the record has no looks.
     known: Option<Known>,
 }
@@ -98,6 +106,8 @@ impl Replay {
             drives,
             capabilities,
             trouble: None,
+            strayed: None,
+            idle: (0, 0),
             known: looks.then(Known::default),
         }
     }
@@ -122,8 +132,8 @@ impl Replay {
         self.known.is_some()
     }
 
-    /// The first thing that was recorded and not played back; `None` where all was. Without looks, bytes that were not fetched do not
-    /// count. Behind trouble the caller asks for nothing.
+    /// The first thing that was recorded and not played back, or what differed behind trouble of the record; `None` where all was played
+    /// back. Without looks, bytes that were not fetched do not count. Behind trouble the caller asks for nothing.
     #[must_use]
     pub fn left(&self) -> Option<String> {
         let exact = self.known.is_some();
@@ -146,8 +156,13 @@ impl Replay {
                 counted(Out::Octets(sent))
             )),
         };
-        match &self.trouble {
-            Some(_) if !exact => None,
+        let strayed = self
+            .strayed
+            .as_ref()
+            .filter(|why| !matches!(&self.trouble, Some(Trouble::Garbled(own)) if own == *why));
+        match (&self.trouble, strayed) {
+            (Some(_), _) if !exact => None,
+            (_, Some(why)) => Some(why.clone()),
             _ => self.events.iter().find_map(words),
         }
     }
@@ -159,7 +174,23 @@ impl Replay {
     }
 
     fn fails(&mut self, text: String) {
+        self.strayed.get_or_insert_with(|| text.clone());
         self.trouble.get_or_insert(Trouble::Garbled(text));
+    }
+
+    /// Whether this wait is one of too many that have taken no event and no time.
+    fn idles(&mut self) -> bool {
+        let left = self.events.len();
+        let (count, before) = self.idle;
+        let count = if before == left { count + 1 } else { 0 };
+        self.idle = (count, left);
+        count > IDLE_WAITS
+    }
+
+    /// Lets time pass where nothing more comes.
+    fn pass(&mut self, until: Instant) -> bool {
+        self.now = self.now.max(until);
+        false
     }
 
     /// Whether the second event is a denial.
@@ -185,6 +216,9 @@ impl Replay {
 
     /// Takes the look that stands next, with what had come; `until` is when a wait was to end.
     fn look(&mut self, until: Option<Instant>) {
+        if self.strayed.is_some() {
+            return;
+        }
         let Some(known) = &mut self.known else {
             return;
         };
@@ -199,7 +233,7 @@ impl Replay {
         } = *look;
         self.events.pop_front();
         let before = (self.now, known.busy);
-        self.now = at;
+        self.now = at.max(before.0);
         known.busy = busy;
         known.lead = lead.unwrap_or(known.lead);
         known.pause = pause;
@@ -270,7 +304,7 @@ impl Line for Replay {
     }
 
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
-        if self.trouble.is_some() || what.is_empty() {
+        if self.trouble.is_some() || self.strayed.is_some() || what.is_empty() {
             return self.now;
         }
         match self.events.front() {
@@ -307,6 +341,9 @@ impl Line for Replay {
         }
         // In real time a wait until a time may have ended later, and what came meanwhile was fetched.
         let late = self.tolerance > Span::ZERO;
+        if self.strayed.is_some() {
+            return None;
+        }
         match self.events.front() {
             Some(LinkEvent::Received(own, at, byte))
                 if *own == port && (late || *at <= self.now) =>
@@ -321,13 +358,22 @@ impl Line for Replay {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        if self.known.is_some() {
+        if self.known.is_some() && self.strayed.is_none() {
             self.look(Some(until));
+        }
+        if self.strayed.is_some() {
+            return self.pass(until);
+        }
+        if self.known.is_some() {
             return !self.trouble.as_ref().is_some_and(Trouble::stops_the_line);
         }
         self.trouble_comes();
         if self.trouble.is_some() {
-            return false;
+            return self.idles() && self.pass(until);
+        }
+        if until > self.now && self.idles() {
+            self.differs("a wait");
+            return self.pass(until);
         }
         // The next byte that comes, behind those that have come and are not fetched; or the time of the next look at an inner link.
         let mut next = self.events.iter().map_while(|event| match event {
@@ -338,6 +384,9 @@ impl Line for Replay {
         let now = self.now;
         let next = next.find(|(at, is_look)| *is_look || *at > now);
         self.now = next.map_or(until, |(at, _)| at.min(until)).max(now);
+        if self.now > now {
+            self.idle = (0, self.events.len());
+        }
         !self.events.is_empty()
     }
 
@@ -352,7 +401,8 @@ impl Line for Replay {
     }
 
     fn pause_due(&self) -> Option<Instant> {
-        self.known.as_ref().and_then(|known| known.pause)
+        let known = self.known.as_ref().filter(|_| self.strayed.is_none());
+        known.and_then(|known| known.pause)
     }
 
     fn pause(&mut self) {
@@ -371,6 +421,9 @@ impl Link for Replay {
     }
 
     fn begin(&mut self) {
+        if self.strayed.is_some() {
+            return;
+        }
         while self.known.is_none() && matches!(self.events.front(), Some(LinkEvent::Received(..))) {
             self.events.pop_front();
         }
@@ -403,7 +456,7 @@ impl Link for Replay {
     }
 
     fn step(&mut self, place: usize) {
-        if self.known.is_none() {
+        if self.known.is_none() || self.strayed.is_some() {
             return;
         }
         match self.events.front() {
@@ -415,12 +468,18 @@ impl Link for Replay {
     }
 
     fn busy(&self) -> bool {
+        if self.strayed.is_some() {
+            return false;
+        }
         let byte = || matches!(self.events.front(), Some(LinkEvent::Received(..)));
         let known = self.known.as_ref();
         known.map_or_else(byte, |known| known.busy)
     }
 
     fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
+        if self.strayed.is_some() {
+            return;
+        }
         match self.events.front() {
             Some(LinkEvent::Fault(own, at, what, then))
                 if (*own, *what, *then) == (port, fault, moment)
@@ -446,6 +505,9 @@ impl Link for Replay {
     }
 
     fn tapped(&mut self, port: usize, link: usize) -> Option<Vec<Received>> {
+        if self.strayed.is_some() {
+            return None;
+        }
         match self.events.pop_front() {
             Some(LinkEvent::Tapped(own, place, _, bytes)) if (own, place) == (port, link) => {
                 let all = self.tapped.entry((port, link)).or_default();
@@ -467,6 +529,9 @@ impl Link for Replay {
     }
 
     fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
+        if self.strayed.is_some() {
+            return Vec::new();
+        }
         match self.events.pop_front() {
             Some(LinkEvent::Probe(own, at, sent, came))
                 if own == port && sent == octets && (self.known.is_none() || at == self.now) =>
@@ -536,78 +601,5 @@ fn held_by(fault: LinkFault, byte_time: Span) -> Span {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::link::Octets;
-    use harness_proto::line::Rate;
-
-    fn ms(at: u64) -> Instant {
-        Instant::START + Span::from_millis(at)
-    }
-
-    /// A byte that comes long behind the time until which it was waited for, and one that is sent then.
-    fn overslept(tolerance: Span) -> Replay {
-        let byte = Heard::Octet(Received::good(0x80));
-        let events = vec![
-            LinkEvent::Begin(Instant::START),
-            LinkEvent::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
-            LinkEvent::Received(0, ms(300), byte),
-            LinkEvent::Sent(0, ms(301), Pieces::Octets(vec![0x81])),
-        ];
-        Replay::new(events, Rate::default(), tolerance, vec![1], Vec::new())
-    }
-
-    /// Sends a byte, waits for answers until 50 ms, and sends the next byte.
-    fn play(replay: &mut Replay) -> Vec<Instant> {
-        replay.begin();
-        replay.send_octets(0, &[0x80]);
-        let mut came = Vec::new();
-        while replay.now() < ms(50) {
-            replay.wait(ms(50));
-            while let Some((at, _)) = replay.receive(0) {
-                came.push(at);
-            }
-        }
-        replay.send_octets(0, &[0x81]);
-        came
-    }
-
-    #[test]
-    fn whoever_slept_too_long_has_fetched_what_came_meanwhile() {
-        let mut replay = overslept(Span::from_millis(20));
-        assert_eq!(play(&mut replay), [ms(300)]);
-        assert_eq!((replay.trouble(), replay.left()), (None, None));
-    }
-
-    #[test]
-    fn nobody_sleeps_too_long_where_time_is_virtual() {
-        let mut replay = overslept(Span::ZERO);
-        assert_eq!(play(&mut replay), []);
-        let trouble = replay.trouble().expect("trouble").to_string();
-        assert!(
-            trouble.contains("something else than what is sent"),
-            "{trouble}"
-        );
-    }
-
-    /// Where a wait ended without a byte, the caller looked at an inner link: so it does again, at the same times.
-    #[test]
-    fn a_wait_ends_at_a_look_at_an_inner_link() {
-        let byte = || Received::good(0x80);
-        let events = vec![
-            LinkEvent::Begin(Instant::START),
-            LinkEvent::Tapped(0, 1, Instant::START, vec![byte()]),
-            LinkEvent::Tapped(0, 1, ms(3), Vec::new()),
-            LinkEvent::Received(0, ms(4), Heard::Octet(byte())),
-        ];
-        let mut replay = Replay::new(events, Rate::default(), Span::ZERO, vec![1], Vec::new());
-        replay.begin();
-        assert_eq!(replay.tapped(0, 1), Some(vec![byte()]));
-        replay.wait(ms(10));
-        assert_eq!(replay.now(), ms(3));
-        assert_eq!(replay.tapped(0, 1), Some(vec![byte()]));
-        replay.wait(ms(10));
-        assert_eq!(replay.receive_octet(0), Some((ms(4), byte())));
-        assert_eq!((replay.trouble(), replay.left()), (None, None));
-    }
-}
+#[path = "replay_tests.rs"]
+mod tests;
