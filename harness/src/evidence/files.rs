@@ -10,9 +10,9 @@ use std::io;
 use std::path::Path;
 
 /// The file of sums.
-pub(super) const SUMS: &str = "SHA256SUMS";
+pub(crate) const SUMS: &str = "SHA256SUMS";
 /// The signature of the sums.
-pub(super) const SIGNATURE: &str = "SHA256SUMS.sig";
+pub(crate) const SIGNATURE: &str = "SHA256SUMS.sig";
 /// The file of the record.
 pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.

@@ -47,6 +47,7 @@ pub use cases::too_large;
 pub use derive::{Derived, derive};
 pub use earlier::Earlier;
 pub use files::{DEVIATIONS, PAGE, PROFILE, RIG, size};
+pub(crate) use files::{SIGNATURE, SUMS};
 pub use folder::{AboutRun, EvidenceError, Folder, KeptAttempts};
 pub use junit::{JunitCase, junit};
 pub use keep::Keep;

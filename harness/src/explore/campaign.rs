@@ -1,6 +1,7 @@
 //! A run tries case after case, keeps those that show something new, and confirms and records every difference from the model.
 
 use super::Case;
+use super::again::file_of;
 use super::confirm::Confirmation;
 use super::dice::Dice;
 use super::error::ExploreError;
@@ -307,7 +308,7 @@ impl<C: FuzzCase> FuzzRun<C> {
                 self.use_line(took);
                 let signature = finding.difference.key();
                 self.note(&signature, finding.confirmed);
-                let file = format!("finding-{number:06}");
+                let file = file_of(number);
                 if let Some(record) = record {
                     finding.write(record.folder(), &file)?;
                     record.line(&LogLine::<C>::Finding {

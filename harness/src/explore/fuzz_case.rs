@@ -81,6 +81,9 @@ pub trait FuzzCase:
         dice: &mut Dice,
     ) -> Self;
 
+    /// Whether it is for the drives of a run.
+    fn is_of(&self, about: &FuzzSettings<Self>) -> bool;
+
     /// Which drives it is with, 0 or 1; cases with different ones are not mixed.
     fn lane(&self) -> usize;
 

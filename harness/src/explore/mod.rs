@@ -5,6 +5,7 @@
 //! cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario. A [`FuzzRun`] does all of
 //! it and a [`FuzzRecord`] writes it down as it happens. The ring's cases, and what shrinks and promotes them, are the default.
 
+mod again;
 mod campaign;
 mod confirm;
 mod dice;
@@ -21,6 +22,7 @@ pub(crate) mod smaller;
 mod swarm;
 mod target;
 
+pub(crate) use again::{file_of, impossible, played_again};
 pub(crate) use campaign::count_finding;
 pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
 pub use confirm::Confirmation;

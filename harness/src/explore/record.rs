@@ -174,6 +174,7 @@ impl FuzzRecord {
             folder: folder.to_owned(),
             file,
         };
+        unsettled(folder, kept.progress.cases);
         Ok((record, kept))
     }
 
@@ -197,6 +198,19 @@ impl FuzzRecord {
             .write_all(text.as_bytes())
             .and_then(|()| self.file.flush())
             .map_err(failed)
+    }
+}
+
+/// Removes the files of findings whose lines were cut off: their cases are tried again.
+fn unsettled(folder: &Path, cases: u64) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let stem = Path::new(&name).file_stem().and_then(|own| own.to_str());
+        let number = stem.and_then(|own| own.strip_prefix("finding-")?.parse::<u64>().ok());
+        if number.is_some_and(|number| number >= cases) {
+            // One that stays is refused by `verify`, or written anew.
+            let _removed = std::fs::remove_file(entry.path());
+        }
     }
 }
 

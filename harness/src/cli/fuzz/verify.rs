@@ -3,17 +3,20 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
-use crate::evidence::{Signer, sealed};
+use crate::evidence::{SIGNATURE, SUMS, Signer, sealed};
 use crate::explore::files::read_text;
 use crate::explore::{
-    Differing as _, ExploreError, Finding, FuzzCase, JudgedAgain, KeptRun, LogLine, count_finding,
+    Differing as _, ExploreError, Finding, FuzzCase, JudgedAgain, KeptRun, LogLine, RECORD,
+    count_finding, file_of, impossible,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// What no folder of a run confirms.
-const UNCONFIRMED: &str =
-    "unconfirmed  which cases were tried and showed nothing: the record has their number only\n";
+const UNCONFIRMED: &str = "unconfirmed  which cases were tried and showed nothing: the record has their number only\n\
+     unconfirmed  that nothing more was found or kept: a finding that is removed with its line and its files leaves no trace\n\
+     unconfirmed  the counts within the last round of cases, the numbers of cases within their rounds, the time on the line, the cases that were \
+     kept, and in the first line what follows from no finding, such as the seed, `of` and `spices`\n";
 
 /// Checks the files of a run, and judges its findings again.
 pub(crate) fn verify<C: FuzzCase>(
@@ -36,6 +39,24 @@ pub(crate) fn verify<C: FuzzCase>(
     for file in &files {
         output.result(&format!("{file}\n"))?;
     }
+    for why in impossible(kept) {
+        wrong += 1;
+        output.result(&format!("{RECORD}: {why}\n"))?;
+    }
+    for (file, own) in strange(folder, kept) {
+        let text = match own {
+            Strange::Added => {
+                wrong += 1;
+                format!("{file} is not a file of the run\n")
+            }
+            Strange::Small => format!("unconfirmed  {file}: `shrink` made it of a finding\n"),
+            Strange::Unsettled => {
+                complete = false;
+                format!("unconfirmed  {file}: the record ends before its case\n")
+            }
+        };
+        output.result(&text)?;
+    }
     let mut judged = 0;
     let mut known = BTreeMap::new();
     for line in &kept.lines {
@@ -48,7 +69,14 @@ pub(crate) fn verify<C: FuzzCase>(
         else {
             continue;
         };
-        let text = match again(folder, file, kept, &known) {
+        let judged_again = match *file == file_of(*number) {
+            true => again(folder, file, kept, &known),
+            false => Err(ExploreError::File(format!(
+                "{file:?} is not the name of its files, which is {}",
+                file_of(*number)
+            ))),
+        };
+        let text = match judged_again {
             Ok((finding, JudgedAgain::Same)) if !is_of(&finding, line) => {
                 wrong += 1;
                 format!(
@@ -97,6 +125,49 @@ pub(crate) fn verify<C: FuzzCase>(
     })
 }
 
+/// What a file is that no line of the record names.
+enum Strange {
+    /// Nothing of the run.
+    Added,
+    /// A finding that was made small.
+    Small,
+    /// Of a case behind the end of the record, as a run leaves it that was killed.
+    Unsettled,
+}
+
+/// The files of the folder that no line of its record names, by name.
+fn strange<C: FuzzCase>(folder: &Path, kept: &KeptRun<C>) -> BTreeMap<String, Strange> {
+    let numbers = kept.lines.iter().filter_map(|line| match line {
+        LogLine::Finding { number, .. } => Some(*number),
+        _ => None,
+    });
+    let numbers: BTreeSet<_> = numbers.collect();
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let names = names.filter(|name| ![RECORD, SUMS, SIGNATURE].contains(&name.as_str()));
+    let judged = names.filter_map(|name| {
+        let own = match finding_of(&name) {
+            Some((number, small)) if numbers.contains(&number) => {
+                small.then_some(Strange::Small)?
+            }
+            Some((number, _)) if number >= kept.progress.cases => Strange::Unsettled,
+            _ => Strange::Added,
+        };
+        Some((name, own))
+    });
+    judged.collect()
+}
+
+/// The number of the case of whose finding a file is, by its name, and whether it was made small.
+fn finding_of(name: &str) -> Option<(u64, bool)> {
+    let stem = [".json", ".scn"]
+        .iter()
+        .find_map(|own| name.strip_suffix(own))?;
+    let plain = stem.strip_suffix("-small").unwrap_or(stem);
+    let number = plain.strip_prefix("finding-")?.parse().ok()?;
+    (plain == file_of(number)).then_some((number, plain != stem))
+}
+
 /// Whether a line of the record is about a finding.
 fn is_of<C: FuzzCase>(finding: &Finding<C>, line: &LogLine<C>) -> bool {
     matches!(line, LogLine::Finding { number, signature, confirmed, .. }
@@ -113,6 +184,10 @@ fn again<C: FuzzCase>(
     let (finding, path) = Finding::<C>::read_as(&folder.join(file).with_extension("json"))?;
     let scenario = path.with_extension("scn");
     let about = &kept.about;
+    if !finding.case.is_of(about) {
+        let why = "it is for other drives than the run has".to_owned();
+        return Ok((finding, JudgedAgain::Differs(why)));
+    }
     let of = |own: &Finding<C>| (own.rig.clone(), own.setup.clone(), own.ports, own.seed);
     let same = (
         about.rig.clone(),

@@ -8,7 +8,7 @@ use crate::explore::promote::Promotes;
 use crate::explore::smaller::Acts;
 use crate::explore::{
     Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
-    Pool, Rehearsal, Swarm, Target,
+    Pool, Rehearsal, Swarm, Target, played_again,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -52,6 +52,11 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
         }
     }
 
+    fn is_of(&self, _: &FuzzSettings<Self>) -> bool {
+        // The drives stand in the setup, with which every case is played.
+        true
+    }
+
     fn lane(&self) -> usize {
         0
     }
@@ -64,20 +69,13 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
     fn again(
         finding: &Finding<Self>,
         about: &FuzzSettings<Self>,
-        _: &BTreeMap<String, u8>,
+        known: &BTreeMap<String, u8>,
     ) -> Result<JudgedAgain, ExploreError> {
         if about.ports {
             return Ok(JudgedAgain::Unknown);
         }
         let mut target = OnLine::<B>::new(finding.setup.under_test::<B>()?);
-        let rehearsal = target.rehearse(&finding.case)?;
-        let found = target.attempt(&finding.case, &rehearsal)?.difference;
-        Ok(match found.as_ref() == Some(&finding.difference) {
-            true => JudgedAgain::Same,
-            false => JudgedAgain::Differs(
-                "its conversation does not differ as the finding says".to_owned(),
-            ),
-        })
+        played_again(finding, about, known, &mut target)
     }
 
     fn is_sound(finding: &Finding<Self>) -> bool {

@@ -13,7 +13,7 @@ use super::{AttemptRecord, Spice};
 use crate::counted::counted;
 use crate::explore::{
     Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
-    Pool, Rehearsal, Swarm, Target,
+    Pool, Rehearsal, Swarm, Target, played_again,
 };
 use std::collections::BTreeMap;
 
@@ -83,6 +83,14 @@ impl FuzzCase for Case {
         }
     }
 
+    fn is_of(&self, about: &FuzzSettings) -> bool {
+        let own = match self.ring() {
+            0 => Some(about.drives),
+            _ => about.second,
+        };
+        own == Some(self.drives)
+    }
+
     fn lane(&self) -> usize {
         self.ring()
     }
@@ -108,17 +116,7 @@ impl FuzzCase for Case {
             });
         }
         let mut target = OnSim::new(finding.setup.clone());
-        let rehearsal = target.rehearse(&finding.case)?;
-        let tried = target.attempt(&finding.case, &rehearsal)?;
-        let same = tried.difference.is_some_and(|found| {
-            found.is_like(&finding.difference) && found.byte == finding.difference.byte
-        });
-        Ok(match same {
-            true => JudgedAgain::Same,
-            false => JudgedAgain::Differs(
-                "its conversation does not differ as the finding says".to_owned(),
-            ),
-        })
+        played_again(finding, about, known, &mut target)
     }
 
     fn is_sound(finding: &Finding) -> bool {
