@@ -25,7 +25,9 @@ use crate::rig::judge::known;
 use crate::rig::run::twin;
 use crate::rig::segment::{Qualified, SegmentJudge};
 use crate::rig::{Rig, parse_beside};
+use crate::scenario::run::DENIED;
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
@@ -358,6 +360,18 @@ impl Opened {
         verified
     }
 
+    /// Whether a scenario was skipped for such a reason.
+    fn skips(&self, is_such: impl Fn(&str) -> bool) -> bool {
+        self.lines.iter().any(|line| match line {
+            RecordLine::Case {
+                verdict, remarks, ..
+            } if verdict == Verdict::Skipped.name() => {
+                remarks.first().is_some_and(|why| is_such(why))
+            }
+            _ => false,
+        })
+    }
+
     /// What nothing in the folder confirms.
     fn unconfirmed(&self) -> Vec<String> {
         let mut all = vec!["date and versions of the program and the system"];
@@ -375,9 +389,19 @@ impl Opened {
                 "which faults on links never happened, line errors without their bytes, bytes on inner links, whether a port had more to send, why one was lost, and the safe state",
             );
         }
-        if header.qualified && !header.simulated {
-            all.push("on a ring with ports which scenarios the limits left out");
+        if header.qualified && !header.simulated || self.skips(|why| why.starts_with(DENIED)) {
+            all.push(
+                "which scenarios the limits left out: the record does not hold what the bench knew of the drives then",
+            );
         }
+        if self.skips(|_| true) {
+            all.push(
+                "the texts of scenarios that were skipped: only their titles, their drives and the reasons are compared",
+            );
+        }
+        all.push(
+            "what nothing recorded depends on in the rig's file: of it the id, the drives and how they answer, the rate, the tolerance, the capabilities and the number of attempts are compared; other values, such as max_speed, serial numbers, interlocks, hooks and the safe state, are not",
+        );
         let mut all: Vec<_> = all.into_iter().map(str::to_owned).collect();
         if !self.left_out.is_empty() {
             all.push(format!(

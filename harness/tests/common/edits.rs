@@ -1,9 +1,9 @@
 //! Edits of evidence whose sums were made to fit again: each field of each kind of line changed, removed or doubled, each line deleted or
-//! doubled, each other file changed. Verify refuses them all but those that nothing in a folder can confirm, which stand here.
+//! doubled, a line of each kind moved, each other file changed. Verify refuses them all but those that nothing in a folder can confirm, which stand here.
 
 use crate::program::{Desk, ended, said};
 use serde_json::{Map, Value};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,16 +32,36 @@ impl Kept {
         self.desk.path("kept")
     }
 
+    /// Its record.
+    pub(crate) fn text(&self) -> String {
+        fs::read_to_string(self.folder().join("run.jsonl")).expect("a record")
+    }
+
     pub(crate) fn lines(&self) -> Vec<Value> {
-        let text = fs::read_to_string(self.folder().join("run.jsonl")).expect("a record");
+        let text = self.text();
         let lines = text.lines().map(serde_json::from_str);
         lines.map(|line| line.expect("JSON")).collect()
     }
 
     /// What verify says of the folder with another record.
     pub(crate) fn verified(&self, lines: &[Value]) -> Output {
+        let before = self.text();
+        let known = before.lines().map(|text| {
+            let line: Value = serde_json::from_str(text).expect("JSON");
+            (line.to_string(), text)
+        });
+        let known: BTreeMap<_, _> = known.collect();
+        let text = lines.iter().map(|line| match known.get(&line.to_string()) {
+            Some(text) => format!("{text}\n"),
+            None => format!("{}\n", written(line, like(line, &before))),
+        });
+        let text: String = text.collect();
+        self.verified_text(&text)
+    }
+
+    /// The same with this text as its record.
+    pub(crate) fn verified_text(&self, text: &str) -> Output {
         let before = fs::read(self.folder().join("run.jsonl")).expect("a record");
-        let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
         fs::write(self.folder().join("run.jsonl"), text).expect("room");
         fit(&self.folder());
         let verified = self.verify();
@@ -61,6 +81,36 @@ impl Kept {
 
     fn is_refused(&self) -> bool {
         is_refusal(&self.verify())
+    }
+}
+
+/// The line of a record whose fields are most like these.
+fn like<'r>(line: &Value, record: &'r str) -> &'r str {
+    let kind = format!("{{\"kind\":{},", line["kind"]);
+    let fields = || line.as_object().into_iter().flatten();
+    let alike = |text: &&str| {
+        let has = |key: &String| text.contains(&format!("\"{key}\":"));
+        fields().filter(|(key, _)| has(key)).count()
+    };
+    let own = record.lines().filter(|text| text.starts_with(&kind));
+    own.max_by_key(alike).unwrap_or_default()
+}
+
+/// A value with its fields in the order in which this line has them: the program writes them in no other one.
+fn written(value: &Value, line: &str) -> String {
+    match value {
+        Value::Object(fields) => {
+            let mut fields: Vec<_> = fields.iter().collect();
+            fields.sort_by_key(|(key, _)| line.find(&format!("\"{key}\":")));
+            let fields = fields.into_iter();
+            let fields = fields.map(|(key, value)| format!("\"{key}\":{}", written(value, line)));
+            format!("{{{}}}", fields.collect::<Vec<_>>().join(","))
+        }
+        Value::Array(all) => {
+            let all = all.iter().map(|value| written(value, line));
+            format!("[{}]", all.collect::<Vec<_>>().join(","))
+        }
+        other => other.to_string(),
     }
 }
 
@@ -206,9 +256,17 @@ pub(crate) fn check_each(kept: &Kept, nth: usize) {
         let line = deleted.remove(at);
         let mut doubled = lines.clone();
         doubled.insert(at, line.clone());
-        for (how, edited) in [("deleted", deleted), ("doubled", doubled)] {
+        for (how, edited) in [("deleted", deleted.clone()), ("doubled", doubled)] {
             if !kept.refused(&edited) {
                 let _infallible = writeln!(accepted, "line {} {how}: {line}", at + 1);
+            }
+        }
+        let count = lines.len();
+        for to in [1, count / 4, count / 2, count - 2] {
+            let mut moved = deleted.clone();
+            moved.insert(to, line.clone());
+            if moved != lines && !kept.refused(&moved) {
+                let _infallible = writeln!(accepted, "line {} moved to {}: {line}", at + 1, to + 1);
             }
         }
     }

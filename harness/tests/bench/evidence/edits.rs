@@ -83,6 +83,62 @@ fn findings_of_a_qualification() {
     ended(&verify(), 0, "0 things wrong");
 }
 
+/// A failure that is stated as left out by the limits cannot be found where the rig has such limits, and verify says so.
+#[test]
+fn a_failure_stated_as_left_out() {
+    let kept = kept(Desk::limited(OWN, ""), "run", false);
+    let mut lines = kept.lines();
+    let of = |line: &Value, kind: &str| line["kind"] == kind && line["name"] == "fails";
+    let from = lines.iter().position(|line| of(line, "scenario"));
+    let to = lines.iter().position(|line| of(line, "case"));
+    let (from, to) = (from.expect("an attempt"), to.expect("a case"));
+    lines.drain(from..to);
+    let case = &mut lines[from];
+    case["verdict"] = "skipped".into();
+    case["took"] = 0.into();
+    let why = "the rig's [limits] do not let it be played to its end: any words";
+    case["remarks"] = vec![why].into();
+    case.as_object_mut().expect("fields").remove("finding");
+    let last = lines.last_mut().expect("lines");
+    last["verdicts"][1] = "skipped".into();
+    let said = crate::program::said(&kept.verified(&lines));
+    assert!(!said.contains("case fails: the record has"), "{said}");
+    let words = "unconfirmed  which scenarios the limits left out";
+    assert!(said.contains(words), "{said}");
+}
+
+/// What nothing in a folder confirms of the rig's file and of skipped scenarios is stated.
+#[test]
+fn what_is_not_compared_is_stated() {
+    let desk = Desk::new(OWN);
+    fs::write(desk.path("passes.scn"), PASSES).expect("room");
+    let run = [
+        "run",
+        "--rig",
+        "desk.toml",
+        "passes.scn",
+        "--evidence",
+        "one",
+    ];
+    ended(&desk.run(&run), 0, "1 passed");
+    let output = desk.run(&["verify", "one"]);
+    ended(
+        &output,
+        0,
+        "unconfirmed  what nothing recorded depends on in the rig's file",
+    );
+    let said = crate::program::said(&output);
+    assert!(!said.contains("scenarios that were skipped"), "{said}");
+    assert!(!said.contains("the limits left out"), "{said}");
+    let kept = kept(desk, "run", false);
+    let output = kept.verified_text(&kept.text());
+    ended(
+        &output,
+        0,
+        "unconfirmed  the texts of scenarios that were skipped",
+    );
+}
+
 /// A scenario that failed is not made to have passed by changing all that tells of it.
 #[test]
 fn a_deleted_failure() {
