@@ -65,6 +65,24 @@ pub fn read(bytes: &[u8]) -> Result<(Vec<RecordLine>, bool), RecordError> {
     Ok((lines, bytes.ends_with(b"\n")))
 }
 
+/// The first line that this program would write in other bytes, in a sentence: blanks, another order of fields, digits of another form.
+pub(super) fn unlike_written(bytes: &[u8], lines: &[RecordLine]) -> Option<String> {
+    let texts = bytes.split_inclusive(|byte| *byte == b'\n');
+    let mut numbered = (1..).zip(texts.zip(lines));
+    numbered.find_map(|(number, (text, line))| {
+        let own = serde_json::to_string(line).unwrap_or_default();
+        let text = text.strip_suffix(b"\n").unwrap_or(text);
+        if text == own.as_bytes() {
+            return None;
+        }
+        let same = text.iter().zip(own.as_bytes());
+        let column = same.take_while(|(one, other)| one == other).count() + 1;
+        Some(format!(
+            "line {number}, column {column}: this program writes the line in other bytes"
+        ))
+    })
+}
+
 /// Parses a line. The error has the column, counted from 1, and the reason.
 fn parse(bytes: &[u8]) -> Result<RecordLine, (usize, String)> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
@@ -152,6 +170,7 @@ impl Order {
                 verdict(name)?;
                 in_time(Span::from_units(*took))
             }
+            _ if self.verdict => Err("an event behind the verdict of its attempt".to_owned()),
             event => match event.event() {
                 Some(event) => self.event(&event),
                 None => Err("this is an event that cannot be".to_owned()),

@@ -13,7 +13,7 @@ use super::folder::EvidenceError;
 use super::header::{Header, header};
 use super::keep::left_out;
 use super::qualified;
-use super::read::{RecordError, read};
+use super::read::{RecordError, read, unlike_written};
 use super::record::RecordLine;
 use super::reports;
 use super::rerun::rerun;
@@ -204,6 +204,10 @@ impl Opened {
             offset: 0,
             message,
         })?;
+        if header.program == env!("CARGO_PKG_VERSION") {
+            let unlike = unlike_written(record, &lines);
+            files.extend(unlike.map(|why| format!("{RECORD}, {why}")));
+        }
         Ok(Self {
             left_out: left_out(&lines, header.keep),
             lines,

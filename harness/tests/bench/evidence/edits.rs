@@ -83,6 +83,34 @@ fn findings_of_a_qualification() {
     ended(&verify(), 0, "0 things wrong");
 }
 
+/// A record with other bytes of the same meaning is none that this program writes.
+#[test]
+fn another_form_of_a_record() {
+    let kept = kept(Desk::new(OWN), "run", false);
+    let text = kept.text();
+    ended(&kept.verified_text(&text), 0, "0 things wrong");
+    let words = "this program writes the line in other bytes";
+    for (from, to) in [
+        ("{\"kind\":\"begin\",", "{\"kind\": \"begin\","),
+        (
+            "\"kind\":\"verdict\",\"verdict\":\"failed\"",
+            "\"verdict\":\"failed\",\"kind\":\"verdict\"",
+        ),
+        ("\"byte\":\"FF\"", "\"byte\":\"ff\""),
+    ] {
+        let edited = text.replacen(from, to, 1);
+        assert_ne!(edited, text, "{from}");
+        ended(&kept.verified_text(&edited), 1, words);
+    }
+    // The verdict is the last line of its attempt.
+    let mut lines = kept.lines();
+    let verdict = |line: &Value| line["kind"] == "verdict";
+    let at = lines.iter().position(verdict).expect("a verdict");
+    lines.swap(at - 1, at);
+    let words = "an event behind the verdict of its attempt";
+    ended(&kept.verified(&lines), 2, words);
+}
+
 /// A failure that is stated as left out by the limits cannot be found where the rig has such limits, and verify says so.
 #[test]
 fn a_failure_stated_as_left_out() {
