@@ -128,7 +128,10 @@ pub fn verify_merged(
     path: &Path,
     signer: Option<Signer<'_>>,
 ) -> Result<(Verified, Merged), EvidenceError> {
-    let made = make(path)?;
+    let made = make(path).map_err(|error| match error {
+        EvidenceError::Merge(why) => EvidenceError::Foreign(path.display().to_string(), why),
+        other => other,
+    })?;
     let mut verified = Verified {
         complete: made.merged.missing.is_empty(),
         ..Verified::default()

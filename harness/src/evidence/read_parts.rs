@@ -172,13 +172,16 @@ impl ReadPart {
 
 /// Refuses what is no folder of its own: a link would let what is elsewhere be checked.
 fn is_folder(path: &Path) -> Result<(), EvidenceError> {
-    match fs::symlink_metadata(path).map_err(failed(path))?.is_dir() {
-        true => Ok(()),
-        false => Err(EvidenceError::Merge(format!(
-            "{} is not a folder",
-            path.display()
-        ))),
-    }
+    let kind = fs::symlink_metadata(path)
+        .map_err(failed(path))?
+        .file_type();
+    let what = match (kind.is_dir(), kind.is_symlink()) {
+        (true, _) => return Ok(()),
+        (_, true) => "a symbolic link, which has no place in evidence",
+        _ => "not a folder",
+    };
+    let path = path.display();
+    Err(EvidenceError::Merge(format!("{path} is {what}")))
 }
 
 /// The parts of a merged folder.

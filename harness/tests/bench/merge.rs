@@ -136,7 +136,10 @@ fn a_missing_part_is_never_passed() {
     let place = desk.path("all-of-it/parts");
     fs::rename(&place, desk.path("elsewhere")).expect("a folder");
     std::os::unix::fs::symlink(desk.path("elsewhere"), &place).expect("a link");
-    ended(&desk.run(&["verify", "all-of-it"]), 2, "is not a folder");
+    let linked = desk.run(&["verify", "all-of-it"]);
+    let words = "parts is a symbolic link, which has no place in evidence";
+    ended(&linked, 2, words);
+    ended(&linked, 2, "all-of-it is not an evidence folder: ");
     ended(
         &merge(&desk, &folders, "strict", &["--require-all"]),
         5,
