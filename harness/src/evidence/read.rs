@@ -70,7 +70,9 @@ pub(super) fn unlike_written(bytes: &[u8], lines: &[RecordLine]) -> Option<Strin
     let texts = bytes.split_inclusive(|byte| *byte == b'\n');
     let mut numbered = (1..).zip(texts.zip(lines));
     numbered.find_map(|(number, (text, line))| {
-        let own = serde_json::to_string(line).unwrap_or_default();
+        // Bytes and times of an event are written from their values.
+        let event = line.event().and_then(|event| RecordLine::of(&event));
+        let own = serde_json::to_string(event.as_ref().unwrap_or(line)).unwrap_or_default();
         let text = text.strip_suffix(b"\n").unwrap_or(text);
         if text == own.as_bytes() {
             return None;
