@@ -1,3 +1,5 @@
+//! A record that is played back: what it gives, and what it makes of a caller that does something else.
+
 use super::*;
 use crate::link::Octets;
 use harness_proto::line::Rate;
