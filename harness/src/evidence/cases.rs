@@ -216,7 +216,11 @@ impl Opened {
             name: name.to_owned(),
             text: text.to_owned().into(),
         };
-        let drives = self.header.way.rings.first().map(|ring| ring.drives());
+        // A rig on another bus has no ring for which a scenario could be made.
+        let rings = self.rig.port().is_none().then_some(&self.header.way.rings);
+        let drives = rings
+            .and_then(|rings| rings.first())
+            .map(|ring| ring.drives());
         Entry::fitting(source, drives).map_err(|problems| problems.to_string())
     }
 

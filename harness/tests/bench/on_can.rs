@@ -3,7 +3,7 @@
 
 use crate::edits;
 use crate::program::{Desk, ended, said};
-use std::process::Output;
+use std::process::{Command, Output};
 
 const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n";
 
@@ -202,6 +202,24 @@ fn a_scenario_that_only_waits_judges_nothing() {
     let kept = run(&desk, &["wait.scn", "--evidence", "kept"]);
     ended(&kept, 5, "nothing was judged");
     ended(&desk.run(&["verify", "kept"]), 0, "1 attempt judged again");
+}
+
+/// Scenarios for rings are left out, whatever the sizes of their rings, and the evidence of it is not refused.
+#[test]
+fn scenarios_of_other_buses_are_left_out_with_evidence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("kept");
+    let program = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(arguments).arg(&kept);
+        command.output().expect("the program")
+    };
+    for rig in ["sim:unitek:1", "sim:nordac:2"] {
+        let more = ["unitek-ex-2-lock", "9.2-pause", "--rig", rig, "--evidence"];
+        let _played = program(&[&["run"], &more[..]].concat());
+        ended(&program(&["verify"]), 0, "0 things wrong");
+        std::fs::remove_dir_all(&kept).expect("evidence");
+    }
 }
 
 /// An edit of any line or file is found: the drives are simulated, so that the run can be played again.
