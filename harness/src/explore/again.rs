@@ -36,14 +36,14 @@ pub(crate) fn played_again<C: FuzzCase>(
     let mut confirmation = Confirmation::new(about.confirm, about.of, known);
     let before = tried.before.as_deref();
     C::confirm(&mut confirmation, &mut again, &rehearsal, before, target)?;
-    Ok(match again == *finding {
-        true => JudgedAgain::Same,
-        false => JudgedAgain::Differs(format!(
-            "the file has \"{}\", its conversation gives \"{}\"",
-            told(finding),
-            told(&again)
-        )),
-    })
+    if again == *finding {
+        return Ok(JudgedAgain::Same);
+    }
+    let (kept, found) = (told(finding), told(&again));
+    Ok(JudgedAgain::Differs(match kept == found {
+        true => "its conversation does not differ as the finding says".to_owned(),
+        false => format!("the file has \"{kept}\", its conversation gives \"{found}\""),
+    }))
 }
 
 /// A finding in a line.
