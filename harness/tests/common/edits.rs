@@ -265,13 +265,29 @@ pub(crate) fn check_each(kept: &Kept, nth: usize) {
         for to in [1, count / 4, count / 2, count - 2] {
             let mut moved = deleted.clone();
             moved.insert(to, line.clone());
-            if moved != lines && !kept.refused(&moved) {
+            let same = match kept.ports {
+                // Bytes with the same value may come at each other's times: nothing confirms the clock of the computer.
+                true => timeless(&moved) == timeless(&lines),
+                false => moved == lines,
+            };
+            if !same && !kept.refused(&moved) {
                 let _infallible = writeln!(accepted, "line {} moved to {}: {line}", at + 1, to + 1);
             }
         }
     }
     files(kept, nth, &mut accepted);
     assert!(accepted.is_empty(), "verify accepts:\n{accepted}");
+}
+
+/// The lines of a record without the times of received bytes.
+fn timeless(lines: &[Value]) -> Vec<Value> {
+    let mut lines = lines.to_vec();
+    for line in &mut lines {
+        if line["kind"] == "received" {
+            line["t"] = Value::Null;
+        }
+    }
+    lines
 }
 
 /// Each file of the folder but the record, with a byte more, and one that does not belong there.
