@@ -404,7 +404,7 @@ impl Opened {
             );
         }
         all.push(
-            "what nothing recorded depends on in the rig's file: of it the id, the drives and how they answer, the rate, the tolerance, the capabilities and the number of attempts are compared; other values, such as max_speed, serial numbers, interlocks, hooks and the safe state, are not",
+            "values of the rig's file on which nothing recorded depends, such as max_speed, serial numbers, interlocks, hooks and the safe state",
         );
         let mut all: Vec<_> = all.into_iter().map(str::to_owned).collect();
         if !self.left_out.is_empty() {

@@ -153,7 +153,7 @@ fn what_is_not_compared_is_stated() {
     ended(
         &output,
         0,
-        "unconfirmed  what nothing recorded depends on in the rig's file",
+        "unconfirmed  values of the rig's file on which nothing recorded depends",
     );
     let said = crate::program::said(&output);
     assert!(!said.contains("scenarios that were skipped"), "{said}");
