@@ -160,16 +160,18 @@ mod tests {
 
     const NOW: Instant = Instant::START;
 
+    /// Reads a cell of the EEPROM in which `value` is found.
+    fn read(drive: &mut Program, address: u8, value: u8) -> Option<bool> {
+        drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
+        drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
+        drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
+        drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
+    }
+
     /// ND21 14.2.2, 14.10.5: a cell that only a master changes holds what was read before, whatever was written to other cells.
     #[test]
     fn the_eeprom_holds_what_was_read() {
         let mut drive = Program::default();
-        let read = |drive: &mut Program, address, value| {
-            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
-            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
-            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
-            drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
-        };
         assert_eq!(read(&mut drive, 0xDC, 0x77), None);
         drive.write(ram::EEPROM_CONTROL, Write::Set(0x10), NOW);
         assert_eq!(read(&mut drive, 0x05, 0x01), None);
@@ -189,12 +191,6 @@ mod tests {
     #[test]
     fn the_eeprom_holds_what_was_copied() {
         let mut drive = Program::default();
-        let read = |drive: &mut Program, address, value| {
-            drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
-            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE), NOW);
-            drive.read(ram::EEPROM_CONTROL, (0x01, READ), Some(NOW));
-            drive.read(ram::EEPROM_BUFFER, (address, value), Some(NOW))
-        };
         for address in [0x1F, 0x20, 0x3F, 0x40] {
             drive.write(ram::EEPROM_BUFFER, Write::Set(address), NOW);
             drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5), NOW);
