@@ -88,7 +88,7 @@ pub(crate) fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<
 struct Reader<L: Language> {
     title: Option<String>,
     sources: Vec<Citation>,
-    bus: Option<Bus>,
+    bus: Option<Spanned<Bus>>,
     header: L::Header,
     needs: Vec<Capability>,
     strict: bool,
@@ -149,12 +149,14 @@ impl<L: Language> Reader<L> {
                 Ok(())
             }
             "bus" => {
-                let bus = match scanner.eat_word(L::NAME) {
+                let here = scanner.here();
+                let value = match scanner.eat_word(L::NAME) {
                     true => L::BUS,
                     false => named(scanner, &Bus::NAMES, "a bus")?,
                 };
+                let span = scanner.since(here);
                 scanner.expect_end()?;
-                once(&mut self.bus, bus, word)
+                once(&mut self.bus, Spanned { value, span }, word)
             }
             "needs" => {
                 while !scanner.at_end() {
@@ -177,7 +179,11 @@ impl<L: Language> Reader<L> {
     }
 
     fn finish(mut self, part: Part) -> Result<Scenario<L>, Vec<Problem>> {
-        let bus = self.bus.unwrap_or(Bus::DEFAULT);
+        let other = self.bus.as_ref().filter(|own| own.value != L::BUS);
+        if let (Part::Header, Some(other)) = (part, other) {
+            self.problems.push(for_another_bus(other, L::BUS));
+        }
+        let bus = self.bus.map_or(Bus::DEFAULT, |own| own.value);
         if part == Part::Whole && self.problems.is_empty() {
             let no_step = self.steps.is_empty().then(|| no_step(L::EXAMPLE));
             self.problems
@@ -220,6 +226,12 @@ fn no_header_line<L: Language>(step: &Step<L>) -> Problem {
         L::HEADER_EXAMPLE
     );
     Problem::new(step.span, what, expected)
+}
+
+fn for_another_bus(named: &Spanned<Bus>, own: Bus) -> Problem {
+    let what = format!("these drives are on the bus `{}`", own.name());
+    let expected = format!("no `bus` line, or `bus {}`, expected here", own.name());
+    Problem::new(named.span, what, expected)
 }
 
 fn no_step(example: &str) -> Problem {

@@ -209,6 +209,10 @@ fn mistakes_are_shown_with_line_and_column() {
             ),
         ),
         (
+            "a setup line of another bus",
+            format!("{sim}[sim]\nsetup = [\"drive 0 input GPIN3 high\", \"bus unitek\"]"),
+        ),
+        (
             "a setup line for a ring of another size",
             format!("{sim}[sim]\nsetup = [\"drive 0 input GPIN3 high\", \"ring 5\"]"),
         ),

@@ -89,6 +89,10 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             ),
         ),
         (
+            "a setup line of another bus",
+            port("[sim]\nbus = \"unitek\"\nsetup = [\"title T\", \"bus novobus\"]"),
+        ),
+        (
             "a setup line of another drive",
             port("[sim]\nbus = \"unitek\"\nsetup = [\"drive 2\"]"),
         ),
