@@ -447,7 +447,12 @@ pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Op
             };
             let rig = rings.iter().map(|ring| ring.drives()).collect();
             let skip = Skip::other_size(plan.sizes.clone(), rig);
-            Some(skip.and(lacks_as_well(plan, link, is_inner)))
+            let skip = skip.and(lacks_as_well(plan, link, is_inner));
+            match skip.unlocks.contains(&Unlock::Simulated) {
+                // No ring behind a port would do, of whatever size.
+                true => lacks(plan, link),
+                false => Some(skip),
+            }
         }
     }
 }
@@ -528,4 +533,32 @@ pub(crate) fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
     twin.rest_through_self_tests();
     Ok(twin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::Entry;
+    use crate::link::Replay;
+    use crate::scenario::source::Source;
+    use harness_proto::line::Rate;
+
+    /// No ring behind a port has what only the simulator has: the size is then no reason.
+    #[test]
+    fn what_needs_the_simulator_is_not_for_another_size() {
+        let link = Replay::new(Vec::new(), Rate::default(), Span::ZERO, vec![1], Vec::new());
+        let reason = |needs: &str| {
+            let text = format!("title t\nsource nd21 9.1\nring 3\n{needs}\n> 80\n");
+            let source = Source::from_bytes("t.scn".to_owned(), text.into_bytes());
+            let entry = Entry::new(source.expect("a text"), None).expect("a scenario");
+            let rings = [RingSize::new(1).expect("a ring")];
+            let skip = entry.plan.and_then(|plan| not_played(&plan, &link, &rings));
+            let skip = skip.expect("a reason");
+            (skip.why.group(), skip.unlocks.into_iter().collect())
+        };
+        let simulator = "the rig has no simulator".to_owned();
+        assert_eq!(reason("needs power"), (simulator, vec![Unlock::Simulated]));
+        let size = "it is for rings of another size".to_owned();
+        assert_eq!(reason(""), (size, vec![Unlock::Rings(vec![(3, 3)])]));
+    }
 }
