@@ -383,6 +383,7 @@ mod tests {
             expected: byte(100),
             received: byte(100 + late.unwrap_or(0)),
             role: Role::Foreign,
+            rule: Role::Foreign.rule(),
             step: Some(step),
             drive: Some(1),
         };

@@ -18,6 +18,7 @@ pub(crate) mod manual;
 pub mod qualify;
 pub mod report;
 pub mod rig;
+pub(crate) mod section;
 pub mod serve;
 pub mod simulate;
 pub mod stream;

@@ -78,12 +78,12 @@ fn a_finding_is_made_readable() {
     );
     insta::assert_snapshot!(page(&finding, shrunk), @"
     title   small
-    source  nd21 10.1 read-byte
+    source  nd21 10.2 write-byte
     ring    1
     strict
 
-    # byte 12: another value: received 00 at 3.724 ms, the manual says 01 at 3.724 ms (ND21 10.1, data of
-    # the answer)
+    # byte 12: another value: received 00 at 3.724 ms, the manual says 01 at 3.724 ms (ND21 10.2, contents
+    # of a cell)
     # found on drive 0 deviates writes-ignored
     > 8A FF 82 01 80 FD 01           # drive 0: WriteByte 01 to FD80
     > 88 FF C0 80 FD 3D              # drive 0: ReadByte FD80

@@ -223,8 +223,6 @@ pub(crate) struct RingModel {
     drives: Vec<Drive>,
     /// The answers under way, by their drives.
     answers: BTreeMap<u8, Answer>,
-    /// By which rule a cell got what it holds: drive and address, and the section of the manual.
-    wrote: BTreeMap<(u8, u16), &'static str>,
 }
 
 /// An answer under way (ND21 9.5).
@@ -232,8 +230,6 @@ pub(crate) struct RingModel {
 struct Answer {
     /// How many bytes it has when it is complete.
     length: usize,
-    /// The section of its command.
-    section: &'static str,
     /// What was received of it.
     bytes: Vec<u8>,
     /// Whether some of that was the drive's choice.
@@ -247,7 +243,6 @@ impl RingModel {
             properties,
             drives: vec![Drive::new(properties); usize::from(size.drives())],
             answers: BTreeMap::new(),
-            wrote: BTreeMap::new(),
         }
     }
 
@@ -332,25 +327,12 @@ impl RingModel {
         self.drives.get_mut(place)
     }
 
-    /// The section of the rule that a byte with this role obeys: for what a cell holds, that by which it was written.
-    pub(crate) fn section(&self, role: Role) -> &'static str {
-        match role {
-            Role::Data {
-                drive: Some(drive),
-                address,
-            } => self.wrote.get(&(drive, address)).copied(),
-            _ => None,
-        }
-        .unwrap_or(role.rule().0)
-    }
-
     /// Takes over what was received for a byte that was sent.
     pub(crate) fn take(&mut self, (sent, role): (u8, Role), must: Must, received: u8) {
         if matches!(role, Role::CheckSequence | Role::Foreign) {
             self.answers.clear();
         }
         let Some(drive) = role.drive() else { return };
-        self.note_writes(drive, role);
         let (Role::Command { .. } | Role::Data { .. } | Role::Check { .. }) = role else {
             return;
         };
@@ -360,7 +342,6 @@ impl RingModel {
             let layout = layout(sent, read_long);
             Answer {
                 length: layout.map_or(1, Layout::length),
-                section: layout.map_or("9.5", |layout| layout.section),
                 bytes: Vec::new(),
                 open: false,
             }
@@ -378,27 +359,5 @@ impl RingModel {
         }
         self.answers
             .retain(|_, answer| answer.bytes.len() < answer.length);
-    }
-
-    /// Notes which cells the addressed drive has written with a byte, or has refused to write with it.
-    fn note_writes(&mut self, drive: u8, role: Role) {
-        let section = match role {
-            Role::ProcessData { .. } => "9.4",
-            _ => self.answers.get(&drive).map_or("9.5", |own| own.section),
-        };
-        let Some(own) = self.drive(drive) else { return };
-        let written = own.cells[0].writes.clone();
-        let refused = match role {
-            Role::Check {
-                writes: Some((address, width)),
-                ..
-            } if written.is_empty() => address..address.saturating_add(u16::from(width)),
-            _ => 0..0,
-        };
-        let cells = written.into_iter().filter(|cell| *cell != ram::BUS_ADDR);
-        let cells = cells.map(|cell| ((drive, cell), section));
-        // What is not written because its checking byte is wrong (9.6).
-        let refused = refused.map(|cell| ((drive, cell), "9.6"));
-        self.wrote.extend(cells.chain(refused));
     }
 }

@@ -4,6 +4,7 @@ use super::case::{Act, ActKind, Case, Harm, OtherRing, Talk, To};
 use super::expect::{Both, Must, RingModel};
 use super::oracle::{Difference, sent};
 use super::order::RawCommand;
+use crate::buses::novobus::section::SentBytes;
 use crate::buses::novobus::twin;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -56,8 +57,8 @@ struct Mismatch {
     index: usize,
     what: twin::Symptom,
     must: Option<Must>,
-    role: Role,
-    section: &'static str,
+    /// The section of the manual with the rule, and the rule in a few words.
+    rule: (&'static str, &'static str),
     /// The drive that the telegram of the byte addresses. `None` behind an error: drives in the error mode read no telegrams (ND21 9.7).
     meant: Option<u8>,
 }
@@ -169,7 +170,8 @@ impl Judge {
         let roles = roles_with(self.size, &all, &self.model.properties);
         let mut counts = vec![0; usize::from(self.size.drives()) + 1];
         let mut index = 0;
-        for ((byte, _), role) in exchange.sent.iter().zip(&roles[self.sent.len()..]) {
+        for (place, (byte, _)) in (self.sent.len()..).zip(&exchange.sent) {
+            let role = &roles[place];
             let meant = role.answering().filter(|_| !self.model.any_in_error());
             for out in around(&mut self.model, *byte, &mut counts, &exchange.harms) {
                 let Some(must) = self.model.must(out, *role) else {
@@ -186,8 +188,17 @@ impl Judge {
                         twin::Symptom::Value if self.is_shifted(exchange) => twin::Symptom::Surplus,
                         other => other,
                     };
-                    let found = self.mismatch(index, what, Some(must), *role);
-                    return Err(Mismatch { meant, ..found });
+                    let sent = SentBytes {
+                        bytes: &all,
+                        roles: &roles,
+                    };
+                    return Err(Mismatch {
+                        index,
+                        what,
+                        must: Some(must),
+                        rule: sent.broken(place, what),
+                        meant,
+                    });
                 }
             }
             if self.model.was_reset() {
@@ -195,7 +206,13 @@ impl Judge {
             }
         }
         match index < exchange.received.len() {
-            true => Err(self.mismatch(index, twin::Symptom::Surplus, None, Role::Foreign)),
+            true => Err(Mismatch {
+                index,
+                what: twin::Symptom::Surplus,
+                must: None,
+                rule: Role::Foreign.rule(),
+                meant: None,
+            }),
             false => Ok(()),
         }
     }
@@ -219,30 +236,8 @@ impl Judge {
         }
     }
 
-    fn mismatch(
-        &self,
-        index: usize,
-        what: twin::Symptom,
-        must: Option<Must>,
-        role: Role,
-    ) -> Mismatch {
-        let section = self.model.section(role);
-        Mismatch {
-            index,
-            what,
-            must,
-            role,
-            section,
-            meant: None,
-        }
-    }
-
     fn difference(&self, found: &Mismatch, exchange: &BytesExchanged) -> Difference {
-        let (own, rule) = found.role.rule();
-        let rule = match found.section == own {
-            true => rule,
-            false => "what a cell holds behind it",
-        };
+        let (section, rule) = found.rule;
         let received = match exchange.received.get(found.index) {
             None => "nothing".to_owned(),
             Some(Received { byte, error: None }) => format!("{byte:02X}"),
@@ -259,7 +254,7 @@ impl Judge {
             }
         };
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
-        let (what, number, section) = (found.what.words(), found.index + 1, found.section);
+        let (what, number) = (found.what.words(), found.index + 1);
         Difference {
             what: found.what,
             section: section.to_owned(),

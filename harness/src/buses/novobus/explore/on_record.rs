@@ -133,6 +133,7 @@ pub(super) fn untimely(
         expected: Some((at(sent) + round, received[index])),
         received: Some((at(times.came[index]), received[index])),
         role,
+        rule: role.rule(),
         step: None,
         drive: None,
     }))
@@ -298,6 +299,7 @@ mod tests {
                 expected: None,
                 received: None,
                 role: Role::Foreign,
+                rule: Role::Foreign.rule(),
                 step: None,
                 drive: None,
             });

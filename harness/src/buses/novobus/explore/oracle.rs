@@ -8,6 +8,7 @@ use super::setup::{drive_name, is_first};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::calm::calm;
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::section::SentBytes;
 use crate::buses::novobus::twin::{self, Symptom};
 use crate::link::{Link, Octets, link_name};
 use harness_proto::line::Received;
@@ -97,7 +98,7 @@ impl Difference {
 
 impl From<&twin::Divergence> for Difference {
     fn from(found: &twin::Divergence) -> Self {
-        let (section, rule) = found.role.rule();
+        let (section, rule) = found.rule;
         Self {
             what: found.what,
             section: section.to_owned(),
@@ -133,8 +134,13 @@ pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Opti
         None => (pairs().position(|(a, b)| a.0 != b.0)?, Symptom::Time),
     };
     let sent = sent(case);
-    let found = twin::answering(&roles(size, &sent), &sent).nth(index);
+    let roles = roles(size, &sent);
+    let found = twin::answering(&roles, &sent).nth(index);
     let (place, role) = found.unwrap_or((sent.len(), Role::Foreign));
+    let bytes = SentBytes {
+        bytes: &sent,
+        roles: &roles,
+    };
     let is_calm = calm(size, &sent).get(place) == Some(&true);
     let divergence = twin::Divergence {
         ring: case.ring(),
@@ -143,6 +149,7 @@ pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Opti
         expected: expected.get(index).copied(),
         received: received.get(index).copied(),
         role,
+        rule: bytes.broken(place, what),
         step: None,
         drive: None,
     };
@@ -450,6 +457,7 @@ mod tests {
                 expected: None,
                 received: None,
                 role,
+                rule: role.rule(),
                 step: None,
                 drive: None,
             };

@@ -105,8 +105,8 @@ impl Sighting {
             received.get(place).map(|own| own.2.byte)
         };
         let (meant, section, end) = sent.blame(index, drives, found, &came);
-        let word_of_bytes = sent.is_word_of_bytes(index);
-        let is_short = sent.is_short(index);
+        let word_of_bytes = sent.sent_bytes().is_word_of_bytes(index);
+        let is_short = sent.sent_bytes().is_short(index);
         let (role, byte) = (sent.roles[index], sent.bytes[index].0);
         let is_refused = (index..index + 2).all(|at| came(at).is_none_or(|byte| byte == 0));
         let zeros = (before..index).rev().take_while(|at| came(*at) == Some(0));
@@ -358,7 +358,7 @@ impl Sent {
         let passed = expected == Some(0) && !refused && came(index) == Some(self.bytes[index].0);
         match meant {
             Meant::Behind(drive) if passed => {
-                return (Meant::Own(drive), self.of_error(index), end);
+                return (Meant::Own(drive), self.sent_bytes().of_error(index), end);
             }
             _ => {}
         }
@@ -385,8 +385,11 @@ impl Sent {
         let section = (of_own && late)
             .then_some("9.7")
             .or_else(|| (refused && self.is_behind_a_silence(index)).then_some("9.9"))
-            .or_else(|| self.comes_back(index, came))
-            .unwrap_or_else(|| self.section(index, refused && before == Some(0)));
+            .or_else(|| self.sent_bytes().comes_back(index, came))
+            .unwrap_or_else(|| {
+                self.sent_bytes()
+                    .section(index, refused && before == Some(0))
+            });
         (meant, section, end)
     }
 

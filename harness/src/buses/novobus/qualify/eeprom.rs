@@ -1,7 +1,7 @@
 //! A march over the EEPROM of each drive (ND21 14.10.5): every cell is written with the complement of what it holds, read, and written with
 //! the old value again. What a cell holds is read first, so the scenarios depend on the drive. Then `ProgParam` is to copy the parameters.
 
-use super::exchange::EEPROM;
+use crate::buses::novobus::section::EEPROM;
 use crate::buses::novobus::twin::Conversation;
 use crate::library::Entry;
 use crate::scenario::source::Source;

@@ -2,6 +2,7 @@
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
 use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep};
+use crate::buses::novobus::section::{EEPROM, SentBytes};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{HARMLESS, Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
@@ -25,9 +26,6 @@ const MOST_BYTES: usize = 20_000;
 
 /// From this number of bytes on, only the telegrams to the drive in question are played again.
 const LONG: usize = 8_000;
-
-/// The ports of the EEPROM (ND21 14.10.5): values written there persist over a reset.
-pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
 
 /// Orders to the controller of the EEPROM (14.10.5.1), and the cells that no function of the drive uses (14.10.5.3).
 const READ_BYTE: u8 = 0x81;
@@ -90,6 +88,12 @@ impl Sent {
         }
         own.roles = roles(RingSize::new(u64::from(drives)).ok()?, &own.bytes);
         Some(own)
+    }
+
+    /// The bytes, and what each is for.
+    pub(super) fn sent_bytes(&self) -> SentBytes<'_> {
+        let Self { bytes, roles, .. } = self;
+        SentBytes { bytes, roles }
     }
 
     fn gap(&mut self, gap: Span) {

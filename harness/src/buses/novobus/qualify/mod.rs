@@ -11,7 +11,6 @@ mod parts;
 mod pinned;
 mod probes;
 mod qualification;
-mod section;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};

@@ -117,7 +117,7 @@ fn diverged(
     divergence: &Divergence,
     facts: &AttemptFacts<'_>,
 ) -> Option<Explanation> {
-    let rule = format!("nd21 {}", divergence.role.rule().0);
+    let rule = format!("nd21 {}", divergence.rule.0);
     let mut known = facts.rig.file.deviation.iter();
     let may_be = divergence.drive.or(divergence.role.drive());
     match known.find(|entry| by_hand(entry) && entry.explains(&rule, divergence.ring, may_be)) {

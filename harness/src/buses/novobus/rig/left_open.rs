@@ -76,7 +76,7 @@ struct FirstDifference {
     /// In which conversation, counted from 1; 0 where the choice makes no ring.
     conversation: usize,
     /// How; `None` where the choice makes no ring.
-    divergence: Option<Divergence>,
+    divergence: Option<Box<Divergence>>,
     /// How many bytes were compared up to there. What ends its comparison before explains nothing (ND21 9.9).
     compared: u64,
 }
@@ -99,7 +99,7 @@ fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
     let last = comparisons.last().filter(|own| own.silenced)?;
     Some(FirstDifference {
         conversation: comparisons.len(),
-        divergence: last.divergence.clone(),
+        divergence: last.divergence.clone().map(Box::new),
         compared: compared(comparisons),
     })
 }
@@ -212,7 +212,7 @@ fn compare(
     let conversation = comparisons.len();
     // What differs behind a silence of the bench says nothing about a choice.
     let last = comparisons.last().filter(|own| !own.silenced);
-    match last.and_then(|own| own.divergence.clone()) {
+    match last.and_then(|own| own.divergence.clone()).map(Box::new) {
         None => Ok(comparisons),
         divergence => Err((
             FirstDifference {

@@ -172,6 +172,7 @@ impl Comparer<'_> {
                 expected: due,
                 received: came,
                 role,
+                rule: rows.broken(index, what),
                 step: step_at(index),
                 drive,
             };
@@ -506,6 +507,7 @@ impl Comparer<'_> {
                 expected: Some(expected),
                 received: Some(received),
                 role,
+                rule: role.rule(),
                 step: step(),
                 drive: None,
             });

@@ -94,6 +94,8 @@ pub struct Divergence {
     pub received: Option<(Instant, Received)>,
     /// What the byte is for.
     pub role: Role,
+    /// The section of the ND21 manual with the rule that is broken, and the rule in a few words.
+    pub rule: (&'static str, &'static str),
     /// The step of the scenario that was running when the byte was sent, as a place in its text.
     pub step: Option<usize>,
     /// The drive whose answers are the only differing bytes of the conversation; `None` if the bytes do not show which drive is wrong.
@@ -132,7 +134,7 @@ impl fmt::Display for Divergence {
                 Some(error) => format!("{:02X} ({error}) at {at}", byte.byte),
             },
         };
-        let (section, rule) = self.role.rule();
+        let (section, rule) = self.rule;
         let what = self.what.words();
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         write!(f, "byte {}{ring}", self.byte)?;

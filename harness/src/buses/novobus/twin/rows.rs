@@ -2,6 +2,7 @@
 
 use super::comparison::Symptom;
 use crate::buses::novobus::calm::calm;
+use crate::buses::novobus::section::SentBytes;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
@@ -32,6 +33,16 @@ pub(super) struct Rows<'a> {
 impl Rows<'_> {
     pub(super) fn role(&self, index: usize) -> Role {
         self.roles.get(index).copied().unwrap_or(Role::Foreign)
+    }
+
+    /// The section of the manual with the rule that a byte breaks, and the rule in a few words.
+    pub(super) fn broken(&self, index: usize, what: Symptom) -> (&'static str, &'static str) {
+        let bytes: Vec<_> = self.sent.iter().map(|byte| (*byte, true)).collect();
+        let sent = SentBytes {
+            bytes: &bytes,
+            roles: self.roles,
+        };
+        sent.broken(index, what)
     }
 
     /// Whether the model refuses the command of an answer, or is in the error mode: then 00 stands in the place of data too (ND21 9.7).

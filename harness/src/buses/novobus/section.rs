@@ -1,11 +1,12 @@
-//! The section of the rule that a byte of an attempt obeys.
+//! The section of the rule that a byte of the master's obeys.
 
-use super::exchange::{EEPROM, Sent};
+use super::twin::Symptom;
 use harness_proto::nd21::io::OUTPUTS;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::Role;
 use harness_proto::novobus::sync::{Addressing, SyncByte};
+use std::ops::RangeInclusive;
 
 /// The command bytes that read several cells (10.1).
 const READ_WORD: u8 = 0xC1;
@@ -14,10 +15,34 @@ const READ_LONG: u8 = 0xC7;
 /// The section of WriteIO.
 const WRITE_IO: &str = "10.4";
 
-impl Sent {
+/// The ports of the EEPROM (ND21 14.10.5): values written there persist over a reset.
+pub(crate) const EEPROM: RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
+
+/// Bytes that the master sent into a ring, and what each is for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SentBytes<'a> {
+    /// The bytes, and whether each went round whole.
+    pub(crate) bytes: &'a [(u8, bool)],
+    /// What each is for.
+    pub(crate) roles: &'a [Role],
+}
+
+impl SentBytes<'_> {
+    /// The section of the ND21 manual with the rule that the answer to a byte breaks, and the rule in a few words.
+    pub(crate) fn broken(self, index: usize, what: Symptom) -> (&'static str, &'static str) {
+        let role = self.roles.get(index).copied().unwrap_or(Role::Foreign);
+        match (role, what) {
+            (Role::Data { .. }, Symptom::Value) => match self.section(index, false) {
+                "10.1" => role.rule(),
+                section => (section, "contents of a cell"),
+            },
+            _ => role.rule(),
+        }
+    }
+
     /// The section of the rule that a byte obeys: for what a cell holds, that of the command by which it was written; for the checking byte of
     /// an answer that was refused before, that of the command.
-    pub(super) fn section(&self, index: usize, refused: bool) -> &'static str {
+    pub(crate) fn section(self, index: usize, refused: bool) -> &'static str {
         let role = self.roles[index];
         match role {
             Role::Data {
@@ -41,7 +66,7 @@ impl Sent {
 
     /// The section of the addressing that the telegram of a byte has, if the rest of its command comes back as it was sent: then the drive has
     /// not taken the command for its own. `came` is what was received in the place of a byte.
-    pub(super) fn comes_back(
+    pub(crate) fn comes_back(
         &self,
         index: usize,
         came: &dyn Fn(usize) -> Option<u8>,
@@ -54,7 +79,7 @@ impl Sent {
     }
 
     /// Whether a byte stands behind the sync byte of a telegram with a short address (9.2).
-    pub(super) fn is_short(&self, index: usize) -> bool {
+    pub(crate) fn is_short(self, index: usize) -> bool {
         let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync);
         let header = start.map(|start| (start, SyncByte::decode(self.bytes[start].0)));
         match header {
@@ -68,7 +93,7 @@ impl Sent {
 
     /// The section of the rule by which the byte of an error in front of `index` is one: the last byte that is a part of a telegram, or the
     /// one behind it.
-    pub(super) fn of_error(&self, index: usize) -> &'static str {
+    pub(crate) fn of_error(self, index: usize) -> &'static str {
         let part = |role: &&Role| !matches!(role, Role::Foreign | Role::Idle);
         match self.roles[..index].iter().rev().find(part) {
             Some(Role::Address { .. } | Role::ProcessData { .. }) => "9.5",
@@ -78,7 +103,7 @@ impl Sent {
     }
 
     /// Whether ReadWord or ReadLong reads the byte at `index`, of a cell that WriteByte was the last to write.
-    pub(super) fn is_word_of_bytes(&self, index: usize) -> bool {
+    pub(crate) fn is_word_of_bytes(self, index: usize) -> bool {
         let Role::Data {
             drive: Some(drive),
             address,
@@ -107,7 +132,7 @@ impl Sent {
     }
 
     /// The section of what a cell holds that is read at `index`.
-    fn of_cell(&self, index: usize, drive: u8, address: u16) -> &'static str {
+    fn of_cell(self, index: usize, drive: u8, address: u16) -> &'static str {
         match address {
             0..0xFD80 => return "10.1",
             ram::STATUS => return "14.10.1",
@@ -158,7 +183,7 @@ impl Sent {
     }
 
     /// Whether the checking byte of a command is right.
-    fn is_right(&self, check: usize, drive: u8, length: u8) -> bool {
+    fn is_right(self, check: usize, drive: u8, length: u8) -> bool {
         let own = |at: &usize| {
             matches!(self.roles[*at], Role::Command { .. } | Role::Data { .. })
                 && self.roles[*at].drive() == Some(drive)
@@ -170,7 +195,7 @@ impl Sent {
     }
 
     /// Whether a command began in another telegram, or is not the first one of its telegram.
-    fn is_cut(&self, index: usize) -> bool {
+    fn is_cut(self, index: usize) -> bool {
         let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync);
         let Some(start) = start else { return false };
         let here = &self.roles[start..index];
@@ -208,11 +233,13 @@ mod tests {
                 let exchange = Exchange::new(3, 1, command);
                 exchange.expect("a drive").bytes
             });
-            let mut sent = Sent::default();
-            sent.bytes = bytes.map(|byte| (byte, true)).collect();
+            let mut bytes: Vec<_> = bytes.map(|byte| (byte, true)).collect();
             // The checking byte of WriteIO stands behind a sync byte, an address byte, the command and its code.
-            sent.bytes[4].0 += spoilt;
-            sent.roles = roles(RingSize::new(3).expect("a ring"), &sent.bytes);
+            bytes[4].0 += spoilt;
+            let sent = SentBytes {
+                roles: &roles(RingSize::new(3).expect("a ring"), &bytes),
+                bytes: &bytes,
+            };
             let index = sent.bytes.len() - 2;
             let role = sent.roles[index];
             assert!(
