@@ -116,11 +116,16 @@ fn an_adapter_that_comes_back_is_heard() {
     assert!(said.contains("2 bytes, 0 damaged"), "{said}");
 }
 
-/// Nothing is kept before the line of `--trigger`; with it come the bytes in front of it.
+/// Nothing is kept before the line of `--trigger`; with it come the bytes in front of it. The point of a line's time is no text of it.
 #[test]
 fn a_trigger_begins_the_file() {
     let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");
-    for (sent, kept) in [(&[0x42][..], 0), (&[0x42, 0x43], 2)] {
+    let cases = [
+        ("43", &[0x42][..], 0),
+        (".", &[0x42], 0),
+        ("43", &[0x42, 0x43], 2),
+    ];
+    for (trigger, sent, kept) in cases {
         let (far, path) = port();
         let tap = format!("0->master={}", name(&path));
         let arguments = [
@@ -128,13 +133,13 @@ fn a_trigger_begins_the_file() {
             "--tap",
             &tap,
             "--trigger",
-            "43",
+            trigger,
             "-o",
             "t.pcapng",
         ];
         let mut listener = Listener::start(desk.command(&arguments));
         send(&far, sent);
-        listener.hears(if kept > 0 { "43" } else { "42" });
+        listener.hears(if kept > 0 { " 43" } else { " 42" });
         listener.signal(Signal::TERM);
         let (_, said) = listener.end();
         assert!(said.contains("not judged"), "{said}");

@@ -164,8 +164,9 @@ impl<'a> Session<'a> {
     ) -> io::Result<()> {
         for (nanos, words) in said {
             let since = seconds(nanos.saturating_sub(self.began.1));
-            let line = format!("{since} {} {words}", self.taps[place].at.name);
-            let has = |own: &Option<String>| own.as_ref().is_some_and(|own| line.contains(own));
+            let text = format!("{} {words}", self.taps[place].at.name);
+            // The time is left out: its figures are nothing that was heard.
+            let has = |own: &Option<String>| own.as_ref().is_some_and(|own| text.contains(own));
             self.found |= has(&self.arguments.until);
             if self.waiting.is_some() && has(&self.arguments.trigger) {
                 self.files.begins(nanos);
@@ -173,7 +174,7 @@ impl<'a> Session<'a> {
                     self.files.recorder().piece(place, &piece)?;
                 }
             }
-            lines.push(line);
+            lines.push(format!("{since} {text}"));
         }
         Ok(())
     }
