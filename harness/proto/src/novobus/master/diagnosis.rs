@@ -170,12 +170,23 @@ impl Evidence {
             _ if self.received.first().is_some_and(|r| r.error.is_some()) => {
                 Fault::Damaged(RingLink::last())
             }
-            Spelled::Address(drive) if silent => Fault::Broken(RingLink::into(ring, drive)),
+            Spelled::Address(drive) if silent && !self.was_late() => {
+                Fault::Broken(RingLink::into(ring, drive))
+            }
             Spelled::Address(drive) => Fault::Damaged(RingLink::into(ring, drive)),
             Spelled::Nothing => Fault::Silent,
             Spelled::Sound => self.compare(ring, drive),
             Spelled::Noise => Fault::Unclear,
         }
+    }
+
+    /// Whether the byte that was missed came after all: the computer was late, and no link was silent. Zeros are what drives send unasked
+    /// behind a silence (ND21 9.9).
+    fn was_late(&self) -> bool {
+        let missed = self.expected.first().copied().flatten();
+        let came = self.received.first();
+        let right = |byte: &u8| *byte != 0 && came.is_some_and(|received| received.is(*byte));
+        matches!(self.cause, Cause::Missed(_)) && missed.as_ref().is_some_and(right)
     }
 
     /// The fault of a ring in which no drive is in the error mode.

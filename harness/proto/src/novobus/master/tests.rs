@@ -272,6 +272,27 @@ fn an_address_is_believed_when_it_stays() {
     assert_eq!(settled(&zeros_and(20, 250, 40)), None, "no drive");
 }
 
+/// ND21 9.7, 9.9: a byte that was missed and comes after all was late. What a drive spells out behind it is a damaged byte and no silence.
+#[test]
+fn a_late_byte_is_no_silence() {
+    let sent = Sent {
+        composed: Composed::SYNCO,
+        due: Instant::START,
+    };
+    let link = RingLink::into(size(3), 1);
+    for (before, fault) in [
+        (&[0x80, 0x80][..], Fault::Damaged(link)),
+        (&[][..], Fault::Broken(link)),
+    ] {
+        let mut evidence = Evidence::new(Cause::Missed(sent), [].into_iter());
+        for byte in [before, &[0; 25], &[1; 10]].concat() {
+            evidence.see(Received::good(byte));
+        }
+        let spelled = evidence.settled(size(3)).expect("an address");
+        assert_eq!(evidence.name(size(3), spelled, true, None), fault);
+    }
+}
+
 /// Nothing is sent to a ring that does not answer, once all that may be is under way.
 #[test]
 fn what_is_under_way_is_bounded() {
