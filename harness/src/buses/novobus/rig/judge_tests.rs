@@ -178,11 +178,11 @@ fn a_known_deviation_excuses_nothing_else() {
     check(ignores, "", writes, Failed);
     check(ignores, &own, &format!("{READ}< 88 02\n"), Failed);
     check("", &own, &format!("{READ}< 88 02\n"), Failed);
-    // One that the simulator does not have, of another drive.
-    let wrong = "drive 1 deviates checksum-wrong";
-    let reads = "read-byte 1 FE13\n";
+    // One that the simulator does not have, of another drive, and of another section.
+    let (wrong, reads) = ("drive 1 deviates checksum-wrong", "read-byte 1 FE13\n");
     check(wrong, &known("odd-sums", 1, "9.6"), reads, Passed);
     check(wrong, &known("odd-sums", 2, "9.6"), reads, Failed);
+    check(ignores, &known("odd-reads", 1, "10.1"), writes, Failed);
 }
 
 /// ND21 9.9: the number of unasked zeros, and which drive sends the first one, is a race of the drives' clocks.
