@@ -84,7 +84,15 @@ impl Entry {
             let found = settle(bus, &source, size)?;
             return Ok(Self::of_other(source, found));
         }
-        let scenario = parse(&source)?;
+        Self::of_ring(parse(&source)?, source, size)
+    }
+
+    /// A scenario of [`Bus::DEFAULT`], settled.
+    fn of_ring(
+        scenario: Scenario,
+        source: Source,
+        size: Option<u8>,
+    ) -> Result<Self, Box<Problems>> {
         let own = plan(&scenario, &source, size)?;
         Ok(Self {
             name: source.name.clone(),
@@ -118,7 +126,8 @@ impl Entry {
         let scenario: Scenario = parse(&source)?;
         let range = scenario.header.rings.first();
         let fits = |drives: &u8| range.is_some_and(|own| own.contains(*drives));
-        Self::new(source, drives.filter(fits))
+        let size = drives.filter(fits);
+        Self::of_ring(scenario, source, size)
     }
 
     /// The name without folders and ending.
@@ -232,12 +241,15 @@ pub fn names() -> Vec<String> {
 fn built_in() -> Result<Vec<Source>, LibraryError> {
     let mut files = Vec::new();
     collect(&BUILT_IN, &mut files);
-    let mut sources = files
+    let mut files: Vec<_> = files
+        .iter()
+        .map(|(name, bytes)| (in_order(name), name, bytes))
+        .collect();
+    files.sort();
+    files
         .into_iter()
-        .map(|(name, bytes)| Source::from_bytes(name, bytes.to_vec()))
-        .collect::<Result<Vec<_>, _>>()?;
-    sources.sort_by(|a, b| in_order(&a.name).cmp(&in_order(&b.name)));
-    Ok(sources)
+        .map(|(_, name, bytes)| Ok(Source::from_bytes(name.clone(), bytes.to_vec())?))
+        .collect()
 }
 
 /// What built-in scenarios are sorted by: the bus of their folder, in the order of the table of buses, then their names.

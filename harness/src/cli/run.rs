@@ -52,7 +52,11 @@ fn select_by(
     selection: &Selection,
     read: impl Fn(Source) -> Result<Entry, Box<Problems>>,
 ) -> Result<Vec<Entry>, Vec<LibraryError>> {
-    let sources = sources(&selection.paths).map_err(|error| vec![error])?;
+    let mut sources = sources(&selection.paths).map_err(|error| vec![error])?;
+    // Built-in scenarios have no mistakes to report, so those that cannot match need not be read.
+    if let (true, Some(text)) = (selection.paths.is_empty(), &selection.filter) {
+        sources.retain(|source| may_match(source, text));
+    }
     let mut entries = Vec::new();
     let mut errors: Vec<LibraryError> = Vec::new();
     for source in sources {
@@ -68,6 +72,15 @@ fn select_by(
         entries.retain(|entry| entry.matches(text));
     }
     Ok(entries)
+}
+
+/// Whether [`Entry::matches`] can hold: titles and sources stand in the text, with any white space between their words.
+fn may_match(source: &Source, filter: &str) -> bool {
+    let places = [source.name.to_lowercase(), source.text.to_lowercase()];
+    let filter = filter.to_lowercase();
+    filter
+        .split_whitespace()
+        .all(|word| places.iter().any(|place| place.contains(word)))
 }
 
 /// The scenarios for the bus of a rig; says how many others were selected.

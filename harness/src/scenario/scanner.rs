@@ -29,7 +29,10 @@ impl<'a> Scanner<'a> {
 
     pub(crate) fn skip_space(&mut self) {
         let rest = &self.text[self.at..];
-        self.at += rest.len() - rest.trim_start().len();
+        // Most places have none.
+        if !rest.as_bytes().first().is_some_and(u8::is_ascii_graphic) {
+            self.at += rest.len() - rest.trim_start().len();
+        }
     }
 
     /// Whether nothing but white space is left.
