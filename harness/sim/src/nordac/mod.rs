@@ -8,6 +8,7 @@ pub mod faults;
 pub mod frequency;
 pub mod fuzz;
 pub mod inverter;
+mod line;
 pub mod machine;
 pub mod parameters;
 /// A host or a drive.

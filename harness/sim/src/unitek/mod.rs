@@ -7,6 +7,7 @@ pub mod deviation;
 pub mod drive;
 pub mod fuzz;
 pub mod inputs;
+mod line;
 pub mod outbox;
 pub mod plant;
 pub mod reference;

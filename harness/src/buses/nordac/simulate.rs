@@ -221,7 +221,7 @@ impl Bench {
     /// When something happens next.
     pub(super) fn next_event(&self) -> Option<Instant> {
         let fault = self.clock.next_fault();
-        self.line.next_event().into_iter().chain(fault).min()
+        self.line.next_due().into_iter().chain(fault).min()
     }
 
     /// The time of the segment.
@@ -268,7 +268,7 @@ impl Bench {
     }
 
     pub(super) fn run_to(&mut self, at: Instant) {
-        self.line.run_until(at);
+        self.line.run_to(at);
         self.clock.now = self.clock.now.max(at);
         while let Some(fault) = self.clock.due() {
             self.suffer(fault);
@@ -352,7 +352,7 @@ impl Line for Bench {
         let busy = self.busy();
         loop {
             let fault = self.clock.next_fault();
-            let event = self.line.next_event();
+            let event = self.line.next_due();
             let Some(next) = [fault, event].into_iter().flatten().min() else {
                 if until != Instant::NEVER {
                     self.run_to(until);

@@ -127,7 +127,7 @@ impl SharedBus for SharedDrives {
 
     fn next_event(&self) -> Option<Instant> {
         let scheduled = self.bench.clock.next_fault();
-        let event = self.bench.segment.next_event();
+        let event = self.bench.segment.next_due();
         event.into_iter().chain(scheduled).min()
     }
 

@@ -253,7 +253,7 @@ impl Bench {
     }
 
     pub(super) fn run_to(&mut self, at: Instant) {
-        self.segment.run_until(at);
+        self.segment.run_to(at);
         self.clock.now = self.clock.now.max(at);
         while let Some(fault) = self.clock.due() {
             self.suffer(fault);
@@ -297,7 +297,7 @@ impl Line for Bench {
         loop {
             let heard = self.heard_at().filter(|at| *at > self.clock.now);
             let fault = self.clock.next_fault();
-            let event = self.segment.next_event();
+            let event = self.segment.next_due();
             let next = [heard, fault, event].into_iter().flatten().min();
             let Some(next) = next else {
                 self.run_to(until);

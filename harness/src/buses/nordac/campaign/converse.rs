@@ -197,7 +197,7 @@ impl Desk {
     }
 
     fn run(&mut self, to: Instant) {
-        self.line.run_until(to);
+        self.line.run_to(to);
         self.now = self.now.max(to);
     }
 

@@ -206,13 +206,13 @@ impl Desk {
     fn advance(&mut self, end: Instant) {
         self.transmit();
         let due = [
-            self.segment.next_event(),
+            self.segment.next_due(),
             self.master.poll_timeout(),
             self.host().and_then(|host| host.heard_at()),
         ];
         let next = due.into_iter().flatten().min().unwrap_or(end);
         self.now = self.now.max(next.min(end));
-        self.segment.run_until(self.now);
+        self.segment.run_to(self.now);
         while let Some(at) = self.host().and_then(|host| host.heard_at()) {
             if at > self.now {
                 break;
