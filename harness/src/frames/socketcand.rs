@@ -20,31 +20,7 @@ use std::fmt::Write as _;
 /// The longest message, both brackets included.
 pub const MAX_MESSAGE: usize = 256;
 
-/// Flags beside an identifier, as Linux has them (`linux/can.h`).
-pub mod flag {
-    /// It has 29 bits.
-    pub const EXTENDED: u32 = 0x8000_0000;
-    /// A remote frame.
-    pub const REMOTE: u32 = 0x4000_0000;
-    /// An error frame: the identifier is its class.
-    pub const ERROR: u32 = 0x2000_0000;
-}
-
-/// The bits of an error frame's class, as Linux numbers them (`linux/can/error.h`).
-pub mod class {
-    /// The interface is bus-off.
-    pub const BUS_OFF: u32 = 0x40;
-    /// No station acknowledged a frame.
-    pub const NO_ACKNOWLEDGE: u32 = 0x20;
-    /// A bus error.
-    pub const BUS_ERROR: u32 = 0x80;
-    /// A problem of the controller: error passive, a lost frame.
-    pub const CONTROLLER: u32 = 0x04;
-    /// A violation of the protocol on the bus.
-    pub const PROTOCOL: u32 = 0x08;
-    /// The interface was restarted.
-    pub const RESTARTED: u32 = 0x100;
-}
+pub use harness_socketcan::{class, flag};
 
 /// A time: seconds and microseconds, since 1970 with the daemon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -30,7 +30,6 @@ pub struct Unsaid {
 
 impl LastWords {
     /// Bytes as they are, for a descriptor that is no wire.
-    #[cfg(feature = "socketcan")]
     pub(crate) const fn raw(fd: OwnedFd, name: String, bytes: Vec<u8>) -> Self {
         let gap = Duration::ZERO;
         Self {

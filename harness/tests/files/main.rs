@@ -14,5 +14,4 @@ datatest_stable::harness! {
     { test = guide::options, root = "harness/docs", pattern = r"\.md$" },
     { test = guide::links, root = "harness/docs", pattern = r"\.md$" },
     { test = guide::citations, root = "harness/docs", pattern = r"\.md$" },
-    { test = guide::pipelines, root = "harness/docs", pattern = r"\.md$" },
 }

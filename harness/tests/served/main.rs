@@ -24,8 +24,6 @@ mod program;
 #[path = "../common/python.rs"]
 mod python;
 mod python_package;
-#[path = "../common/record.rs"]
-mod record;
 mod reports;
 mod ring;
 mod scenarios;

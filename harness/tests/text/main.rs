@@ -13,9 +13,6 @@ mod junit_rules;
 mod nordac;
 mod nordac_drive;
 mod package;
-mod public_api;
-#[path = "../common/record.rs"]
-mod record;
 mod reports;
 mod rig;
 mod tidy;

@@ -9,7 +9,6 @@
 
 mod adapter;
 mod clock;
-#[cfg(feature = "socketcan")]
 mod kernel;
 mod open;
 mod transport;

@@ -1,6 +1,7 @@
 //! Opening a CAN adapter: the handshake of its language.
 
 use super::adapter::{Adapter, Slcan, Socketcand};
+use super::kernel::Kernel;
 use super::transport::{Stream, Transport};
 use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, rate_of};
 use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
@@ -163,7 +164,6 @@ pub enum AdapterError {
     )]
     Rate(BitRate),
     /// The program has no interfaces of the kernel.
-    #[cfg(not(feature = "socketcan"))]
     #[error(
         "{0}: this program is built without CAN interfaces of the kernel; build it with `cargo build --release --features socketcan`, or \
          serve the interface with socketcand"
@@ -200,21 +200,10 @@ pub(super) fn open(
             talk.open_socketcand(channel)?;
             Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))
         }
-        AdapterPlace::Kernel { interface } => kernel(interface, settings.listen_only),
+        AdapterPlace::Kernel { interface } => {
+            Ok(Box::new(Kernel::open(interface, settings.listen_only)?))
+        }
     }
-}
-
-#[cfg(feature = "socketcan")]
-fn kernel(interface: &str, listen_only: bool) -> Result<Box<dyn Transport>, AdapterError> {
-    Ok(Box::new(super::kernel::Kernel::open(
-        interface,
-        listen_only,
-    )?))
-}
-
-#[cfg(not(feature = "socketcan"))]
-fn kernel(interface: &str, _listen_only: bool) -> Result<Box<dyn Transport>, AdapterError> {
-    Err(AdapterError::NotBuilt(interface.to_owned()))
 }
 
 /// The command that chooses a rate: a code, or bit timing registers.

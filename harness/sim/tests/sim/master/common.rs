@@ -157,7 +157,7 @@ pub(crate) fn seed() -> u64 {
 /// The command that repeats a random failure.
 pub(crate) fn repeat(test: &str) -> String {
     format!(
-        "repeat with: DRIVEBENCH_SEED={} cargo test -p harness-sim --test sim {test}",
+        "repeat with: DRIVEBENCH_SEED={} cargo test -p harness-sim-tests --test sim {test}",
         seed()
     )
 }

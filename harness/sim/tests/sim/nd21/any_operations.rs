@@ -267,7 +267,7 @@ fn any_operations_keep_the_invariants() {
     );
     if let Err(error) = result {
         panic!(
-            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim any_operations"
+            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim-tests --test sim any_operations"
         );
     }
     let seen = seen.into_inner().0;

@@ -228,7 +228,7 @@ pub(super) fn property<S: Strategy>(
     };
     if let Err(error) = TestRunner::new(config).run(strategy, test) {
         panic!(
-            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim {name}"
+            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim-tests --test sim {name}"
         );
     }
 }

@@ -5,7 +5,6 @@ mod bodies;
 mod common;
 mod deviations;
 mod exchange;
-mod gsd;
 mod line;
 mod profirust;
 mod slave;

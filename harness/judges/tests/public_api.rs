@@ -17,7 +17,7 @@ const FILES: [&str; 6] = [
 ];
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
 fn items(file: &str) -> Vec<Item> {
