@@ -10,8 +10,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// What every limit of a rig's file allows, and drives of its own.
-const REST: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n\
-                    allow_monitoring = true\n[retry]\nattempts = 2\n";
+const REST: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\n[retry]\nattempts = 2\n";
 
 fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_judged"));
