@@ -188,6 +188,7 @@ fn parts_on_frames_equal_one_machine() {
 
 /// The first part alone does not know the deviation.
 #[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
 fn parts_on_frames_name_the_deviation_of_one_machine() {
     let wrong = Bench::frames("\"drive 1 deviates interval-one-more\"");
     wrong.equals_one_machine(1, "deviation: drive 1: interval-one-more (UNITEK 5.2)");

@@ -34,7 +34,6 @@ fn qualify_with(folder: &Path, name: &str, text: &str, more: &[&str]) -> Output 
 #[test]
 fn right_drives_have_no_deviations() {
     have_none(&[1], &[true]);
-    have_none(&[2], &[false]);
 }
 
 #[test]
@@ -90,41 +89,55 @@ fn have_none(sizes: &[u8], resets: &[bool]) {
 /// ND21 9.2, 10.1: drives that are not reset hold what earlier scenarios have left, and perhaps already what a probe writes.
 #[test]
 fn probes_settle_the_bus_without_resets() {
+    probes_settle("as-printed", "accepted");
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn probes_settle_the_bus_as_by_default() {
+    probes_settle("four-data", "error");
+}
+
+fn probes_settle(read_long: &str, empty: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let held = ", \"drive 0..last memory FE12 = 12 34 56 78\"";
-    for (read_long, empty) in [("four-data", "error"), ("as-printed", "accepted")] {
-        let setup = format!(
-            "{held}, \"drive 0..last property read-long = {read_long}\", \"drive 0..last property empty-short-telegram = {empty}\""
-        );
-        let path = folder.path().join("rig.toml");
-        std::fs::write(&path, rig(2, false, "", &setup)).expect("room");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
-        command.args(["qualify", "10.2-write-byte", "--allow-motion", "--rig"]);
-        command.arg(path);
-        let kept = folder.path().join(read_long);
-        let output = command.arg("--evidence").arg(&kept).output();
-        let said = said(&output.expect("the program"));
-        for settled in [
-            format!("read-long (nd21 10.1): {read_long}"),
-            format!("empty-short-telegram (nd21 9.2): {empty}"),
-        ] {
-            assert!(said.contains(&settled), "{said}");
-        }
-        ended(&verify(&kept), 0, "0 things wrong");
+    let setup = format!(
+        "{held}, \"drive 0..last property read-long = {read_long}\", \"drive 0..last property empty-short-telegram = {empty}\""
+    );
+    let path = folder.path().join("rig.toml");
+    std::fs::write(&path, rig(2, false, "", &setup)).expect("room");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command.args(["qualify", "10.2-write-byte", "--allow-motion", "--rig"]);
+    command.arg(path);
+    let kept = folder.path().join(read_long);
+    let output = command.arg("--evidence").arg(&kept).output();
+    let said = said(&output.expect("the program"));
+    for settled in [
+        format!("read-long (nd21 10.1): {read_long}"),
+        format!("empty-short-telegram (nd21 9.2): {empty}"),
+    ] {
+        assert!(said.contains(&settled), "{said}");
     }
+    ended(&verify(&kept), 0, "0 things wrong");
 }
 
 /// ND21 9.8: one answer to the byte that breaks a check sequence off does not show which of the drives has passed it on. The probe tells the
 /// first sixteen behind the master from each other. Of two others none is named.
 #[test]
 fn the_drive_that_differs_is_named_or_none_is() {
-    let folder = tempfile::tempdir().expect("a folder");
+    differs(&[(3, 1, "answered, but drive 1 forwarded")]);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn more_drives_that_differ_are_named_or_none_is() {
     let two = "the bytes received do not tell which: answered, but drive 0 forwarded, or answered, but drive 1 forwarded";
-    for (drives, drive, words) in [
-        (3, 1, "answered, but drive 1 forwarded"),
-        (3, 2, "answered, but drive 2 forwarded"),
-        (18, 0, two),
-    ] {
+    differs(&[(3, 2, "answered, but drive 2 forwarded"), (18, 0, two)]);
+}
+
+fn differs(rings: &[(u8, u8, &str)]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for &(drives, drive, words) in rings {
         let setup = format!(", \"drive {drive} property broken-sequence = forwarded\"");
         let name = format!("{drives}-{drive}");
         let output = ask(folder.path(), &name, &rig(drives, false, "", &setup));
@@ -180,7 +193,17 @@ fn limits_leave_out_what_they_deny() {
 /// What `qualify` has found is what a rig with that profile does.
 #[test]
 fn a_profile_is_loaded_again() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let open = ", \"drive 0..last property read-long = as-printed\", \"drive 0..last property time-out = 13ms\"";
+    let found = [
+        "read-long (nd21 10.1): as-printed",
+        "time-out (nd21 9.9): 13ms",
+    ];
+    is_loaded_again(false, open, &found);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn a_whole_profile_is_loaded_again() {
     let open = ", \"drive 0..last property read-long = as-printed\", \"drive 0..last property time-out = 13ms\", \
                 \"drive 1 property bus-errors = time-out-only\", \"drive 1 property self-test-time = 300ms\", \
                 \"drive 1 property i2t-time = 700ms\", \"drive 1 property s-ramp-wire = puffer\"";
@@ -195,17 +218,23 @@ fn a_profile_is_loaded_again() {
         "s-ramp-wire (nd21 13.5.3): drive 0: none",
         "s-ramp-wire (nd21 13.5.3): drive 1: puffer",
     ];
-    let first = ask(folder.path(), "first", &rig(2, true, "", open));
+    is_loaded_again(true, open, &found);
+}
+
+fn is_loaded_again(resets: bool, open: &str, found: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig = |more: &str, setup: &str| rig(2, resets, more, setup);
+    let first = ask(folder.path(), "first", &rig("", open));
     let profile = "profile = \"first/profile.toml\"";
-    let second = ask(folder.path(), "second", &rig(2, true, profile, ""));
-    for words in found {
+    let second = ask(folder.path(), "second", &rig(profile, ""));
+    for &words in found {
         assert!(said(&first).contains(words), "{}", said(&first));
         assert!(said(&second).contains(words), "{}", said(&second));
     }
     // The folder stands for itself.
     std::fs::remove_dir_all(folder.path().join("first")).expect("a folder");
     ended(&verify(&folder.path().join("second")), 0, "0 things wrong");
-    let output = ask(folder.path(), "third", &rig(2, true, profile, ""));
+    let output = ask(folder.path(), "third", &rig(profile, ""));
     ended(
         &output,
         2,
@@ -245,17 +274,17 @@ const WRONG: &str = "title wrong\nring 4\ndrive 1 memory FE13 = 88\n> 88 FD C0 1
 
 #[test]
 fn evidence_changes_no_verdict() {
-    changes_no_verdict(&[("10", 4)]);
+    changes_no_verdict(&[("10.3-", 4)]);
 }
 
 #[test]
 #[ignore = "plays long chapters four times; .ci/nightly runs it"]
 fn evidence_changes_no_verdict_of_long_chapters() {
-    changes_no_verdict(&[("9", 3), ("14", 3)]);
+    changes_no_verdict(&[("9.", 3), ("10.", 4), ("14.", 3)]);
 }
 
 /// Keeping evidence changes no verdict, no exit code and no message, and `verify` gives the same verdicts.
-/// `chapters` are those that are played, each with the size of its ring; one scenario that fails is played as well.
+/// `chapters` are the filters of what is played, each with the size of its ring; one scenario that fails is played as well.
 fn changes_no_verdict(chapters: &[(&str, u8)]) {
     let folder = tempfile::tempdir().expect("a folder");
     let wrong = folder.path().join("wrong.scn");
@@ -267,7 +296,7 @@ fn changes_no_verdict(chapters: &[(&str, u8)]) {
             let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
             match what == wrong {
                 true => command.args(["run", wrong]),
-                false => command.args(["run", "--filter", &format!("{what}.")]),
+                false => command.args(["run", "--filter", what]),
             };
             command.args(["--rig", &format!("sim:{size}")]).args(more);
             command.output().expect("the program")
@@ -524,7 +553,9 @@ fn an_interlock_disturbs_no_verdict() {
 #[test]
 fn a_failed_scenario_leaves_deviations_unsettled() {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("own.toml"), rig(4, true, "", "")).expect("room");
+    // Without resets there are fewer conversations.
+    let text = rig(4, false, "", "");
+    std::fs::write(folder.path().join("own.toml"), text).expect("room");
     std::fs::write(folder.path().join("wrong.scn"), WRONG).expect("room");
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
     command.args(["qualify", "wrong.scn", "--rig", "own.toml"]);

@@ -113,8 +113,19 @@ fn the_scripts_know_every_target() {
 /// The script writes for libFuzzer the same inputs that are played here.
 #[test]
 fn the_script_converts_as_the_tests_do() {
+    converts(&["links", "scenario"]);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn the_script_converts_every_input() {
+    let all: Vec<_> = targets().map(|(name, _)| name).collect();
+    converts(&all);
+}
+
+fn converts(targets: &[&str]) {
     let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz-seeds");
-    for (target, _) in targets() {
+    for target in targets {
         let to = to.join(target);
         let _none_before = std::fs::remove_dir_all(&to);
         script("fuzz-seeds", &[target, &to.display().to_string()]);

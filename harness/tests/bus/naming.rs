@@ -284,7 +284,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
 
 #[test]
 fn some_planted_in_turn() {
-    planted_in_turn(SOME, 3, 1);
+    planted_in_turn(SOME, 2, 1);
 }
 
 #[test]
@@ -294,7 +294,7 @@ fn all_planted_in_turn() {
 }
 
 /// An ordinary run plants every `SOME`-th deviation, the nightly run plants all of them.
-const SOME: usize = 8;
+const SOME: usize = 16;
 
 /// Plants every `step`-th deviation, each in the next drive in turn. No other drive may be blamed. The planted drive is blamed where only
 /// its own answers differ, as for a deviation without a name. At least `named` deviations must be named, and `culprits` drives blamed.
@@ -379,6 +379,7 @@ fn what_is_right_refutes_a_name() {
 
 /// ND21 10.3: a drive that takes only the mask FF for 7F does not add masks to bytes: with all others before it is right.
 #[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
 fn what_is_right_before_refutes_a_name() {
     let lines = [STANDS.to_owned()];
     let link = twin(&lines).expect("a ring").into_link();

@@ -9,7 +9,7 @@ pub(crate) struct Desk {
 }
 
 /// What every limit of a rig's file allows.
-const ALL: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n";
+pub(crate) const ALL: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n";
 
 impl Desk {
     /// A rig with one ring, given by the lines of `[ring.1]` and what follows. It allows everything.

@@ -110,8 +110,18 @@ impl Desk {
 
 /// What only looks leaves drives as they are; what changes them ends in the safe state.
 #[test]
-fn every_command_over_every_way_in() {
-    for way in ["slcan", "pty", "socketcand"] {
+fn every_command_over_socketcand() {
+    every_command_over(&["socketcand"]);
+}
+
+#[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
+fn every_command_over_other_ways_in() {
+    every_command_over(&["slcan", "pty"]);
+}
+
+fn every_command_over(ways: &[&str]) {
+    for way in ways {
         let desk = Desk::new(way, MOTION);
         desk.shows("read all SPEED_ACTUAL STATUS", "Ena N-I");
         assert!(!said(&desk.run("read 1 MODE")).contains("safe state"));
@@ -152,8 +162,18 @@ fn every_command_over_every_way_in() {
 
 /// All that needs no permission is played over each way in, no correct drive is accused, and a changed frame of the record is found.
 #[test]
-fn scenarios_over_every_way_in() {
-    for way in ["slcan", "pty", "socketcand"] {
+fn scenarios_over_a_pty() {
+    scenarios_over(&["pty"]);
+}
+
+#[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
+fn scenarios_over_other_ways_in() {
+    scenarios_over(&["slcan", "socketcand"]);
+}
+
+fn scenarios_over(ways: &[&str]) {
+    for way in ways {
         let desk = Desk::new(way, "");
         let played = desk.run("run --filter unitek --evidence kept");
         let code = played.status.code();

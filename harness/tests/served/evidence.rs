@@ -1,6 +1,6 @@
 //! Evidence of a ring that another process serves, in real time.
 
-use crate::edits::{check, kept};
+use crate::edits::{check, check_each, kept};
 use crate::program::{Desk, ended, said};
 use crate::ring::Served;
 use crate::{drives_on_can, inverters_on_line};
@@ -36,6 +36,13 @@ fn untouched_evidence_of_the_driver_verifies() {
 #[test]
 fn of_a_served_ring() {
     let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    check_each(&kept(Desk::new(&served.lines(0)), "run", true), 3);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn each_of_a_served_ring() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
     check(&kept(Desk::new(&served.lines(0)), "run", true));
 }
 
@@ -45,6 +52,17 @@ type Runs<'a> = &'a dyn Fn(&str) -> Output;
 /// The verdicts of a run with wrong drives behind a port are the same with evidence and without, whatever the bus.
 #[test]
 fn evidence_changes_no_verdict_on_a_port() {
+    changes_no_verdict(&[0]);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn evidence_changes_no_verdict_on_other_ports() {
+    changes_no_verdict(&[1, 2]);
+}
+
+/// On these rigs: a ring, drives on CAN, inverters.
+fn changes_no_verdict(rigs: &[usize]) {
     let wrong = ["drive 1 deviates writes-ignored"];
     let served = Served::start_with("nd21", &[2], "tcp", true, &[], &wrong);
     let ring = Desk::new(&served.lines(0));
@@ -69,7 +87,7 @@ fn evidence_changes_no_verdict_on_a_port() {
         (&on_can, "unitek-5.1-too-short"),
         (&on_line, "nordac-en-1-fcs"),
     ];
-    for (run, scenarios) in runs {
+    for (run, scenarios) in rigs.iter().map(|own| runs[*own]) {
         let line = format!("run {scenarios} --allow-motion --rig desk.toml");
         let without = settled(|_| run(&line));
         let with = settled(|time| run(&format!("{line} --evidence kept{time}")));

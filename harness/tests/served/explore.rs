@@ -76,6 +76,7 @@ fn place(served: &Served) -> String {
 
 /// ND21 9.7: a drive that counts wrongly is found over a socket, seen again, and made small in few runs.
 #[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
 fn a_deviating_drive_behind_a_socket() {
     let more = ["drive 1 deviates counts-9-zeros"];
     let served = Served::start_with("nd21", &[2], "tcp", true, &[], &more);
@@ -199,6 +200,7 @@ fn two_rings(transport: &str) {
 
 /// Over sockets.
 #[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn two_rings_behind_sockets() {
     two_rings("tcp");
 }

@@ -7,6 +7,16 @@ use harness_proto::line::Parity;
 /// Any bytes behind the first ones of each format, and damaged files of each: a capture or a reason, never a panic.
 #[test]
 fn hostile_files() {
+    damaged_files(1_000);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn more_hostile_files() {
+    damaged_files(10_000);
+}
+
+fn damaged_files(rounds: usize) {
     let changes = drawn(&many()[..20], Parity::Odd, 1);
     let times: Vec<f64> = changes[1..]
         .iter()
@@ -29,7 +39,7 @@ fn hostile_files() {
     ];
     let mut dice = fastrand::Rng::with_seed(24);
     let settings = settings(&[]);
-    for round in 0..4_000 {
+    for round in 0..rounds {
         let mut file = files[round % files.len()].clone();
         for _ in 0..=dice.usize(..4) {
             let place = dice.usize(..file.len());

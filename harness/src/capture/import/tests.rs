@@ -391,7 +391,8 @@ fn binary_levels() {
             format!("0->master:{}\n", hex(&many()))
         );
         assert_eq!(found.capture.rate, Rate::Baud19200);
-        for length in 0..file.len() {
+        // Wherever a file of many numbers is cut.
+        for length in (0..file.len()).step_by(11).chain([file.len() - 1]) {
             assert!(read_with(&file[..length], &settings(&["0->master"])).is_err());
         }
     }

@@ -13,24 +13,32 @@ const OWN: &str =
 
 #[test]
 fn of_a_simulated_rig() {
+    check_each(&kept(Desk::new(OWN), "run", false), 5);
+}
+
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn each_of_a_simulated_rig() {
     check(&kept(Desk::new(OWN), "run", false));
 }
 
 #[test]
 fn of_rings_of_their_own() {
     let desk = Desk::new("drives = 2\ntransport = \"sim\"\n");
+    check_each(&kept(desk, "run", false), 3);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn each_of_rings_of_their_own() {
+    let desk = Desk::new("drives = 2\ntransport = \"sim\"\n");
     check(&kept(desk, "run", false));
 }
 
 /// A rig that denies what it can has few conversations, which are played again for each edit.
 #[test]
-fn of_a_careful_qualification() {
-    check_each(&kept(Desk::limited(OWN, ""), "qualify", false), 16);
-}
-
-#[test]
 #[ignore = "plays a conversation for each edit, a minute in all; .ci/nightly runs it"]
-fn each_of_a_careful_qualification() {
+fn of_a_careful_qualification() {
     check(&kept(Desk::limited(OWN, ""), "qualify", false));
 }
 
@@ -43,6 +51,20 @@ fn of_a_qualification() {
 /// What a qualification has found is made again from its record, and an edited finding is refused with the line that was edited.
 #[test]
 fn findings_of_a_qualification() {
+    findings(&[("profile.toml", "accepted", "refused")]);
+}
+
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn more_findings_of_a_qualification() {
+    findings(&[
+        ("deviations.txt", "deviations: none", "deviations: some"),
+        ("deviations.txt", "were skipped", "were left out"),
+        ("profile.toml", "date = \"2", "date = \"3"),
+    ]);
+}
+
+fn findings(edits: &[(&str, &str, &str)]) {
     let desk = Desk::limited(OWN, "");
     let fixed = ["qualify", "--rig", "desk.toml", "--filter", "9.2-synco"];
     ended(
@@ -52,12 +74,7 @@ fn findings_of_a_qualification() {
     );
     let verify = || desk.run(&["verify", "kept"]);
     ended(&verify(), 0, "0 things wrong");
-    for (file, from, to) in [
-        ("deviations.txt", "deviations: none", "deviations: some"),
-        ("deviations.txt", "were skipped", "were left out"),
-        ("profile.toml", "accepted", "refused"),
-        ("profile.toml", "date = \"2", "date = \"3"),
-    ] {
+    for &(file, from, to) in edits {
         let path = desk.path(&format!("kept/{file}"));
         let text = fs::read_to_string(&path).expect("a file");
         let edited = text.replacen(from, to, 1);

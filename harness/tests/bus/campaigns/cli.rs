@@ -173,6 +173,11 @@ fn campaigns_over_telegrams() {
         lines.lines().all(|line| line.contains(":former")),
         "{lines}"
     );
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn a_campaign_of_single_bits_over_telegrams() {
     let bits = drivebench(&["campaign", "nordac/3.3-single-bits", "--format", "json"]);
     let listed: Value = serde_json::from_str(&stdout(&bits)).expect("JSON");
     let own = &listed["campaigns"][0];

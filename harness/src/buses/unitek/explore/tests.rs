@@ -43,6 +43,14 @@ fn right_drives() -> Vec<Vec<String>> {
 #[test]
 fn no_right_drive_is_accused() {
     for header in right_drives() {
+        usual().accuses_nobody(&header, (1, 15));
+    }
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn no_right_drive_is_accused_in_more_cases() {
+    for header in right_drives() {
         usual().accuses_nobody(&header, (1, 60));
     }
 }
@@ -58,7 +66,7 @@ fn no_right_drive_behind_an_adapter_is_accused() {
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_drives_are_found_and_their_findings_are_scenarios() {
-    let missed = usual().missed(deviations().step_by(6).map(|own| own.name));
+    let missed = usual().missed(deviations().step_by(15).map(|own| own.name));
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
