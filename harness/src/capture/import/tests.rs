@@ -378,6 +378,17 @@ pub(super) fn saleae(version: u32, parts: &[(u32, f64, f64, &[f64])]) -> Vec<u8>
 
 #[test]
 fn binary_levels() {
+    of_binary_levels(11);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn binary_levels_cut_anywhere() {
+    of_binary_levels(1);
+}
+
+/// Files that are cut at every `step`-th place are refused.
+fn of_binary_levels(step: usize) {
     let changes = drawn(&many(), Parity::Odd, 1);
     let times: Vec<f64> = changes[1..]
         .iter()
@@ -391,8 +402,7 @@ fn binary_levels() {
             format!("0->master:{}\n", hex(&many()))
         );
         assert_eq!(found.capture.rate, Rate::Baud19200);
-        // Wherever a file of many numbers is cut.
-        for length in (0..file.len()).step_by(11).chain([file.len() - 1]) {
+        for length in (0..file.len()).step_by(step).chain([file.len() - 1]) {
             assert!(read_with(&file[..length], &settings(&["0->master"])).is_err());
         }
     }
