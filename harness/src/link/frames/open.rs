@@ -165,7 +165,7 @@ pub enum AdapterError {
     Rate(BitRate),
     /// The program has no interfaces of the kernel.
     #[error(
-        "{0}: this program is built without CAN interfaces of the kernel; build it with `cargo build --profile dist --features socketcan`, or \
+        "{0}: this program is built without CAN interfaces of the kernel; build it with `cargo build --profile installed --features socketcan`, or \
          serve the interface with socketcand"
     )]
     NotBuilt(String),
