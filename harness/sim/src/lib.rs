@@ -9,6 +9,7 @@
 //! the fuzz targets of all buses share.
 #![forbid(unsafe_code)]
 
+mod compiled;
 pub mod fault;
 pub mod fuzz;
 pub mod nd21;

@@ -8,7 +8,6 @@ pub mod faults;
 pub mod frequency;
 pub mod fuzz;
 pub mod inverter;
-mod line;
 pub mod machine;
 pub mod parameters;
 /// A host or a drive.
@@ -25,3 +24,10 @@ pub use drive::Drive;
 pub use inverter::Inverter;
 pub use setup::InverterSetup;
 pub use slave::Slave;
+
+use crate::octet_segment::OctetSegment;
+
+crate::compiled::compiled_here!(
+    OctetSegment<Member<Box<deviation::Deviant>>>,
+    OctetSegment<Member<Drive>>
+);

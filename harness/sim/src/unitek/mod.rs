@@ -7,7 +7,6 @@ pub mod deviation;
 pub mod drive;
 pub mod fuzz;
 pub mod inputs;
-mod line;
 pub mod outbox;
 pub mod plant;
 pub mod reference;
@@ -20,3 +19,10 @@ pub use plant::Control;
 
 /// A host or a drive.
 pub type Member<D> = crate::participant::Participant<crate::segment::Host, D>;
+
+use crate::segment::Segment;
+
+crate::compiled::compiled_here!(
+    Segment<Member<Box<deviation::Deviant>>>,
+    Segment<Member<Box<Drive>>>
+);
