@@ -24,3 +24,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     drives.close()?;
     Ok(())
 }
+
+#[test]
+fn the_example_holds() -> Result<(), Box<dyn std::error::Error>> {
+    main()
+}

@@ -29,3 +29,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     writeln!(out, "{}", played.mismatch().unwrap_or_default())?;
     Ok(())
 }
+
+#[test]
+fn the_example_holds() -> Result<(), Box<dyn std::error::Error>> {
+    main()
+}

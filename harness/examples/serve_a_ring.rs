@@ -21,3 +21,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     assert!(matches!(wrong, Err(Error::Mistake(_))), "{wrong:?}");
     Ok(())
 }
+
+#[test]
+fn the_example_holds() -> Result<(), Box<dyn std::error::Error>> {
+    main()
+}

@@ -443,3 +443,20 @@ pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No scenario that a filter selects is left unread.
+    #[test]
+    fn what_matches_may_match() {
+        for source in sources(&[]).expect("the built-in ones") {
+            let entry = Entry::new(source.clone(), None).expect("a scenario");
+            let cited = entry.scenario.sources.iter().map(|own| own.text.as_str());
+            for place in cited.chain([entry.name.as_str(), &entry.scenario.title]) {
+                assert!(entry.matches(place) && may_match(&source, place), "{place}");
+            }
+        }
+    }
+}

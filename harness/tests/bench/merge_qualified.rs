@@ -179,6 +179,23 @@ fn a_deviation_that_one_part_shows_is_named() {
     ended(&verified, 1, "deviations.txt, line 1");
 }
 
+/// ND21 9.7: the scenarios pass, and the deviation that the conversations show fails the drives all the same.
+#[test]
+fn a_deviation_fails_merged_parts_whose_scenarios_pass() {
+    let ring =
+        "drives = 2\ntransport = \"sim\"\n[sim]\nsetup = [\"drive 1 deviates counts-7-zeros\"]\n";
+    let bench = Bench {
+        desk: Desk::limited(ring, ""),
+        scenarios: &["9.2-synco", "9.8-sequence-with-gaps"],
+    };
+    for part in ["1", "2"] {
+        bench.qualify(part, &["--partition", &format!("slice:{part}/2")]);
+    }
+    let merged = bench.merge(&["1", "2"], "merged");
+    ended(&merged, 1, "2 passed, 0 failed");
+    ended(&merged, 1, "deviation: drive 1: counts-7-zeros");
+}
+
 #[test]
 fn parts_on_frames_equal_one_machine() {
     let bench = Bench::frames("");
