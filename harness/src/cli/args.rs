@@ -101,7 +101,8 @@ pub enum ProgramCommand {
     /// Print a DBC file of UNITEK drives on CAN, for tools that decode frames by one.
     ///
     /// Byte 0 of a frame, REGID, selects the signals behind it. Frames may be shorter than a message says: a register of 16 bits has 3 bytes from
-    /// the master and 4 bytes from the drive. Let the tool accept that (cantools: `allow_truncated`).
+    /// the master and 4 bytes from the drive. Let the tool accept that: `cantools decode --no-strict drive.dbc` on the command line, `allow_truncated=True` in
+    /// a call of cantools. For a tool that refuses short frames, fill each frame up with zero bytes, to 5 from the master and 6 from the drive.
     Dbc {
         /// How many drives: drive n has the identifiers 200 + n and 180 + n.
         #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=127))]

@@ -1,6 +1,5 @@
-//! The DBC file of drives on CAN, read and written by cantools. The crate `harness-judges` holds it against another reader and the table of registers.
+//! The DBC file of drives on CAN, read and written by cantools, and converted by canmatrix. The crate `harness-judges` holds it against another reader and the table of registers.
 
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn dbc(drives: &str) -> String {
@@ -12,34 +11,26 @@ fn dbc(drives: &str) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// A Python that has cantools, found as for python-can; without one, prints that the test `who` is skipped.
-fn cantools(who: &str) -> Option<PathBuf> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python/bin/python");
-    let given = std::env::var_os("DRIVEBENCH_PYTHON").map(PathBuf::from);
-    let imports = |python: &PathBuf| {
-        let output = Command::new(python)
-            .args(["-c", "import cantools"])
-            .output();
-        output.is_ok_and(|output| output.status.success())
-    };
-    let found = given
-        .into_iter()
-        .chain([own, "python3".into()])
-        .find(imports);
-    crate::debian::told(found.is_some(), "cantools", who);
-    found
+/// What a program in Python prints for the DBC of one drive; `None` where `modules` are not installed, and the test `who` says so.
+fn python(modules: &str, program: &str, who: &str) -> Option<String> {
+    let python = crate::python::with(modules, who)?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("drive.dbc");
+    std::fs::write(&path, dbc("1")).expect("room");
+    let output = Command::new(python)
+        .args(["-c", program])
+        .arg(&path)
+        .output()
+        .expect("python");
+    let wrong = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{wrong}");
+    Some(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
 /// The frames of the manual's examples (ex 3, 7, 10), read and written by cantools.
 #[test]
 fn cantools_reads_and_writes_examples() {
     let who = "cantools_reads_and_writes_examples";
-    let Some(python) = cantools(who) else {
-        return;
-    };
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("drives.dbc");
-    std::fs::write(&path, dbc("1")).expect("room");
     let program = "
 import cantools, sys
 db = cantools.database.load_file(sys.argv[1])
@@ -57,13 +48,9 @@ show(rx('31CD0C'))
 print(db.get_message_by_name('DriveRx').encode({'REGID': 0x3D, 'READ': 'STATUS', 'INTERVAL': 100}).hex())
 print(db.get_message_by_name('DriveRx').encode({'REGID': 0x31, 'SPEED_CMD': -50.0}).hex())
 ";
-    let output = Command::new(python)
-        .args(["-c", program])
-        .arg(&path)
-        .output()
-        .expect("python");
-    let said = String::from_utf8_lossy(&output.stdout);
-    let wrong = String::from_utf8_lossy(&output.stderr);
+    let Some(said) = python("cantools", program, who) else {
+        return;
+    };
     let expected = "\
 REGID=48.000 SPEED_ACTUAL=10.001
 REGID=48.000 SPEED_ACTUAL=-50.002
@@ -74,5 +61,41 @@ REGID=49.000 SPEED_CMD=10.001
 3d40640000
 3100c00000
 ";
-    assert_eq!(said, expected, "{wrong}");
+    assert_eq!(said, expected);
+}
+
+/// canmatrix makes KCD and ARXML of it, which have every signal. A multiplexer inside another leaves ARXML empty, and makes a set point of a
+/// read request in KCD.
+#[test]
+fn canmatrix_converts_it() {
+    let who = "canmatrix_converts_it";
+    let program = "
+import sys
+import canmatrix.formats, cantools
+path = sys.argv[1]
+matrix = canmatrix.formats.loadp_flat(path)
+for kind in ('kcd', 'arxml'):
+    canmatrix.formats.dumpp({'': matrix}, f'{path}.{kind}')
+own = {frame.name: {signal.name for signal in frame.signals} for frame in matrix.frames}
+autosar = canmatrix.formats.loadp_flat(f'{path}.arxml')
+for frame in autosar.frames:
+    name = frame.name.removeprefix('FRAME_')
+    print(name, frame.size, {signal.name for signal in frame.signals} == own[name])
+db = cantools.database.load_file(f'{path}.kcd')
+for text in ('3D3064', '31CD0C', 'D478563412'):
+    print(db.get_message_by_name('DriveRx').decode(bytes.fromhex(text), decode_choices=False, allow_truncated=True))
+print(db.get_message_by_name('DriveTx').decode(bytes.fromhex('30CD0C00'), allow_truncated=True))
+";
+    let Some(said) = python("cantools, canmatrix", program, who) else {
+        return;
+    };
+    let expected = "\
+DriveRx 5 True
+DriveTx 6 True
+{'REGID': 61, 'READ': 48, 'INTERVAL': 100}
+{'REGID': 49, 'SPEED_CMD': 10.00091245}
+{'REGID': 212, 'VAR4': 305419896}
+{'REGID': 48, 'SPEED_ACTUAL': 10.00091245}
+";
+    assert_eq!(said, expected);
 }

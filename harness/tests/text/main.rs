@@ -13,6 +13,8 @@ mod junit_rules;
 mod nordac;
 mod nordac_drive;
 mod package;
+#[path = "../common/python.rs"]
+mod python;
 mod reports;
 mod rig;
 mod tidy;

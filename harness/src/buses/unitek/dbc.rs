@@ -1,8 +1,9 @@
 //! A DBC file of drives on a CAN bus, for tools that decode frames by one.
 //!
 //! A drive has two messages: what the master sends to it (5 bytes) and what it sends (6 bytes). Byte 0 of each is the register, REGID, which
-//! selects the signals behind it. REGID 3D of the master's message reads a register; its next byte selects which (`READ`), and the byte
-//! behind that the interval of the replies. A register is as wide as the drive keeps it, so a tool must accept shorter frames: the
+//! selects the signals behind it. REGID 3D of the master's message reads a register; its next byte is which (`READ`), and the byte
+//! behind that the interval of the replies. There is one level of selectors and no `SG_MUL_VAL_` line, which many readers do not know.
+//! A register is as wide as the drive keeps it, so a tool must accept shorter frames: the
 //! drive answers for a register of 16 bits with 4 bytes. A register whose bits have names is one signal a bit.
 
 use harness_proto::unitek::register::{Access, Register, Unit, Width};
@@ -30,10 +31,6 @@ enum Selected {
     Selector,
     /// It is there for one value of REGID.
     By(u8),
-    /// It is there for this value of REGID, and selects others.
-    SelectorBy(u8),
-    /// It is there for every value of READ.
-    ByRead,
 }
 
 /// One signal: bits of a message, lowest byte first.
@@ -112,10 +109,6 @@ pub fn dbc(drives: u16) -> String {
     for message in &messages {
         value_names(&mut text, message);
     }
-    text.push('\n');
-    for message in &messages {
-        selections(&mut text, message);
-    }
     text
 }
 
@@ -169,13 +162,13 @@ fn read_request() -> Vec<Signal> {
         Signal {
             values: named.collect(),
             comment: "The register that the drive sends".to_owned(),
-            ..Signal::plain("READ", Selected::SelectorBy(frame::READ), 8, 8)
+            ..Signal::plain("READ", Selected::By(frame::READ), 8, 8)
         },
         Signal {
             unit: "ms",
             values: interval,
             comment: "How often the drive sends the register: 0 once, 255 no longer".to_owned(),
-            ..Signal::plain("INTERVAL", Selected::ByRead, 16, 8)
+            ..Signal::plain("INTERVAL", Selected::By(frame::READ), 16, 8)
         },
     ]
 }
@@ -326,8 +319,6 @@ fn declaration(text: &mut String, message: &Message) {
         let selected = match signal.selected {
             Selected::Selector => "M".to_owned(),
             Selected::By(regid) => format!("m{regid}"),
-            Selected::SelectorBy(regid) => format!("m{regid}M"),
-            Selected::ByRead => "m0".to_owned(),
         };
         let (least, greatest) = signal.range();
         put(
@@ -365,24 +356,6 @@ fn value_names(text: &mut String, message: &Message) {
             put(text, format_args!(" {value} \"{name}\""));
         }
         text.push_str(" ;\n");
-    }
-}
-
-/// Which value of which selector each signal has: with two levels of selectors a DBC says it of all.
-fn selections(text: &mut String, message: &Message) {
-    for signal in &message.signals {
-        let (selector, from, to) = match signal.selected {
-            Selected::Selector => continue,
-            Selected::By(regid) | Selected::SelectorBy(regid) => ("REGID", regid, regid),
-            Selected::ByRead => ("READ", 0, u8::MAX),
-        };
-        put(
-            text,
-            format_args!(
-                "SG_MUL_VAL_ {} {} {selector} {from}-{to};\n",
-                message.id, signal.name
-            ),
-        );
     }
 }
 

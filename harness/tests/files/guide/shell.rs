@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// What a page needs whose commands call `python3` with a package: as it is called, and its modules.
-const PYTHON: [(&str, &str); 4] = [
+const PYTHON: [(&str, &str); 5] = [
     ("python-can", "can"),
+    ("cantools", "cantools"),
     ("pyprofibus", "pyprofibus"),
     ("pytest", "drivebench, pytest"),
     ("labgrid", "drivebench, labgrid, pytest"),
