@@ -57,23 +57,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Logged>, Vec<String>), CaptureEr
         errors: 0,
     };
     let mut frames = Vec::new();
-    let whole = bytes.ends_with(b"\n");
-    let mut lines = text.lines().enumerate().peekable();
     let mut notes = Vec::new();
-    while let Some((number, line)) = lines.next() {
-        match reader.line(line) {
-            Ok(own) => frames.extend(own),
-            Err(_) if !whole && lines.peek().is_none() => {
-                notes.push("the file ends in the middle of a line, which was not read".to_owned());
+    for (number, line) in text.lines().enumerate() {
+        frames.extend(reader.line(line).map_err(|what| {
+            let shown: String = line.trim().chars().take(60).collect();
+            CaptureError::Link {
+                place: format!("line {}", number + 1),
+                what: format!("{shown:?}: {what}"),
             }
-            Err(what) => {
-                let shown: String = line.trim().chars().take(60).collect();
-                return Err(CaptureError::Link {
-                    place: format!("line {}", number + 1),
-                    what: format!("{shown:?}: {what}"),
-                });
-            }
-        }
+        })?);
     }
     if reader.errors > 0 {
         let errors = reader.errors;

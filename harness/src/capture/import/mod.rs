@@ -5,6 +5,7 @@
 //! octets ([`UartFormat`]), whose format is given or found.
 
 mod asc;
+mod cut;
 mod levels;
 mod links;
 mod numbers;
@@ -21,6 +22,7 @@ pub use uart::UartFormat;
 
 use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
 use crate::buses;
+use cut::{Parts, whole_part};
 use harness_proto::line::Rate;
 use links::ChannelRead;
 
@@ -71,10 +73,20 @@ enum Reader {
 }
 
 /// A format of files.
+#[derive(Clone, Copy)]
 struct Format {
     name: &'static str,
     recognised: fn(&[u8]) -> bool,
     reader: Reader,
+    /// What shows where a file that was cut stops being whole.
+    parts: Parts,
+}
+
+impl Format {
+    /// The same, of files that consist of these parts.
+    const fn of(self, parts: Parts) -> Self {
+        Self { parts, ..self }
+    }
 }
 
 const fn whole(
@@ -87,6 +99,7 @@ const fn whole(
         name,
         recognised,
         reader,
+        parts: Parts::Blocks,
     }
 }
 
@@ -100,6 +113,7 @@ const fn channels(
         name,
         recognised,
         reader,
+        parts: Parts::Blocks,
     }
 }
 
@@ -130,17 +144,20 @@ const FORMATS: [Format; 16] = [
         "log of candump",
         |bytes| first(bytes) == Some(b'('),
         |bytes, settings| frames::candump(bytes, &settings.links),
-    ),
+    )
+    .of(Parts::Lines),
     whole(
         "frames in JSON",
         |bytes| first(bytes) == Some(b'{') && frames::is_json(bytes),
         |bytes, _| Ok(frames::json(bytes)?.into()),
-    ),
+    )
+    .of(Parts::Objects),
     whole(
         "telegrams in JSON",
         |bytes| first(bytes) == Some(b'{') && telegrams::is_json(bytes),
         |bytes, _| Ok(telegrams::json(bytes)?.into()),
-    ),
+    )
+    .of(Parts::Objects),
     whole(
         "trace in JSON",
         |bytes| first(bytes) == Some(b'{'),
@@ -148,15 +165,18 @@ const FORMATS: [Format; 16] = [
     ),
     whole("bytes in csv", own::is_bytes, |bytes, settings| {
         Ok(own::bytes(bytes, settings.rate)?.into())
-    }),
+    })
+    .of(Parts::Lines),
     whole("frames in csv", own::is_frames, |bytes, _| {
         Ok(own::frames(bytes)?.into())
-    }),
-    whole("telegrams in csv", own::is_telegrams, own::telegrams),
+    })
+    .of(Parts::Lines),
+    whole("telegrams in csv", own::is_telegrams, own::telegrams).of(Parts::Lines),
     whole("ASC (Vector)", asc::recognised, |bytes, settings| {
         frames::asc(asc::read(bytes)?, &settings.links)
-    }),
-    channels("VCD", vcd::recognised, |bytes, _| vcd::read(bytes)),
+    })
+    .of(Parts::Lines),
+    channels("VCD", vcd::recognised, |bytes, _| vcd::read(bytes)).of(Parts::Words),
     channels(
         "binary levels (Saleae Logic)",
         |bytes| bytes.starts_with(saleae::BINARY),
@@ -164,22 +184,26 @@ const FORMATS: [Format; 16] = [
     ),
     channels("csv (sigrok)", sigrok::recognised, |bytes, settings| {
         sigrok::read(bytes, settings.samples)
-    }),
+    })
+    .of(Parts::Lines),
     channels(
         "table of octets (Saleae Logic)",
         saleae::is_data_table,
         |bytes, _| saleae::data_table(bytes),
-    ),
+    )
+    .of(Parts::Lines),
     channels(
         "text of octets (Saleae Logic)",
         saleae::is_analyser,
         |bytes, _| saleae::analyser(bytes),
-    ),
+    )
+    .of(Parts::Lines),
     channels(
         "csv of levels (Saleae Logic)",
         saleae::is_levels,
         |bytes, _| saleae::levels(bytes),
-    ),
+    )
+    .of(Parts::Lines),
 ];
 
 /// The formats of which parts follow each other in one text: sections of pcapng, lines of a log.
@@ -252,13 +276,16 @@ pub(super) fn read(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Ca
     let Some(format) = format(bytes) else {
         return Err(foreign(bytes));
     };
-    match format.reader {
-        Reader::Whole(read) => read(bytes, settings),
+    let (bytes, mut notes) = whole_part(bytes, format.parts)?;
+    let imported = match format.reader {
+        Reader::Whole(read) => read(&bytes, settings)?,
         Reader::Channels(read) => {
-            let (channels, notes) = read(bytes, settings)?;
-            links::settle(channels, settings, notes)
+            let (channels, notes) = read(&bytes, settings)?;
+            links::settle(channels, settings, notes)?
         }
-    }
+    };
+    notes.extend(imported.notes);
+    Ok(Imported { notes, ..imported })
 }
 
 /// Reads the files of one capture, each with its name. Files of a format whose parts follow each other are one text; of files with channels, each
@@ -285,16 +312,25 @@ pub(super) fn read_files(
     let Some(first) = kinds.first() else {
         return Err(wrong("none is given".to_owned()));
     };
+    let same = |at: usize| files[..at].iter().any(|own| own.1 == files[at].1);
+    let twice = (1..files.len()).find(|at| same(*at));
+    let twice = twice.map(|at| format!("{} is given twice", files[at].0));
+    let mut notes = Vec::new();
+    for ((name, bytes), kind) in files.iter_mut().zip(&kinds) {
+        let (whole, cut) = whole_part(without_mark(bytes), kind.parts)?;
+        notes.extend(cut.into_iter().map(|own| format!("{name}: {own}")));
+        *bytes = whole.into_owned();
+    }
     match first.reader {
         Reader::Channels(_) => {
-            let (mut channels, mut notes) = (Vec::new(), Vec::new());
+            let mut channels = Vec::new();
             for ((name, bytes), kind) in files.iter().zip(&kinds) {
                 let Reader::Channels(read) = kind.reader else {
                     return Err(wrong(format!(
                         "{name} is of another kind than the first one"
                     )));
                 };
-                let (own, said) = read(without_mark(bytes), settings)?;
+                let (own, said) = read(bytes, settings)?;
                 let alone = own.len() == 1;
                 channels.extend(own.into_iter().map(|mut own| {
                     if alone {
@@ -313,18 +349,13 @@ pub(super) fn read_files(
                     first.name, other.name
                 )));
             }
-            let same = |at: usize| files[..at].iter().any(|own| own.1 == files[at].1);
-            if let Some(at) = (1..files.len()).find(|at| same(*at)) {
-                return Err(wrong(format!("{} is given twice", files[at].0)));
+            if let Some(twice) = twice {
+                return Err(wrong(twice));
             }
-            let mut all = std::mem::take(&mut files[0].1);
-            for (_, bytes) in &files[1..] {
-                if !all.ends_with(b"\n") && first.name != JOINED[0] {
-                    all.push(b'\n');
-                }
-                all.extend_from_slice(without_mark(bytes));
-            }
-            read(&all, settings)
+            let all: Vec<_> = files.iter().map(|own| &own.1[..]).collect();
+            let imported = read(&all.concat(), settings)?;
+            notes.extend(imported.notes);
+            Ok(Imported { notes, ..imported })
         }
         Reader::Whole(_) => Err(wrong(format!(
             "several files of {} cannot be joined; one expected",

@@ -48,19 +48,12 @@ pub(super) fn is_levels(bytes: &[u8]) -> bool {
 /// The row and the field that cannot be.
 pub(super) fn levels(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
     let mut table = Table::new(bytes);
-    let mut notes = Vec::new();
     let mut lines = vec![Levels::default(); table.columns.len().saturating_sub(1)];
-    let whole = bytes.ends_with(b"\n") || bytes.ends_with(b"\r");
     // Rows of the same levels as the one before are written by other programs at times of their own.
     while table.next()? {
         if table.fields() != lines.len() + 1 {
             let expected = lines.len() + 1;
-            let short = table.wrong(format!("{expected} fields are expected in each row"));
-            if whole || table.next()? {
-                return Err(short);
-            }
-            notes.push("the file ends in the middle of a row, which was not read".to_owned());
-            break;
+            return Err(table.wrong(format!("{expected} fields are expected in each row")));
         }
         let time = std::str::from_utf8(table.raw(0)).ok().and_then(seconds);
         let Some(time) = time else {
@@ -85,7 +78,7 @@ pub(super) fn levels(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Ca
         names: vec![name],
         signal: Signal::Levels(levels),
     });
-    Ok((channels.collect(), notes))
+    Ok((channels.collect(), Vec::new()))
 }
 
 /// What an analyser calls an error of the line.

@@ -44,13 +44,11 @@ pub(super) fn read(
         above: b"",
         repeated: false,
     };
-    // Behind the last line feed is nothing, or half a row.
-    let end = bytes.iter().rposition(|own| *own == b'\n').unwrap_or(0);
-    let mut notes = Vec::new();
-    if !bytes[end..].trim_ascii().is_empty() {
-        notes.push("the file ends in the middle of a row, which was not read".to_owned());
-    }
-    for (number, line) in bytes[..end].split(|own| *own == b'\n').enumerate() {
+    for (number, line) in bytes
+        .trim_ascii_end()
+        .split(|own| *own == b'\n')
+        .enumerate()
+    {
         let read = samples.line(line.trim_ascii());
         read.map_err(|what| CaptureError::Link {
             place: format!("line {}", number + 1),
@@ -75,7 +73,7 @@ pub(super) fn read(
             signal: Signal::Levels(levels),
         }
     });
-    Ok((channels.collect(), notes))
+    Ok((channels.collect(), Vec::new()))
 }
 
 impl<'b> Samples<'b> {

@@ -626,7 +626,7 @@ fn files_of_one_capture() {
             .map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
         read_files(all.collect(), &settings(links)).map(|own| shown(&own.capture))
     };
-    let first = ("a", "(0.1) can0 201#3D4000");
+    let first = ("a", "(0.1) can0 201#3D4000\n");
     let log = files(&[first, ("b", "(0.2) can0 202#\n")], &[]);
     assert!(log.expect("a log").ends_with(": 201#3D4000 202#\n"));
     let octets = "Time [s],Value,Parity Error,Framing Error\n0.001,0x88,,\n";
