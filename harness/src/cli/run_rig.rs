@@ -441,18 +441,25 @@ fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> 
     }
 }
 
-/// How long sending was held up around bytes with a wrong parity bit, and what interposers have cost.
+/// What bytes with a wrong parity bit and interposers have cost.
 fn measured(run: &mut Run<'_>) -> Vec<String> {
     let Some(ports) = run.session().ports() else {
         return Vec::new();
     };
-    let gaps = ports.take_gaps();
+    let switches = ports.take_switches();
     let mut lines = Vec::new();
-    if let Some(longest) = gaps.iter().max() {
+    if let Some(longest) = switches.iter().map(|switch| switch.idle).max() {
         lines.push(format!(
             "{} sent with a wrong parity bit; the line was idle for at most {:.1} ms around one\n",
-            counted(gaps.len(), "byte"),
+            counted(switches.len(), "byte"),
             longest.as_secs_f64() * 1e3
+        ));
+    }
+    let unknown: u64 = switches.iter().map(|switch| switch.unknown).sum();
+    if unknown > 0 {
+        lines.push(format!(
+            "{} came meanwhile, and are compared without their line status: a UART has one parity setting for both directions\n",
+            counted(unknown, "byte")
         ));
     }
     for inner in ports.inner_links().iter().filter(|inner| inner.passes()) {

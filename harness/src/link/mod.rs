@@ -27,7 +27,7 @@ pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::AnyStimulus;
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::LastWords;
+use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -36,7 +36,6 @@ use std::fmt;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::time::Duration;
 
 /// What a rig can be asked to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -328,8 +327,8 @@ pub trait PortLink: Link {
     /// Number of line errors since the last call that the transport reported without their byte.
     fn take_unplaced(&mut self) -> u64;
 
-    /// How long sending was held up around each byte with a wrong parity bit.
-    fn take_gaps(&mut self) -> Vec<Duration>;
+    /// Every time that the parity of a port was switched, to send a byte with a wrong parity bit.
+    fn take_switches(&mut self) -> Vec<Switch>;
 
     /// The inner links at which the bench has a port.
     fn inner_links(&self) -> &[InnerLink];

@@ -9,7 +9,7 @@ use super::lateness::Lateness;
 use super::port_end::{Accounting, MOST_RECORDED, PortEnd};
 use super::tamper::Tamper;
 use super::{HARMLESS, Lead, LinkFault, Moment, Trouble};
-use crate::port::{LastWords, Wire, wake_on_time};
+use crate::port::{LastWords, Switch, Wire, wake_on_time};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use rustix::event::{Timespec, poll};
@@ -207,7 +207,8 @@ impl<A: Accounting> Pump<A> {
         }
         self.give(now);
         let until = self.due(now).map_or(until, |due| due.min(until));
-        if (self.lying || !self.any_has_come()) && self.trouble.is_none() && now < until {
+        let early = self.ports.iter().any(|port| port.wire.has_early());
+        if (self.lying || !self.any_has_come()) && !early && self.trouble.is_none() && now < until {
             self.pass(now, until);
         } else {
             self.take(now);
@@ -325,10 +326,10 @@ impl<A: Accounting> Pump<A> {
         ports.map(|port| std::mem::take(&mut port.unplaced)).sum()
     }
 
-    /// As [`PortLink::take_gaps`](super::PortLink::take_gaps).
-    pub(crate) fn take_gaps(&mut self) -> Vec<time::Duration> {
+    /// As [`PortLink::take_switches`](super::PortLink::take_switches).
+    pub(crate) fn take_switches(&mut self) -> Vec<Switch> {
         let ports = self.ports.iter_mut();
-        ports.flat_map(|port| port.wire.take_gaps()).collect()
+        ports.flat_map(|port| port.wire.take_switches()).collect()
     }
 
     fn at(&self, time: time::Instant) -> Instant {

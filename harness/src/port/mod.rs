@@ -22,6 +22,7 @@ mod wire;
 
 pub use last_words::{LastWords, Unsaid};
 pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
+pub use serial::Switch;
 pub use tap::{PortCounts, SilentTap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
 

@@ -4,7 +4,7 @@
 //! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
 
 use super::open::{OpenError, printed};
-use harness_proto::line::{Format, Parity as LineParity};
+use harness_proto::line::{Format, Parity as LineParity, Received};
 use harness_proto::time::Span;
 use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::io::Errno;
@@ -16,11 +16,23 @@ use std::os::fd::AsRawFd;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Gaps that are remembered until they are asked for.
-const MOST_GAPS: usize = 10_000;
+/// Switches that are remembered until they are asked for.
+const MOST_SWITCHES: usize = 10_000;
 
 /// How long a drained port may take to take a byte.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// How much later than it came a byte may be read: adapters collect bytes for up to 16 ms.
+const LATEST: Duration = Duration::from_millis(20);
+
+/// One time that the parity of a port was switched, to send a byte with a wrong parity bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Switch {
+    /// How long sending was held up.
+    pub idle: Duration,
+    /// Bytes that came meanwhile. A UART has one parity setting for both directions, so it is not known whether they came with errors.
+    pub unknown: u64,
+}
 
 /// What belongs to a serial port beside its stream.
 #[derive(Debug)]
@@ -31,7 +43,45 @@ pub(super) struct Serial {
     fd: OwnedFd,
     /// Whether the right parity is odd.
     odd: bool,
-    gaps: Vec<Duration>,
+    switches: Switches,
+}
+
+/// The times that the parity was switched.
+#[derive(Debug, Default)]
+pub(super) struct Switches {
+    done: Vec<Switch>,
+    /// Since when the parity is right again, until all bytes that came before are read.
+    restored: Option<Instant>,
+}
+
+impl Switches {
+    pub(super) fn take(&mut self) -> Vec<Switch> {
+        std::mem::take(&mut self.done)
+    }
+
+    /// The parity was switched, and is right again.
+    fn note(&mut self, idle: Duration, restored: Instant) {
+        self.restored = Some(restored);
+        if self.done.len() < MOST_SWITCHES {
+            self.done.push(Switch { idle, unknown: 0 });
+        }
+    }
+
+    /// A byte that was read, without the error that the kernel may have marked because the parity was switched while it came.
+    pub(super) fn judged(&mut self, byte: Received) -> Received {
+        if self.restored.is_none() {
+            return byte;
+        }
+        if let Some(last) = self.done.last_mut() {
+            last.unknown += 1;
+        }
+        Received::good(byte.byte)
+    }
+
+    /// All that had come by this time is read.
+    pub(super) fn has_read_all(&mut self, by: Instant) {
+        self.restored = self.restored.filter(|restored| by < *restored + LATEST);
+    }
 }
 
 impl Drop for Serial {
@@ -110,7 +160,7 @@ fn raw(
             .try_clone()
             .map_err(|error| OpenError::of(path, &error))?,
         odd: parity == Parity::Odd,
-        gaps: Vec::new(),
+        switches: Switches::default(),
     };
     rustix::io::ioctl_fionbio(&fd, true).map_err(other)?;
     rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(other)?;
@@ -181,16 +231,14 @@ fn lower_latency(path: &Path) {
 }
 
 impl Serial {
-    pub(super) fn take_gaps(&mut self) -> Vec<Duration> {
-        std::mem::take(&mut self.gaps)
+    pub(super) fn switches(&mut self) -> &mut Switches {
+        &mut self.switches
     }
 
-    /// Sends a byte with a wrong parity bit, and remembers how long that held up the line.
+    /// Sends a byte with a wrong parity bit. What came before must have been read.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
-        let gap = send_wrong_parity(&mut fd.as_fd(), byte, self.odd)?;
-        if self.gaps.len() < MOST_GAPS {
-            self.gaps.push(gap);
-        }
+        let idle = send_wrong_parity(&mut fd.as_fd(), byte, self.odd)?;
+        self.switches.note(idle, Instant::now());
         Ok(())
     }
 

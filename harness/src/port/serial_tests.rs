@@ -1,7 +1,7 @@
 //! Wrong parity in its order, and what a pseudo terminal can show of it: it keeps PARODD, though it has no parity.
 
 use super::*;
-use harness_proto::line::Rate;
+use harness_proto::line::{LineError, Rate};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::os::unix::ffi::OsStrExt;
@@ -46,6 +46,25 @@ fn the_parity_is_switched_between_drained_bytes() {
     assert_eq!(port.done, ["drain", "even", "13", "drain", "odd"]);
     // The second drain is in the gap.
     assert!(gap >= Duration::from_millis(2), "{gap:?}");
+}
+
+/// A UART has one parity setting for both directions: what comes while it is switched says nothing of the line. A byte may be read later
+/// than it came, and a computer that stands still reads it later than any adapter hands it over.
+#[test]
+fn what_comes_while_the_parity_is_switched_has_no_known_line_status() {
+    let bad = Received::bad(0x13, LineError::Parity);
+    let start = Instant::now();
+    let mut switches = Switches::default();
+    assert_eq!(switches.judged(bad), bad);
+    switches.note(Duration::from_millis(2), start);
+    assert_eq!(switches.judged(bad), Received::good(0x13));
+    // The port is looked at once more before the adapter must have handed over everything, and then after a standstill.
+    switches.has_read_all(start + LATEST / 2);
+    assert_eq!(switches.judged(bad), Received::good(0x13));
+    switches.has_read_all(start + LATEST * 50);
+    assert_eq!(switches.judged(bad), bad);
+    let idle = Duration::from_millis(2);
+    assert_eq!(switches.take(), [Switch { idle, unknown: 2 }]);
 }
 
 #[test]

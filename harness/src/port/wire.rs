@@ -2,7 +2,7 @@
 
 use super::last_words::LastWords;
 use super::rfc2217::Telnet;
-use super::serial::Serial;
+use super::serial::{Serial, Switch};
 use crate::counted::counted;
 use crate::trouble::Trouble;
 use harness_proto::line::{LineError, Received};
@@ -13,6 +13,7 @@ use rustix::io::Errno;
 use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::time::Instant;
 
 /// What is read from the operating system at a time: a line brings few bytes between two looks at it.
 const CHUNK: usize = 256;
@@ -71,6 +72,8 @@ pub struct Wire {
     unplaced: u64,
     /// Bytes that were read, as coded.
     read: u64,
+    /// What was read before the parity was switched.
+    early: Vec<Received>,
     /// A serial port under plain bytes: its settings are put back with it.
     plain_serial: Option<Box<Serial>>,
 }
@@ -93,6 +96,7 @@ impl Wire {
             bytes_waiting: 0,
             unplaced: 0,
             read: 0,
+            early: Vec::new(),
             plain_serial: None,
         }
     }
@@ -165,10 +169,10 @@ impl Wire {
         std::mem::take(&mut self.unplaced)
     }
 
-    /// How long sending has been held up by draining around bytes with a wrong parity bit, each time.
-    pub fn take_gaps(&mut self) -> Vec<std::time::Duration> {
+    /// Every time that the parity was switched to send a byte with a wrong parity bit.
+    pub fn take_switches(&mut self) -> Vec<Switch> {
         match &mut self.coding {
-            Coding::Serial(_, serial) => serial.take_gaps(),
+            Coding::Serial(_, serial) => serial.switches().take(),
             _ => Vec::new(),
         }
     }
@@ -259,11 +263,7 @@ impl Wire {
                 },
                 Waiting::WrongParity(byte) => {
                     let byte = *byte;
-                    let sent = match &mut self.coding {
-                        Coding::Serial(_, serial) => serial.send_wrong_parity(&self.fd, byte),
-                        _ => Ok(()),
-                    };
-                    sent.map_err(|error| self.lost(error))?;
+                    self.send_wrong_parity(byte)?;
                     self.bytes_waiting -= 1;
                 }
                 Waiting::Break(span) => {
@@ -279,6 +279,20 @@ impl Wire {
             self.waiting.pop_front();
         }
         Ok(())
+    }
+
+    /// Sends a byte with a wrong parity bit on a serial port. What came before the parity is switched keeps its line errors.
+    fn send_wrong_parity(&mut self, byte: u8) -> Result<(), Trouble> {
+        rustix::termios::tcdrain(&self.fd).map_err(|error| self.lost(error))?;
+        let mut early = std::mem::take(&mut self.early);
+        let read = self.read_all(&mut early);
+        self.early = early;
+        read?;
+        let sent = match &mut self.coding {
+            Coding::Serial(_, serial) => serial.send_wrong_parity(&self.fd, byte),
+            _ => Ok(()),
+        };
+        sent.map_err(|error| self.lost(error))
     }
 
     fn lost(&self, error: impl Into<std::io::Error>) -> Trouble {
@@ -300,12 +314,32 @@ impl Wire {
         ))
     }
 
+    /// Whether something is read that [`Self::receive`] has not given yet: the operating system does not report it again.
+    #[must_use]
+    pub fn has_early(&self) -> bool {
+        !self.early.is_empty()
+    }
+
     /// Reads what has come.
     ///
     /// # Errors
     /// [`Trouble::Lost`] where the port is gone or the other end has closed the connection,
     /// [`Trouble::Garbled`] where what came is not coded as it must be. What came before is in `into`.
     pub fn receive(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
+        into.append(&mut self.early);
+        self.read_all(into)
+    }
+
+    fn read_all(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
+        let by = Instant::now();
+        self.read_chunks(into)?;
+        if let Coding::Serial(_, serial) = &mut self.coding {
+            serial.switches().has_read_all(by);
+        }
+        Ok(())
+    }
+
+    fn read_chunks(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
         let mut buffer = [0; CHUNK];
         for _ in 0..MOST_CHUNKS {
             let length = match rustix::io::read(&self.fd, &mut buffer) {
@@ -327,15 +361,14 @@ impl Wire {
     fn decode(&mut self, bytes: &[u8], into: &mut Vec<Received>) -> Result<(), Trouble> {
         match &mut self.coding {
             Coding::Plain => into.extend(bytes.iter().map(|byte| Received::good(*byte))),
-            Coding::Marked(unmark) | Coding::Serial(unmark, _) => {
-                for byte in bytes {
-                    match unmark.push(*byte) {
-                        None => {}
-                        Some(Ok(received)) => into.push(received),
-                        Some(Err(bad)) => {
-                            return Err(Trouble::Garbled(format!("{}: {bad}", self.name)));
-                        }
-                    }
+            Coding::Marked(unmark) => {
+                for byte in unmarked(unmark, bytes, &self.name) {
+                    into.push(byte?);
+                }
+            }
+            Coding::Serial(unmark, serial) => {
+                for byte in unmarked(unmark, bytes, &self.name) {
+                    into.push(serial.switches().judged(byte?));
                 }
             }
             Coding::Telnet(telnet) => {
@@ -350,4 +383,14 @@ impl Wire {
         }
         Ok(())
     }
+}
+
+/// Bytes without their marks.
+fn unmarked<'a>(
+    unmark: &'a mut Unmark,
+    bytes: &'a [u8],
+    name: &'a str,
+) -> impl Iterator<Item = Result<Received, Trouble>> + 'a {
+    let bytes = bytes.iter().filter_map(|byte| unmark.push(*byte));
+    bytes.map(move |byte| byte.map_err(|bad| Trouble::Garbled(format!("{name}: {bad}"))))
 }

@@ -10,7 +10,7 @@ use crate::link::{
     Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble,
 };
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::{LastWords, Wire};
+use crate::port::{LastWords, Switch, Wire};
 use crate::rig::segment::ON_PORT;
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
@@ -233,8 +233,8 @@ impl PortLink for SegmentLink {
         self.pump.take_unplaced()
     }
 
-    fn take_gaps(&mut self) -> Vec<time::Duration> {
-        self.pump.take_gaps()
+    fn take_switches(&mut self) -> Vec<Switch> {
+        self.pump.take_switches()
     }
 
     fn inner_links(&self) -> &[InnerLink] {

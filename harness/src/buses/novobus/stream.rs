@@ -10,13 +10,12 @@ use crate::link::{
     Capability, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble, link_name,
 };
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::{LastWords, Wire};
+use crate::port::{LastWords, Switch, Wire};
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, Trace};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::time;
 
 /// Default time tolerance of a rig.
 pub const TOLERANCE: Span = Span::from_millis(5);
@@ -194,8 +193,8 @@ impl PortLink for StreamLink {
         self.pump.take_unplaced()
     }
 
-    fn take_gaps(&mut self) -> Vec<time::Duration> {
-        self.pump.take_gaps()
+    fn take_switches(&mut self) -> Vec<Switch> {
+        self.pump.take_switches()
     }
 
     fn inner_links(&self) -> &[InnerLink] {

@@ -18,7 +18,7 @@ pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD};
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::{LastWords, wake_on_time};
+use crate::port::{LastWords, Switch, wake_on_time};
 use adapter::Event;
 use harness_proto::can::{self, BitRate, CanError, Frame};
 use harness_proto::time::{Instant, Span};
@@ -414,7 +414,7 @@ impl PortLink for FrameLink {
         std::mem::take(&mut self.unplaced)
     }
 
-    fn take_gaps(&mut self) -> Vec<time::Duration> {
+    fn take_switches(&mut self) -> Vec<Switch> {
         Vec::new()
     }
 

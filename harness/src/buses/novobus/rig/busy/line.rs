@@ -9,7 +9,7 @@ use crate::link::pump::SLACK;
 use crate::link::stamp::stamped;
 use crate::link::{Capability, InnerLink, Lead, Line, Link, Moment, Octets, PlacedFault, PortLink};
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::LastWords;
+use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -280,7 +280,7 @@ impl PortLink for BusyLine {
         0
     }
 
-    fn take_gaps(&mut self) -> Vec<Duration> {
+    fn take_switches(&mut self) -> Vec<Switch> {
         Vec::new()
     }
 
