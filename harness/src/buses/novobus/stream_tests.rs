@@ -7,6 +7,7 @@ use crate::port::{PortAddress, PortSettings, open};
 use harness_proto::novobus::sync::SYNCO;
 use std::io::Write as _;
 use std::net::{TcpListener, TcpStream};
+use std::time;
 
 const DRIVES: u8 = 3;
 
