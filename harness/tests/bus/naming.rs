@@ -377,6 +377,32 @@ fn what_is_right_refutes_a_name() {
     assert!(names.contains(&"ram-bit-stuck-at-0"), "{names:?}");
 }
 
+/// ND21 9.6: 00 in place of 01 is accepted by a drive that does not know this rule, and by one that checks nothing. That it refuses another
+/// wrong byte tells them apart.
+#[test]
+fn what_is_right_elsewhere_refutes_a_name() {
+    let wrong = ["drive 1 deviates checksum-zero-accepted".to_owned()];
+    let link = twin(&wrong).expect("a ring").into_link();
+    let mut play = Play::default();
+    let mut names = Vec::new();
+    // C0+42+FE = 200, so 01 is right.
+    for check in ["00", "2F"] {
+        let source = Source {
+            name: "wrong".to_owned(),
+            text: format!("title x\nring {DRIVES}\n> 88 FE C0 42 FE {check}\n").into(),
+        };
+        let plan = Entry::new(source, None).expect("a scenario").plan;
+        let all = played_in_time(&plan.expect("novobus"), &link);
+        let _sighting = play.judge(all, link.byte_time(), twin(&[]).expect("a ring"));
+        names.push(names_of(&play, &[]));
+    }
+    assert_eq!((play.differing.len(), play.alike.len()), (1, 1));
+    let unchecked = "checksum-not-checked";
+    assert!(names[0].contains(&unchecked), "{names:?}");
+    assert!(!names[1].contains(&unchecked), "{names:?}");
+    assert!(names[1].contains(&"checksum-zero-accepted"), "{names:?}");
+}
+
 /// ND21 10.3: a drive that takes only the mask FF for 7F does not add masks to bytes: with all others before it is right.
 #[test]
 #[ignore = "takes half a minute; .ci/nightly runs it"]
