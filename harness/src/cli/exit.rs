@@ -109,3 +109,34 @@ impl From<Exit> for ExitCode {
         Self::from(exit as u8)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gravest verdict decides, and what was only skipped has shown nothing.
+    #[test]
+    fn verdicts_and_their_exit_codes() {
+        let code = |gravest| match gravest {
+            Verdict::RigError => Exit::RigError,
+            Verdict::Aborted => Exit::Usage,
+            Verdict::Failed => Exit::Failed,
+            Verdict::Inconclusive | Verdict::Flaky | Verdict::Skipped => Exit::Incomplete,
+            Verdict::Marginal | Verdict::Passed => Exit::Passed,
+        };
+        for some in 0..1_u32 << Verdict::ALL.len() {
+            let numbered = (0..).zip(Verdict::ALL);
+            let chosen = numbered.filter(|(place, _)| some >> place & 1 == 1);
+            let verdicts: Vec<_> = chosen.map(|(_, verdict)| verdict).collect();
+            let expected = verdicts
+                .last()
+                .map_or(Exit::NothingSelected, |own| code(*own));
+            assert_eq!(Exit::of(&verdicts, false), expected, "{verdicts:?}");
+            let required = match expected {
+                Exit::Passed if verdicts.contains(&Verdict::Skipped) => Exit::Incomplete,
+                other => other,
+            };
+            assert_eq!(Exit::of(&verdicts, true), required, "{verdicts:?}");
+        }
+    }
+}

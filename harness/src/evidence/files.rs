@@ -193,3 +193,50 @@ fn refused(file: &str, kind: fs::FileType) -> String {
     };
     format!("{file} is {what}, which has no place in evidence")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_from_the_sums_is_said() {
+        let folder = tempfile::tempdir().expect("room");
+        let path = folder.path();
+        let scenario = "scenarios/a.scn";
+        fs::create_dir(path.join(SCENARIOS)).expect("room");
+        let put = |name: &str, text: &str| fs::write(path.join(name), text).expect("room");
+        let remove = |name: &str| fs::remove_file(path.join(name)).expect("a file");
+        let wrong = || compare_sums(path).expect("a folder");
+        put(VERSIONS, "{}");
+        put(scenario, "title a\n");
+        let stated = sums(path).expect("a folder");
+        put(SUMS, &stated);
+        assert_eq!(wrong(), [""; 0]);
+        // A file of the same length.
+        put(VERSIONS, "[]");
+        put("notes", "");
+        remove(scenario);
+        assert_eq!(
+            wrong(),
+            [
+                "scenarios/a.scn is missing",
+                "versions.json was changed",
+                "notes was added"
+            ]
+        );
+        put(VERSIONS, "{}");
+        put(scenario, "title a\n");
+        remove("notes");
+        for more in ["x\n", stated.as_str()] {
+            put(SUMS, &(stated.clone() + more));
+            let words = "SHA256SUMS has lines that are no sum of a file of its own";
+            assert_eq!(wrong(), [words], "{more}");
+        }
+        fs::create_dir(path.join("parts")).expect("room");
+        put(SUMS, &stated);
+        assert_eq!(
+            wrong(),
+            ["parts is a folder, which has no place in evidence"]
+        );
+    }
+}

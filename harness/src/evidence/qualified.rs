@@ -247,3 +247,42 @@ impl QualifiedBench for Record<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn both_files_of_a_qualification_are_compared() {
+        let folder = tempfile::tempdir().expect("room");
+        let path = folder.path();
+        let put = |file: &str, text: &str| fs::write(path.join(file), text).expect("room");
+        let wrong = |profile: Option<&str>| {
+            let made = Qualified {
+                profile: profile.map(str::to_owned),
+                deviations: "deviations: none\ncompared: 3\n".to_owned(),
+                verdict: Verdict::Passed,
+            };
+            compare(path, &made)
+        };
+        let asked = Some("schema = 1\n");
+        let missing = wrong(asked);
+        let starts = |place: usize, file: &str| missing[place].starts_with(file);
+        assert!(starts(0, PROFILE) && starts(1, DEVIATIONS), "{missing:?}");
+        put(PROFILE, "schema = 1\n");
+        put(DEVIATIONS, "deviations: none\ncompared: 3\n");
+        assert_eq!(wrong(asked), [""; 0]);
+        let not_asked = "profile.toml: the drives were not asked, so there is none";
+        assert_eq!(wrong(None), [not_asked]);
+        put(PROFILE, "schema = 2\n");
+        put(DEVIATIONS, "deviations: none\ncompared: 4\n");
+        assert_eq!(
+            wrong(asked),
+            [
+                "profile.toml, line 1: the file has \"schema = 2\", the record gives \"schema = 1\"",
+                "deviations.txt, line 2: the file has \"compared: 4\", the record gives \"compared: 3\""
+            ]
+        );
+    }
+}
