@@ -44,3 +44,37 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         ..Limits::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::limits;
+    use crate::rig::check::parse;
+    use crate::scenario::source::Source;
+
+    /// The guard judges bytes to all drives alike: by the lowest speed of the file, and without motion if one motor must not turn.
+    #[test]
+    fn the_strictest_drive_counts_for_all() {
+        let permitted = |drive: &str, allow_motion: bool| {
+            let text = format!(
+                "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n\
+                 [limits]\nallow_motion = true\nmax_speed = \"300rpm\"\n[[drive]]\naddress = 0\nmax_speed = \"250rpm\"\n\
+                 [[drive]]\naddress = 2\n{drive}\n"
+            );
+            let source = Source {
+                name: "desk.toml".to_owned(),
+                text: text.into(),
+            };
+            let own = limits(&parse(&source).expect("a rig"), allow_motion);
+            (own.motion, own.max_speed)
+        };
+        for (drive, allow_motion, expected) in [
+            ("", true, (true, Some(250))),
+            ("max_speed = \"199.9rpm\"", true, (true, Some(199))),
+            ("max_speed = \"301rpm\"", true, (true, Some(250))),
+            ("", false, (false, Some(250))),
+            ("motion = false", true, (false, Some(250))),
+        ] {
+            assert_eq!(permitted(drive, allow_motion), expected, "{drive}");
+        }
+    }
+}

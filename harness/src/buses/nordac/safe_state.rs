@@ -430,19 +430,23 @@ mod tests {
         assert!(!is_on(&line, 9));
     }
 
-    /// An inverter that ignores OFF2 keeps its output on: that is seen. On its quick-stop ramp it stops.
+    /// An inverter that ignores OFF2 keeps its output on: that is seen, also where its first replies are from before the start (`pzd-latency`).
+    /// On its quick-stop ramp it stops.
     #[test]
     fn an_output_that_stays_on_is_not_confirmed() {
-        let mut deaf = slave(8, PpoType::One);
-        deaf.deviation = harness_sim::nordac::deviation::deviation("no-off2");
-        assert!(deaf.deviation.is_some());
-        let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
-        run(&mut line, &slaves);
-        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
-        assert!(!safe.confirmed, "{safe}");
-        assert!(safe.words.contains("the output is on"), "{safe}");
-        let safe = self::safe(&mut line, &slaves, &[StandstillStep::Stop]);
-        assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
+        for latency in [1, 5, 20] {
+            let mut deaf = slave(8, PpoType::One);
+            deaf.deviation = harness_sim::nordac::deviation::deviation("no-off2");
+            assert!(deaf.deviation.is_some());
+            deaf.properties.pzd_latency = latency;
+            let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
+            run(&mut line, &slaves);
+            let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
+            assert!(!safe.confirmed, "{latency}: {safe}");
+            assert!(safe.words.contains("the output is on"), "{safe}");
+            let safe = self::safe(&mut line, &slaves, &[StandstillStep::Stop]);
+            assert!(safe.confirmed && !is_on(&line, 8), "{latency}: {safe}");
+        }
     }
 
     /// A denied telegram of which the begin was sent, and whose FCS is the begin of the telegram that stops: it is ended first.

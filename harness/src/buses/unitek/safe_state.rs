@@ -276,6 +276,25 @@ mod tests {
         }
     }
 
+    /// A drive that is locked, and whose motor still coasts, is not safe yet.
+    #[test]
+    fn a_motor_that_does_not_stand_is_not_confirmed() {
+        let mut line = line(Limits::unlimited());
+        send(&mut line, &["201#31FF7F"]);
+        let standing = Standstill {
+            order: vec![StandstillStep::Block],
+            within: Span::from_millis(50),
+            ..Standstill::default()
+        };
+        let coasts = safe_state(&mut line, &axes(), PATIENCE, &standing);
+        let why = "drive 1: NOT confirmed: waited 50.000 ms for it to stand";
+        assert!(coasts.words.contains(why), "{coasts}");
+        assert!(!coasts.confirmed);
+        assert_eq!(registers(&line, 1)[..3], [4, 0, 0]);
+        let stands = safe(&mut line);
+        assert!(stands.confirmed, "{stands}");
+    }
+
     /// Without permission for motion the drives, which another master may have released, are locked first.
     #[test]
     fn drives_that_may_not_be_commanded_are_locked() {

@@ -197,3 +197,40 @@ impl Entry {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::Entry;
+    use crate::link::{DriveFault, Link as _, Moment, PlacedFault};
+    use crate::rig::check::parse;
+    use crate::scenario::simulate::bench;
+    use crate::scenario::source::Source;
+
+    fn source(text: &str) -> Source {
+        Source {
+            name: "desk".to_owned(),
+            text: text.to_owned().into(),
+        }
+    }
+
+    /// A drive may be silent on purpose while a scenario is played. Between scenarios one that does not answer is not known to be safe.
+    #[test]
+    fn a_silent_drive_trips_between_scenarios_only() {
+        let rig = source(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 2\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n\
+             [[interlock]]\ndrive = 1\ncell = \"nist\"\nmin = \"-300rpm\"\nmax = \"300rpm\"\n",
+        );
+        let mut interlocks = Interlocks::of(&parse(&rig).expect("a rig")).expect("one of them");
+        let ring = "title x\nring 2\ndrive 0..last model nd21\n> 80\n";
+        let plan = Entry::new(source(ring), None).expect("no mistakes").plan;
+        let mut link = bench(&plan.expect("novobus"));
+        assert_eq!(interlocks.look_at_all(&mut link), Ok(()));
+        link.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
+        assert_eq!(interlocks.look(link.now(), &mut link), Ok(()));
+        let why =
+            "interlock on nist of drive 1: the drive does not answer, so its state is not known";
+        let trips = Err(Trouble::Interlock(why.to_owned()));
+        assert_eq!(interlocks.look_at_all(&mut link), trips);
+    }
+}
