@@ -176,7 +176,7 @@ fn a_choice_that_moves_the_model_excuses_no_wrong_byte() {
         };
         let ring = format!("drive 0..last property self-test-time = 0ms\n{wrong}");
         let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_, _| {}, early);
+        let outcome = judged_early(&mut link(&ring), "", (&plan, &way), &|_, _| {}, (early, 0));
         assert_eq!(outcome.verdict, expected, "{outcome:#?}");
     };
     judged("", Passed);
@@ -200,7 +200,7 @@ fn zeros_of_the_bench_excuse_no_wrong_byte() {
             anew: true,
         };
         let early = Span::from_micros(230);
-        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_, _| {}, early);
+        let outcome = judged_early(&mut link(wrong), "", (&plan, &way), &|_, _| {}, (early, 0));
         assert_eq!(outcome.verdict, expected, "{outcome:#?}");
     };
     judged("", Passed);

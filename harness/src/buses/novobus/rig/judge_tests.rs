@@ -67,16 +67,17 @@ pub(super) fn judged_on(
     (plan, way): (&Plan, &Way),
     change: Change<'_>,
 ) -> Outcome {
-    judged_early(link, rig, (plan, way), change, Span::ZERO)
+    judged_early(link, rig, (plan, way), change, (Span::ZERO, 0))
 }
 
-/// The same where each byte is stamped so much earlier: a ring behind a socket is not bound to the times of a line.
+/// The same where each byte is stamped so much earlier, as behind a socket, which is not bound to the times of a line, and with so many line errors
+/// whose bytes are not known.
 pub(super) fn judged_early(
     link: &mut dyn Link,
     rig: &str,
     (plan, way): (&Plan, &Way),
     change: Change<'_>,
-    early: Span,
+    (early, unplaced): (Span, u64),
 ) -> Outcome {
     let drives = way.rings[0].drives();
     let rig = format!(
@@ -108,7 +109,7 @@ pub(super) fn judged_early(
         exactness,
         conversations: &conversations,
         comparisons: &comparisons,
-        unplaced: 0,
+        unplaced,
         alive: &|| {},
     };
     judge(&mut outcome, &facts);
@@ -185,6 +186,10 @@ fn a_known_deviation_excuses_nothing_else() {
     check(wrong, &known("odd-sums", 1, "9.6"), reads, Passed);
     check(wrong, &known("odd-sums", 2, "9.6"), reads, Failed);
     check(ignores, &known("odd-reads", 1, "10.1"), writes, Failed);
+    // Where a drive could not be made ready, no step was played.
+    let unready = format!("{SET}{reads}");
+    check(wrong, "", &unready, Failed);
+    check(wrong, &known("odd-sums", 1, "9.6"), &unready, Inconclusive);
 }
 
 /// ND21 9.9: the number of unasked zeros, and which drive sends the first one, is a race of the drives' clocks.
@@ -265,6 +270,29 @@ fn a_race_excuses_nothing_elsewhere() {
         all.iter_mut().for_each(end);
     };
     assert_eq!(verdict(&over), Failed);
+}
+
+/// ND21 9.1: any byte may be the one that a line error has damaged.
+#[test]
+fn line_errors_without_their_bytes_settle_nothing() {
+    let plan = plan(format!("title x\nring 3\n{SET}read-byte 1 FE13 = 88\n"));
+    let way = Way {
+        rings: plan.rings.clone(),
+        attempts: None,
+        anew: false,
+    };
+    let wrong = "drive 1 deviates checksum-wrong\n";
+    for (drives, errors, expected) in [
+        ("", 0, Passed),
+        (wrong, 0, Failed),
+        ("", 1, Inconclusive),
+        (wrong, 1, Inconclusive),
+    ] {
+        let mut link = link(&format!("{SET}{drives}"));
+        let seen = (Span::ZERO, errors);
+        let outcome = judged_early(&mut link, "", (&plan, &way), &|_, _| {}, seen);
+        assert_eq!(outcome.verdict, expected, "{drives}{errors}: {outcome:#?}");
+    }
 }
 
 /// ND21 9.8: a byte that is lost at the very end of a conversation is noticed although no line asks for it.

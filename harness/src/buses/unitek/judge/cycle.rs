@@ -128,3 +128,22 @@ impl Cycle {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// UNITEK 5.2: a gap may be off by a scan and the clock of an adapter, the mean of many gaps may not.
+    #[test]
+    fn the_mean_of_many_gaps_is_judged() {
+        let seen = |gap: Span| {
+            let mut cycle = Running::new(10, Instant::START, true);
+            (0..=ENOUGH).find_map(|count| cycle.comes(Instant::START + gap * count, Span::ZERO))
+        };
+        assert_eq!(seen(Span::from_millis(10)), None);
+        let late = Span::from_millis(11);
+        assert_eq!(seen(late), Some(Untimely::Mean(late, ENOUGH)));
+        let lost = Span::from_millis(20);
+        assert_eq!(seen(lost), Some(Untimely::Gap(lost)));
+    }
+}
