@@ -6,10 +6,12 @@ use crate::capture::{
     Capture, Carries, JudgeOptions, LiveRecorder, Piece, RecordedPlace, Tape, judge, read,
 };
 use crate::library::{Entry, sources};
+use crate::medium::Medium;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
+use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use harness_sim::record::{Channel, Trace};
 
@@ -133,8 +135,14 @@ fn every_bus_is_heard_again() {
             Carries::Frames => channels.map(|own| own.frames().len()).sum(),
             _ => channels.map(|own| own.octets().len()).sum(),
         };
+        let lasts = |piece: &Piece| match piece {
+            Piece::Frame(own) => own.at.since(own.start),
+            _ => Span::ZERO,
+        };
         let heard = |(at, _, piece): &(_, usize, Piece)| {
-            let (end, count) = match piece.later(hour) {
+            let later = piece.later(hour);
+            assert_eq!(lasts(&later), lasts(piece), "{name}");
+            let (end, count) = match later {
                 Piece::Octet(own) => (Some(own.at), 1),
                 Piece::Telegram(_, octets) => (octets.last().map(|own| own.at), octets.len()),
                 Piece::Frame(own) => (Some(own.at), 1),
@@ -147,6 +155,17 @@ fn every_bus_is_heard_again() {
         assert!(carried > 0, "{name}");
         assert_eq!(heard, carried, "{name}");
     }
+}
+
+/// A telegram at a port is heard once it is whole: the last one too, behind which nothing comes.
+#[test]
+fn the_last_telegram_of_a_port_is_heard() {
+    let traces = traces("nordac-en-1-rate-187.5");
+    let carried = Tape::of(&traces, Rate::default()).pieces;
+    let medium = Medium::Octets(BusRate::K187_5.format());
+    let end = carried.last().expect("a telegram").0;
+    let heard = Tape::of_ports(&traces, medium, end).pieces;
+    assert_eq!(heard.len(), carried.len());
 }
 
 /// A capture that begins in mid-conversation.

@@ -6,8 +6,8 @@ use super::{
 };
 use crate::explore::smaller::smaller;
 use crate::explore::{
-    Bounds, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd, Spiced, Swarm,
-    Watcher,
+    Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd,
+    Spiced, Swarm, Watcher,
 };
 use crate::library::Entry;
 use crate::rig::{UseOptions, find};
@@ -137,6 +137,8 @@ impl<B: LineBus> EngineTrial<B> {
                 .expect("a header")
                 .finding;
             assert!(small.case.measure() <= finding.case.measure(), "{name}");
+            let (own, kind) = (&small.difference, &finding.difference);
+            assert!(own.is_like(kind), "{name}: {own:?} in place of {kind:?}");
             let text = LineTalk::<B>::text(&small).expect("a model");
             let (right, why) = verdict(&text, "", &[]);
             assert_eq!(right, Verdict::Passed, "{name}: {why}\n{text}");

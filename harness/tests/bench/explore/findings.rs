@@ -3,8 +3,9 @@
 use super::{Difference, bounds, explore, planted};
 use harness::buses::novobus::explore::shrink::{Shrunk, Subject, shrink};
 use harness::explore::promote::{Naming, checkout, promote};
-use harness::explore::{ExploreError, Finding, OnSim, Target};
+use harness::explore::{ExploreError, Finding, OnSim, RingSetup, Target, against_reference, play};
 use harness::library::Entry;
+use harness::link::Link as _;
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
@@ -90,6 +91,26 @@ fn a_finding_is_made_readable() {
     < 8A 00 82 01 80 FD 01
     < 88 00 C0 80 01 BF
     ");
+}
+
+/// ND21 10.2: a write that is never read back shows in the cell, which is compared with that of the reference model.
+#[test]
+fn a_cell_that_is_not_read_is_compared() {
+    let Shrunk { subject, .. } = small("writes-ignored").1;
+    let mut case = subject.case;
+    case.acts.truncate(1);
+    let judged = |setup: &RingSetup| {
+        let mut link = setup.under_test(&case.sizes()).expect("a ring");
+        let _seen = play(&mut link, &case);
+        against_reference(&case, &link, &link.trace(case.ring()))
+    };
+    assert_eq!(judged(&RingSetup::default()), None);
+    let found = judged(&subject.setup).expect("another cell");
+    assert_eq!(
+        (found.drive, found.rule.as_str()),
+        (Some(0), "contents of a cell")
+    );
+    assert!(found.about.contains(" FD80 "), "{}", found.about);
 }
 
 /// The same twice gives the same.

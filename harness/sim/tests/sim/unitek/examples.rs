@@ -476,6 +476,13 @@ fn eeprom_levels() {
     assert_eq!(desk.ask("201#3D1C00"), ["181#1C0A0000"]);
     desk.ask("201#830100");
     assert_eq!(desk.ask("201#3D1C00"), ["181#1C341200"]);
+    // The status mask is no parameter: it stays as it was written.
+    let stored = desk.ask("201#3D5200");
+    desk.ask("201#523412");
+    let written = desk.ask("201#3D5200");
+    assert_ne!(written, stored);
+    desk.ask("201#830100");
+    assert_eq!(desk.ask("201#3D5200"), written);
     desk.restart();
     assert_eq!(
         desk.ask("201#3D1C00"),
