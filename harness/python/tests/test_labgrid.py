@@ -58,6 +58,12 @@ def test_a_local_environment() -> None:
         own.read(0, "nist")
 
 
+def test_the_variable_names_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DRIVEBENCH", "/nowhere/drivebench")
+    with pytest.raises(drivebench.Error, match="failed to start /nowhere/drivebench"):
+        driver(Environment(str(EXAMPLES / "local.yaml")))
+
+
 def test_motion_is_off_by_default(tmp_path: Path) -> None:
     file = tmp_path / "env.yaml"
     file.write_text((EXAMPLES / "local.yaml").read_text().replace("allow_motion: true", "{}").replace("        {}", "        timeout: 20"))

@@ -73,3 +73,46 @@ def test_a_rig_that_is_not_there(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("-W", "error", "--drivebench-rig", "no-such-rig")
     result.assert_outcomes(errors=3)
     result.stdout.fnmatch_lines(["*no-such-rig*"])
+
+
+#: Runs each test twice on one item, as pytest-rerunfailures does, and reports the second run.
+TWICE = """
+    from _pytest.runner import runtestprotocol
+
+    def pytest_runtest_protocol(item, nextitem):
+        runtestprotocol(item, nextitem=nextitem, log=False)
+        item._initrequest()
+        runtestprotocol(item, nextitem=nextitem, log=True)
+        return True
+"""
+
+
+def test_a_rerun_replaces_its_properties(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(TWICE)
+    pytester.makepyfile("""
+        def test_stands(request, drivebench_drive):
+            request.node.user_properties.append(("own", "1"))
+            assert drivebench_drive["nist"] == 0
+    """)
+    pytester.runpytest_subprocess("-W", "error", "--drivebench-evidence", "evidence", "--junit-xml", "junit.xml").assert_outcomes(passed=1)
+    names = [(own.get("name"), own.get("value")) for own in xml.parse(pytester.path / "junit.xml").iter("property")]
+    own = [name for name, _ in names if name != "own"]
+    assert own == ["drivebench_rig", "drivebench_bus", "drivebench_capture"]
+    captures = sorted(path.name for path in (pytester.path / "evidence").iterdir())
+    assert len(captures) == 2 and str(dict(names)["drivebench_capture"]).endswith(captures[0])
+    assert captures[0].endswith("-2.pcapng")
+
+
+def test_a_rerun_without_a_rig_shows_no_earlier_one(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(TWICE)
+    pytester.makepyfile("""
+        import os
+
+        def test_stands(drivebench_drive):
+            os.environ["DRIVEBENCH"] = "no-such-program"
+            assert drivebench_drive["nist"] == 0
+    """)
+    result = pytester.runpytest_subprocess("-W", "error", "--junit-xml", "junit.xml")
+    result.assert_outcomes(errors=1)
+    result.stdout.no_fnmatch_line("*the last requests and answers*")
+    assert not list(xml.parse(pytester.path / "junit.xml").iter("property"))

@@ -57,7 +57,7 @@ fn pytest_and_labgrid_work() {
     let words = ["-W", "error", "-m", "pytest", "-W", "error"];
     let mut command = python(found, &words);
     command.args(["-q", "-p", "no:cacheprovider", "tests"]);
-    passed(&command.output().expect("Python"), "22 passed");
+    passed(&command.output().expect("Python"), "25 passed");
 }
 
 #[test]

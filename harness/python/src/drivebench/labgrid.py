@@ -25,8 +25,8 @@ class DrivebenchRig(Resource):
     rig: str = attr.ib(default="sim:3", validator=attr.validators.instance_of(str))
     #: The computer at which the rig is; it is reached by ssh. Empty: this one.
     host: str = attr.ib(default="", validator=attr.validators.instance_of(str))
-    #: The program there.
-    program: str = attr.ib(default="drivebench", validator=attr.validators.instance_of(str))
+    #: The program there. Empty: `drivebench` at `host`; at this computer `$DRIVEBENCH`, or `drivebench`.
+    program: str = attr.ib(default="", validator=attr.validators.instance_of(str))
     #: What an exporter adds; not used.
     extra: dict[str, Any] = attr.ib(factory=dict, repr=False)
 
@@ -48,10 +48,11 @@ class DrivebenchDriver(Driver):
 
     def on_activate(self) -> None:
         own = self.resource
-        program, name = own.program, own.rig
+        program: str | list[str] | None = own.program or None
+        name = own.rig
         if own.host:
             # ssh gives one line to the shell of its host.
-            program = [self._ssh(), "-T", "-o", "BatchMode=yes", own.host, shlex.quote(program)]
+            program = [self._ssh(), "-T", "-o", "BatchMode=yes", own.host, shlex.quote(own.program or "drivebench")]
             name = shlex.quote(name)
         self._rig = Rig(name, allow_motion=self.allow_motion, program=program, timeout=self.timeout)
 

@@ -12,6 +12,8 @@ import pytest
 from . import Drive, Rig
 
 _RIG = pytest.StashKey[Rig]()
+#: What the report of a test says of its rig.
+_PROPERTIES = ("drivebench_rig", "drivebench_bus", "drivebench_capture")
 #: The longest name of a file of evidence, without its ending.
 _LONGEST = 120
 
@@ -54,6 +56,10 @@ def drivebench_rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     item = request.node
     motion = item.get_closest_marker("drivebench_motion") is not None
     name = request.config.getoption("--drivebench-rig")
+    # A test that is run again (pytest-rerunfailures) keeps its item: what an earlier run has left there does not hold any more.
+    item.user_properties[:] = [own for own in item.user_properties if own[0] not in _PROPERTIES]
+    if _RIG in item.stash:
+        del item.stash[_RIG]
     with Rig(name, allow_motion=motion, program=request.config.getoption("--drivebench-program")) as rig:
         item.stash[_RIG] = rig
         item.user_properties += [("drivebench_rig", name), ("drivebench_bus", rig.bus)]
