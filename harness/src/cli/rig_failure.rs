@@ -58,7 +58,7 @@ pub(crate) fn alarm() -> Alarm {
 pub(crate) fn exit_of(error: &SessionError) -> Exit {
     match error {
         SessionError::OtherBus { .. } => Exit::Usage,
-        SessionError::Lock(LockError::Busy { .. }) => Exit::Busy,
+        SessionError::Lock(LockError::Busy { .. }) | SessionError::PortInUse { .. } => Exit::Busy,
         SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
         SessionError::Interrupted { .. } => Exit::Interrupted,
         SessionError::Lock(LockError::Io { .. })

@@ -13,6 +13,7 @@
 //! | `pty`, `tcp` with plain bytes | none | no | no |
 //! | `rfc2217` | that there was one, not at which byte | no | no |
 
+mod holder;
 mod last_words;
 mod open;
 mod rfc2217;
@@ -20,6 +21,8 @@ mod serial;
 mod tap;
 mod wire;
 
+pub use holder::OtherProgram;
+pub(crate) use holder::is_exclusive;
 pub use last_words::{LastWords, Unsaid};
 pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
 pub use serial::Switch;

@@ -1,5 +1,6 @@
 //! Opening, with an error of its own for everything that can be wrong.
 
+use super::holder::{OtherProgram, holder};
 use super::rfc2217::{self, NegotiationError};
 use super::serial;
 use super::wire::{Coding, Wire};
@@ -64,8 +65,13 @@ pub enum OpenError {
     )]
     Denied(String),
     /// Another program has it.
-    #[error("{0} is in use by another program")]
-    InUse(String),
+    #[error("{port} is in use by another program{}", by(holder.as_ref()))]
+    InUse {
+        /// The port.
+        port: String,
+        /// Which program, where the kernel shows it.
+        holder: Option<OtherProgram>,
+    },
     /// The path is something else than a port.
     #[error("{0} is not a {1}")]
     NotA(String, &'static str),
@@ -106,6 +112,10 @@ pub enum OpenError {
     },
 }
 
+fn by(holder: Option<&OtherProgram>) -> String {
+    holder.map_or(String::new(), |holder| format!(": {holder}"))
+}
+
 /// The likely cause of a connection that cannot be made, and what to do next.
 fn unconnected(error: &io::Error) -> &'static str {
     match error.kind() {
@@ -127,7 +137,10 @@ impl OpenError {
         match error.kind() {
             io::ErrorKind::NotFound => Self::Missing(name),
             io::ErrorKind::PermissionDenied => Self::Denied(name),
-            io::ErrorKind::ResourceBusy => Self::InUse(name),
+            io::ErrorKind::ResourceBusy => Self::InUse {
+                port: name,
+                holder: holder(port),
+            },
             _ if error.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error()) => {
                 Self::Missing(name)
             }

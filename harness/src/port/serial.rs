@@ -3,6 +3,7 @@
 //! The crate `serialport` opens the port and sets rate and format. The marks of POSIX termios (`INPCK` and `PARMRK`
 //! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
 
+use super::holder::refuse_used;
 use super::open::{OpenError, printed};
 use harness_proto::line::{Format, Parity as LineParity, Received};
 use harness_proto::time::Span;
@@ -179,7 +180,10 @@ fn look(path: &Path) -> Result<Termios, OpenError> {
     if (136..=143).contains(&rustix::fs::major(device.st_rdev)) {
         return Err(OpenError::PseudoTerminal(name));
     }
-    rustix::termios::tcgetattr(&fd).map_err(|_| OpenError::NotA(name, "serial port"))
+    let found =
+        rustix::termios::tcgetattr(&fd).map_err(|_| OpenError::NotA(name, "serial port"))?;
+    refuse_used(path, &fd)?;
+    Ok(found)
 }
 
 /// A second descriptor of the same open port, owned here: the crate gives its own only as a number.

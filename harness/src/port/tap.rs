@@ -5,10 +5,11 @@
 //! and the mode is read back. The program then sends nothing. Two things it cannot prevent: the kernel raises DTR and RTS at every open,
 //! and a byte that arrives between open and raw mode may be echoed. So a tap's TX and RTS are not to be wired.
 
+use super::holder::refuse_used;
 use super::open::OpenError;
 use harness_proto::line::{Format, LineError, Parity, Received};
 use harness_proto::marks::Unmark;
-use rustix::fs::{FlockOperation, Mode, OFlags};
+use rustix::fs::{Mode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{
     ControlModes, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector, Termios,
@@ -55,14 +56,10 @@ impl SilentTap {
         let flags = OFlags::RDONLY | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(of)?;
         let name = path.display().to_string();
-        // A port that another program uses is left as it is.
-        match rustix::fs::flock(&fd, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => {}
-            Err(Errno::WOULDBLOCK) => return Err(OpenError::InUse(name)),
-            Err(error) => return Err(of(error)),
-        }
         let before = rustix::termios::tcgetattr(&fd)
             .map_err(|_| OpenError::NotA(name.clone(), "serial port"))?;
+        // A port that another program uses is left as it is.
+        refuse_used(path, &fd)?;
         let device = rustix::fs::fstat(&fd).map_err(of)?;
         // Major numbers 136 to 143 are the slave ends of pseudo terminals (Documentation/admin-guide/devices.txt).
         let pty = (136..=143).contains(&rustix::fs::major(device.st_rdev));
@@ -301,7 +298,7 @@ mod tests {
         assert!(!arrives(&master, 200), "an echo");
         assert_eq!(tap.counts(), None);
         let second = SilentTap::open(&path, FORMAT, false);
-        assert!(matches!(second, Err(OpenError::InUse(_))));
+        assert!(matches!(second, Err(OpenError::InUse { .. })));
         drop(tap);
         let now = rustix::termios::tcgetattr(&master).expect("a mode");
         assert_eq!(speaks(&now), None);

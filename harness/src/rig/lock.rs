@@ -6,13 +6,14 @@
 
 use super::check::Rig;
 use super::state::{self, Holder};
+use crate::port::is_exclusive;
 use crate::regular::{self, Links};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, Seek, Write};
-use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -335,23 +336,12 @@ impl PortLock {
         if !rustix::termios::isatty(&lock.port) {
             return Ok(lock);
         }
-        if lock.is_exclusive() {
+        if is_exclusive(&lock.port) {
             return Err(PortLockError::Busy { how: "TIOCEXCL" });
         }
         rustix::termios::ioctl_tiocexcl(&lock.port).map_err(io::Error::from)?;
         lock.exclusive = true;
         Ok(lock)
-    }
-
-    /// Whether a second open is refused.
-    fn is_exclusive(&self) -> bool {
-        use rustix::fs::{Mode, OFlags};
-        let again = format!("/proc/self/fd/{}", self.port.as_raw_fd());
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-        matches!(
-            rustix::fs::open(again, flags, Mode::empty()),
-            Err(Errno::BUSY)
-        )
     }
 }
 

@@ -1,10 +1,10 @@
 //! From a rig's file to its rings' ends: ports opened and locked, or simulated rings set up.
 
-use super::Rig;
 use super::ends::Ends;
 use super::file::{Endpoint, Transport};
 use super::lock::{PortLock, PortLockError};
 use super::scan::{self, FoundPort, MatchError};
+use super::{Rig, SessionError};
 use crate::buses;
 use crate::link::{InnerLink, InnerPorts};
 use crate::medium::ErrorMarks;
@@ -46,6 +46,31 @@ pub enum OpenRigError {
         /// Ring 2.
         second: u32,
     },
+}
+
+impl OpenRigError {
+    /// The same as an error of the rig's.
+    pub(crate) fn of_rig(self, rig: &Rig) -> SessionError {
+        let busy = matches!(
+            self,
+            Self::Port(OpenError::InUse { .. })
+                | Self::Lock {
+                    error: PortLockError::Busy { .. },
+                    ..
+                }
+        );
+        let name = rig.id().to_owned();
+        match busy {
+            true => SessionError::PortInUse {
+                rig: name,
+                why: self.to_string(),
+            },
+            false => SessionError::Open {
+                rig: name,
+                error: Box::new(self),
+            },
+        }
+    }
 }
 
 /// Open ends, and the locks of their ports.

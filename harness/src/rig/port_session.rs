@@ -1,6 +1,6 @@
 //! A rig with a port in use, whatever its bus: locked, opened, guarded, and taken to its safe state on every way out.
 
-use super::lock::PortLock;
+use super::lock::{PortLock, PortLockError};
 use super::port_file::Port;
 use super::segment::observed::Beats;
 use super::taken::{Taken, take};
@@ -9,6 +9,7 @@ use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep, Watch};
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Pieces};
+use crate::port::OpenError;
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
 use std::os::fd::AsFd;
@@ -343,7 +344,26 @@ pub(crate) fn patience(port: &Port) -> Span {
 /// It is in use.
 pub(crate) fn lock(rig: &Rig, place: &str, port: impl AsFd) -> Result<PortLock, SessionError> {
     let lock = PortLock::acquire(port);
-    lock.map_err(|error| failed(rig, &format!("{place}: {error}")))
+    lock.map_err(|error| match error {
+        PortLockError::Busy { .. } => in_use(rig, &format!("{place}: {error}")),
+        PortLockError::Io(_) => failed(rig, &format!("{place}: {error}")),
+    })
+}
+
+/// An error about a port that another program has.
+pub(crate) fn in_use(rig: &Rig, why: &str) -> SessionError {
+    SessionError::PortInUse {
+        rig: rig.id().to_owned(),
+        why: why.to_owned(),
+    }
+}
+
+/// An error about a port that is not opened.
+pub(crate) fn unopened(rig: &Rig, error: &OpenError) -> SessionError {
+    match error {
+        OpenError::InUse { .. } => in_use(rig, &error.to_string()),
+        _ => failed(rig, &error.to_string()),
+    }
 }
 
 /// An error about the drives of a rig.

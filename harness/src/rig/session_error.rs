@@ -27,6 +27,14 @@ pub enum SessionError {
         /// What is wrong, in a sentence.
         why: String,
     },
+    /// Another program has its port.
+    #[error("rig {rig}: {why}")]
+    PortInUse {
+        /// Which.
+        rig: String,
+        /// Which port, and by which program, in a sentence.
+        why: String,
+    },
     /// It is held or reserved, or its lock cannot be used.
     #[error(transparent)]
     Lock(#[from] LockError),

@@ -86,7 +86,7 @@ pub(crate) fn listen_into(
         output: pipe.to_owned(),
         ..CaptureArguments::default()
     };
-    let mut session = Session::begin(&arguments, &stop)?;
+    let mut session = Session::begin(&arguments, &stop).map_err(|(_, what)| what)?;
     while !stop.load(Ordering::Relaxed) {
         match session.step(false) {
             Ok(_) => {}
@@ -118,9 +118,9 @@ pub(crate) fn capture(arguments: &CaptureArguments, output: &mut Output) -> io::
     let (stop, new_file) = signals::stop_and_rotate_flags();
     let mut session = match Session::begin(arguments, &stop) {
         Ok(session) => session,
-        Err(what) => {
+        Err((exit, what)) => {
             output.complain(&what);
-            return Ok(Exit::RigError);
+            return Ok(exit);
         }
     };
     output.say(&format!(

@@ -43,22 +43,21 @@ impl<'a> Session<'a> {
     pub(super) fn begin(
         arguments: &'a CaptureArguments,
         stop: &Arc<AtomicBool>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, (Exit, String)> {
         let names = arguments.tap.iter().map(|own| &own.name);
         let twice = names
             .clone()
             .enumerate()
             .find(|(place, name)| names.clone().take(*place).any(|other| other == *name));
         if let Some((_, name)) = twice {
-            return Err(format!(
-                "two taps are named {name}; a name for each is expected"
-            ));
+            let what = format!("two taps are named {name}; a name for each is expected");
+            return Err((Exit::RigError, what));
         }
         let mut taps = Vec::new();
         for at in opened_first(&arguments.tap) {
             let drives = drives(&arguments.tap, &at.name);
             let tap = Tap::open(at, arguments, drives, stop);
-            taps.push(tap.map_err(|error| format!("{}: {error}", at.name))?);
+            taps.push(tap.map_err(|error| (error.exit(), format!("{}: {error}", at.name)))?);
         }
         let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let wall = wall.unwrap_or_default().as_nanos();
@@ -71,8 +70,10 @@ impl<'a> Session<'a> {
             files: arguments.files.and_then(|own| usize::try_from(own).ok()),
         };
         let path = &arguments.output;
-        let files = Files::begin(path, &places, rotation, wall)
-            .map_err(|error| format!("failed to write {}: {error}", path.display()))?;
+        let files = Files::begin(path, &places, rotation, wall).map_err(|error| {
+            let what = format!("failed to write {}: {error}", path.display());
+            (Exit::RigError, what)
+        })?;
         Ok(Self {
             arguments,
             taps,

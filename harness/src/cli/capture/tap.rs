@@ -5,6 +5,7 @@ use super::place::{TapAt, TapPort};
 use crate::buses::{TelegramCutter, live_text, sender_of};
 use crate::capture::live::LiveText;
 use crate::capture::{AWAY, Piece, RecordedPlace};
+use crate::cli::exit::Exit;
 use crate::link::Line as _;
 use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink};
 use crate::medium;
@@ -36,6 +37,16 @@ pub(super) enum ListenError {
          with --may-acknowledge"
     )]
     Unknown(String),
+}
+
+impl ListenError {
+    pub(super) fn exit(&self) -> Exit {
+        match self {
+            Self::Tap(OpenError::InUse { .. })
+            | Self::Adapter(AdapterError::Open(OpenError::InUse { .. })) => Exit::Busy,
+            _ => Exit::RigError,
+        }
+    }
 }
 
 /// What listens.

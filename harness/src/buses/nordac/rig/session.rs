@@ -13,7 +13,9 @@ use crate::medium::{ErrorMarks, Pieces};
 use crate::port::{PortAddress, PortSettings};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
-use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
+use crate::rig::port_session::{
+    PortDrives, PortSession, failed, lock, patience, setup_text, unopened,
+};
 use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::profibus::dp::Diagnosis;
@@ -222,7 +224,7 @@ fn ends(
         low_latency: true,
     });
     options.unless_interrupted(rig)?;
-    let wire = wire.map_err(|error| failed(rig, &error.to_string()))?;
+    let wire = wire.map_err(|error| unopened(rig, &error))?;
     let lock = locks.then(|| lock(rig, &place, wire.fd()));
     let locks = lock.transpose()?.into_iter().collect();
     let addresses = slaves(port).iter().map(|own| own.address).collect();

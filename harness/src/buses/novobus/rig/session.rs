@@ -140,10 +140,7 @@ impl Session {
     fn open_as_stated(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         rig.of_rings()?;
         let taken = take(rig, options)?;
-        let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
-            rig: rig.id().to_owned(),
-            error: Box::new(error),
-        })?;
+        let opened = open(rig, options.interrupt.clone()).map_err(|error| error.of_rig(rig))?;
         Self::over(rig, options, taken, opened)
     }
 

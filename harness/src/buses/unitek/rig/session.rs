@@ -7,11 +7,13 @@ use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
 use crate::guard::{Guarded, Safe, Standstill, Watch};
-use crate::link::frames::{AdapterSettings, FrameLink};
+use crate::link::frames::{AdapterError, AdapterSettings, FrameLink};
 use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
-use crate::rig::port_session::{PortDrives, PortSession, failed, lock, patience, setup_text};
+use crate::rig::port_session::{
+    PortDrives, PortSession, failed, lock, patience, setup_text, unopened,
+};
 use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
@@ -192,7 +194,10 @@ fn adapter(
         .filter_map(|axis| Some((Id::base(axis.tx)?, axis.node)));
     let link = FrameLink::open(&settings, senders.collect(), options.interrupt.clone());
     options.unless_interrupted(rig)?;
-    let link = link.map_err(|error| failed(rig, &error.to_string()))?;
+    let link = link.map_err(|error| match &error {
+        AdapterError::Open(error) => unopened(rig, error),
+        _ => failed(rig, &error.to_string()),
+    })?;
     let device = port.slcan.as_ref().filter(|place| place.contains('/'));
     let lock = device.map(|place| lock(rig, place, link.fd()));
     let locks = lock.transpose()?.into_iter().collect();
