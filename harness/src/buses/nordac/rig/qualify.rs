@@ -309,6 +309,16 @@ impl Attempts for AttemptNotes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::nordac::gate::guarded;
+    use crate::buses::nordac::rig::player::Own;
+    use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
+    use crate::link::Link as _;
+    use crate::rig::find;
+    use crate::scenario::verdict::Verdict;
+    use harness_proto::profibus::BusRate;
+    use harness_proto::time::Span;
+    use std::path::Path;
+    use std::sync::Arc;
 
     #[test]
     fn every_need_is_of_a_property_and_its_conversation_is_there() {
@@ -317,6 +327,38 @@ mod tests {
             let file = format!("{shown}.scn");
             assert!(shown.is_empty() || CONVERSATIONS.contains(file), "{name}");
         }
+    }
+
+    /// A value is the slave's only where every other one would have shown something else.
+    #[test]
+    fn a_point_that_nothing_shows_stays_open() {
+        let rig = find("sim:nordac:1", Path::new("")).expect("a rig");
+        let all = slaves(rig.port().expect("a port"));
+        let text =
+            "title x\nbus nordac\nslave {slave} ppo {ppo}\nstart {slave}\nexchange {slave}\n";
+        let source = Source {
+            name: format!("{CONVERSATION}tasks"),
+            text: with_slave(text, &all[0]).into(),
+        };
+        let own = Arc::new(Own::read(&source).expect("a scenario"));
+        let setup = Setup {
+            rate: BusRate::K500,
+            slaves: vec![SlaveSetup::new(all[0].address)],
+            master: None,
+        };
+        let limits = Limits::default();
+        let mut link = guarded(Bench::new(&setup), limits.clone(), &[all[0].into()], false);
+        let able = (link.capabilities().to_vec(), true);
+        let patience = Span::from_millis(5);
+        let mut player = Player::of(all, BusRate::K500, patience, limits, able);
+        player.qualify();
+        let (outcome, _) = player.attempt(&own, &mut link);
+        assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
+        let made = qualify(&[&player], &rig, "", true);
+        let profile = made.profile.expect("the slave was asked");
+        // The conversation has its name, and no task with SPM.
+        assert!(profile.contains("spm = "), "{profile}");
+        assert!(!profile.contains("property spm = "), "{profile}");
     }
 
     /// Every conversation can be read, with any address; its telegrams have a right FCS.
@@ -332,7 +374,7 @@ mod tests {
                     name,
                     text: text.into(),
                 };
-                super::super::player::Own::read(&source).expect("a scenario");
+                Own::read(&source).expect("a scenario");
             }
         }
     }

@@ -269,3 +269,29 @@ fn measure(setup: &Setup, drive: usize) -> Measured {
         homing_time,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_differ_in_all_but_the_stuff_byte() {
+        let frame = |text: &str| -> Frame { text.parse().expect("a frame") };
+        for (other, same) in [
+            ("181#31008000", true),
+            ("181#310080A5", true),
+            ("181#31008100", false),
+            ("181#31018000", false),
+            ("181#32008000", false),
+            ("182#31008000", false),
+            ("181#310080", false),
+            ("181#310080000000", false),
+        ] {
+            assert_eq!(
+                same_frame(&frame("181#31008000"), &frame(other)),
+                same,
+                "{other}"
+            );
+        }
+    }
+}
