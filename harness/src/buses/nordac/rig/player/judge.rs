@@ -1,6 +1,7 @@
 //! Whether a line that was not met accuses a slave.
 
-use super::{Left, Other, Own, Player};
+use super::rehearse::Other;
+use super::{Left, Own, Player};
 use crate::buses::nordac::rig::known::value_of;
 use crate::buses::nordac::rig::observed::Came;
 use crate::buses::nordac::rig::settle::{Assumed, search};

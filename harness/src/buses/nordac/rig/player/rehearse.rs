@@ -1,0 +1,215 @@
+//! Scenarios played on a model of the slaves first: what a right slave with these parameters would not meet, and what the limits deny, is not
+//! begun.
+
+use super::{Own, Player};
+use crate::buses::nordac::language::syntax;
+use crate::buses::nordac::rig::known::value_of;
+use crate::buses::nordac::rig::observed::{Came, Observed};
+use crate::buses::nordac::rig::settle::Assumed;
+use crate::buses::nordac::rig::talk::TalkError;
+use crate::link::{Line as _, Link as _, LinkEvent, Recording, Trouble};
+use crate::rig::segment::observed::Slow;
+use crate::scenario::run::outcome::Unready;
+use crate::scenario::run::{AtMismatch, Outcome, Why, play};
+use crate::scenario::verdict::Verdict;
+use harness_proto::nordac::guard::Limits;
+use harness_proto::nordac::words::State;
+
+/// What a model is beside what is known of the slaves.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Other<'o> {
+    /// The properties of the slaves in place of those that are known.
+    pub(super) properties: Option<&'o Assumed>,
+    /// What adapter and computer do to telegrams.
+    pub(super) slow: Option<Slow>,
+    /// Whether the settings of the bus are switched to those of the scenario.
+    pub(super) switches: bool,
+    /// What came from the slaves, where the model is played up to the first difference from it.
+    pub(super) came: Option<&'o Came>,
+}
+
+/// A scenario played on the model.
+pub(super) struct Rehearsal {
+    pub(super) outcome: Outcome,
+    pub(super) denied: Option<String>,
+    /// The slave that has a fault at the end.
+    pub(super) faulted: Option<u8>,
+    /// What came from the first telegram on that makes the slaves ready.
+    pub(super) came: Came,
+}
+
+impl Rehearsal {
+    pub(super) fn passes(&self) -> bool {
+        self.denied.is_none() && self.outcome.verdict == Verdict::Passed
+    }
+}
+
+impl Player {
+    /// Plays a scenario on the model: with the settings of the bus as they are, or if that is permitted and needed with those of the scenario.
+    /// Returns whether they are switched.
+    ///
+    /// # Errors
+    /// Why the rig does not play it.
+    pub(super) fn rehearsed(&self, own: &Own) -> Result<bool, Why> {
+        let other = self.other_port(own).or_else(|| self.other_properties(own));
+        if let Some(why) = other {
+            return Err(Why::OtherDrives(why));
+        }
+        let with = |switches| Other {
+            switches,
+            ..Other::default()
+        };
+        let first = self.rehearse(own, &self.limits, with(false));
+        if first.passes() {
+            return match first.faulted.filter(|_| !self.acknowledges()) {
+                None => Ok(false),
+                Some(slave) => Err(left_in_fault(slave)),
+            };
+        }
+        let permitted = may_switch_settings(&self.limits);
+        if permitted && self.rehearse(own, &self.limits, with(true)).passes() {
+            return Ok(true);
+        }
+        if let Some(why) = first.denied {
+            return Err(Why::Denied(why));
+        }
+        let all = Limits {
+            motion: true,
+            eeprom: true,
+            bus_settings: true,
+            ..self.limits
+        };
+        let why = if !permitted && self.rehearse(own, &all, with(true)).passes() {
+            "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
+             --allow-motion, `allow_eeprom` and `allow_bus_settings`"
+                .to_owned()
+        } else {
+            let finding = first.outcome.finding.map(|own| own.message);
+            let remark = first.outcome.remarks.into_iter().next();
+            let found = finding.or(remark).unwrap_or_default();
+            format!("a right slave with the same parameters does not meet it: {found}")
+        };
+        Err(Why::OtherDrives(why))
+    }
+
+    /// What of the line and of the addresses and PPO types of its slaves is another than the scenario has, and is not switched.
+    fn other_port(&self, own: &Own) -> Option<String> {
+        let bench = &own.plan.setup;
+        for slave in &bench.slaves {
+            let address = slave.address;
+            let mut known = self.known().iter();
+            let Some(known) = known.find(|own| own.slave.address == address) else {
+                return Some(format!("the rig has no slave {address}"));
+            };
+            if !self.may_switch(known.ppo(), slave.ppo) {
+                return Some(format!(
+                    "slave {address} of the rig is set to another PPO type than that of the scenario, {}; the bench switches 1622 with `allow_motion`, \
+                     `allow_eeprom` and `allow_bus_settings`, if it can switch it back through a parameter channel",
+                    slave.ppo.number()
+                ));
+            }
+            if !known.ppo().has_pkw() {
+                return Some(format!(
+                    "slave {address} is set to PPO type {}, which has no parameter channel: its parameters are not known",
+                    known.ppo().number()
+                ));
+            }
+            if slave.posicon {
+                return Some(format!(
+                    "slave {address} of the scenario has the option PosiCon"
+                ));
+            }
+        }
+        let other = own.scenario.header.rate.is_some() && bench.rate != self.rate;
+        other.then(|| {
+            format!(
+                "the rig's line has {} kbit/s, that of the scenario {}",
+                self.rate.name(),
+                bench.rate.name()
+            )
+        })
+    }
+
+    /// The first property of the header of which a slave of the rig has another value, as far as is known.
+    fn other_properties(&self, own: &Own) -> Option<String> {
+        let lines = own.scenario.header.slaves.iter();
+        let mut named = lines.filter_map(|line| match &line.what {
+            syntax::SetupKind::Property(property, _) => Some(*property),
+            _ => None,
+        });
+        named.find_map(|property| {
+            own.plan.setup.slaves.iter().find_map(|slave| {
+                let address = slave.address;
+                let known = self.known().iter().find(|own| own.slave.address == address)?;
+                let wanted = value_of(property, &slave.properties);
+                let has = value_of(property, &known.properties);
+                let name = property.name;
+                let why = format!("it is for a slave with {name} = {wanted}; slave {address} has {has}, as far as is known");
+                (wanted != has).then_some(why)
+            })
+        })
+    }
+
+    /// Plays a scenario on the model within limits.
+    pub(super) fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+        let known = self.known().iter().enumerate();
+        let slaves = known.map(|(place, known)| {
+            let other = other.properties.and_then(|all| all.get(place));
+            known.model(*other.unwrap_or(&known.properties))
+        });
+        let mut link = self.model(slaves.collect(), limits);
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        recording.begin();
+        let mut observed = Observed::new(&mut recording);
+        let ready = self.prepare(own, &mut observed, other.switches);
+        let outcome = match ready {
+            Ok(()) => {
+                observed.begin();
+                observed = observed.slowed(other.slow);
+                if let Some(came) = other.came {
+                    observed.noted.expect(came, observed.noted.fresh, true);
+                }
+                play(&own.plan, &mut observed, AtMismatch::Stop)
+            }
+            Err(TalkError::Line(trouble)) => Outcome::trouble(&trouble),
+            Err(error) => {
+                let remark = error.to_string();
+                Outcome::not_ready(Verdict::Inconclusive, Unready::Differs, remark)
+            }
+        };
+        let came = observed.noted.came();
+        let faulted = self.known().iter().map(|own| own.slave.address);
+        let faulted = faulted.into_iter().find(|slave| {
+            let drive = link.inner().drive(*slave);
+            drive.is_some_and(|own| own.inverter().state() == State::Fault)
+        });
+        let denied = match link.trouble() {
+            Some(Trouble::Denied(why)) => Some(why.clone()),
+            _ => None,
+        };
+        Rehearsal {
+            outcome,
+            denied,
+            faulted,
+            came,
+        }
+    }
+
+    /// Whether a fault that a scenario leaves behind is taken away before the next one.
+    pub(super) const fn acknowledges(&self) -> bool {
+        self.restarts || self.limits.motion
+    }
+}
+
+/// Whether the settings of the bus may be switched for a scenario: who controls an inverter may start its motor.
+pub(super) const fn may_switch_settings(limits: &Limits) -> bool {
+    limits.motion && limits.eeprom && limits.bus_settings
+}
+
+/// A scenario behind which an inverter has a fault is not begun where the bench may not acknowledge it: it would stay for the scenarios behind.
+fn left_in_fault(slave: u8) -> Why {
+    Why::Denied(format!(
+        "it leaves slave {slave} with a fault, and to acknowledge one needs `allow_motion` in the rig's [limits] and --allow-motion"
+    ))
+}
