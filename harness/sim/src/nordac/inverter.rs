@@ -139,6 +139,17 @@ impl Inverter {
             now: at,
         };
         inverter.power_up(at);
+        for code in &setup.history.faults {
+            inverter.faults.record(Past {
+                code: *code,
+                ..Past::default()
+            });
+            inverter.faults.acknowledge();
+        }
+        if let Some(word) = setup.history.stw {
+            inverter.obey(word);
+            inverter.settle();
+        }
         inverter
     }
 

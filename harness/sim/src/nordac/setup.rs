@@ -3,6 +3,15 @@
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::Properties;
 
+/// What an inverter keeps of the time before, where it was not just switched on, or had faults once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct History {
+    /// The control word in force: the last valid one stays, whoever controls the inverter now (3.2.1, bit 10).
+    pub stw: Option<u16>,
+    /// The faults that were acknowledged, the oldest first (5.7).
+    pub faults: Vec<u8>,
+}
+
 /// How a simulated drive is set up before power-up.
 #[derive(Clone, Debug, Default)]
 pub struct InverterSetup {
@@ -13,4 +22,6 @@ pub struct InverterSetup {
     /// Parameters that are stored already: number, set and element, value. The others have their factory settings, and so have
     /// those whose value does not fit their 16 or 32 bits. The limits do not count here.
     pub parameters: Vec<(u16, Index, i32)>,
+    /// What it keeps of the time before.
+    pub history: History,
 }

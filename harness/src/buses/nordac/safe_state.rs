@@ -17,6 +17,9 @@ use std::fmt::Write as _;
 /// The DP watchdog of an exchange that is begun to stop a motor: 1 s.
 const WATCHDOG: [u8; 2] = [1, 100];
 
+/// The DP watchdog by which a slave forgets the bench: 100 ms.
+const FORGET: [u8; 2] = [1, 10];
+
 /// The time between two exchanges while a motor ramps down.
 const AGAIN: Span = Span::from_millis(5);
 
@@ -81,9 +84,14 @@ pub fn safe_state<L: Line>(
     let mut reports = String::new();
     let mut confirmed = true;
     finish_telegrams(line);
+    let places = slaves.iter().map(|own| match line.slaves() {
+        Some(gate) => gate.places(own.address).collect(),
+        None => vec![own.address],
+    });
+    let places: Vec<Vec<u8>> = places.collect();
     let mut talk = Talk::new(Box::new(&mut *line), patience);
-    for slave in slaves {
-        let made = make_safe(&mut talk, *slave, standing);
+    for (slave, places) in slaves.iter().zip(&places) {
+        let made = make_safe(&mut talk, *slave, places, standing);
         let address = slave.address;
         // Writing to a String cannot fail.
         let _infallible = match made {
@@ -123,12 +131,11 @@ fn finish_telegrams<L: Line>(line: &mut Guarded<L>) {
 fn make_safe(
     talk: &mut Talk<'_>,
     slave: RigSlave,
+    places: &[u8],
     standing: &Standstill,
 ) -> Result<String, String> {
     let text = |error: TalkError| error.to_string();
-    let address = slave.address;
-    talk.restart(address);
-    let diagnosis = talk.diagnose(address).map_err(text)?;
+    let (address, diagnosis) = found(talk, places)?;
     let exchanges = !diagnosis.has(Diagnosis::NOT_READY);
     let other = diagnosis.master.filter(|own| exchanges && *own != MASTER);
     if let Some(controls) = other {
@@ -164,10 +171,58 @@ fn make_safe(
     if stops {
         off.stop()?;
     }
-    match standing.order.contains(&StandstillStep::Block) {
-        true => off.block(),
-        false => Ok("stopped".to_owned()),
+    if !standing.order.contains(&StandstillStep::Block) {
+        return Ok("stopped".to_owned());
     }
+    let shows = off.block()?;
+    let shows = match release(talk, address) {
+        Ok(()) => shows,
+        // Its output is off all the same.
+        Err(error) => format!("{shows}; it may go on waiting for the bench's master: {error}"),
+    };
+    Ok(match address == slave.address {
+        true => shows,
+        false => format!("{shows}, at address {address} (1624)"),
+    })
+}
+
+/// The first of the addresses at which a slave may be and where a NORDAC replies, and its diagnosis there.
+pub(super) fn found(talk: &mut Talk<'_>, places: &[u8]) -> Result<(u8, Diagnosis), String> {
+    let mut why = None;
+    for address in places {
+        talk.restart(*address);
+        match talk.diagnose(*address) {
+            // A station that the rig's file does not list may have the address.
+            Ok(diagnosis) if diagnosis.ident == IDENT || places.len() == 1 => {
+                return Ok((*address, diagnosis));
+            }
+            Ok(_) => {}
+            Err(TalkError::Line(trouble)) => return Err(trouble.to_string()),
+            Err(error) => {
+                why.get_or_insert(error.to_string());
+            }
+        }
+    }
+    let why = why.unwrap_or_else(|| "no address that it had is that of a NORDAC".to_owned());
+    let others = places.iter().skip(1).map(u8::to_string);
+    let others: Vec<_> = others.collect();
+    Err(match others.is_empty() {
+        true => why,
+        false => format!(
+            "{why}, nor is it at address {}, which it was given",
+            others.join(" or ")
+        ),
+    })
+}
+
+/// Lets a slave forget the bench, so that any master can take it: without a watchdog it would be the bench's until its power goes (EN 2).
+fn release(talk: &mut Talk<'_>, address: u8) -> Result<(), TalkError> {
+    let mut parameters = SetPrm::lock(IDENT);
+    parameters.status |= SetPrm::WATCHDOG;
+    parameters.watchdog = FORGET;
+    let parameters = parameters.encode().unwrap_or_default();
+    talk.raw(address, Service::SetPrm, &parameters)?;
+    Ok(())
 }
 
 /// An inverter on its way to the safe state.

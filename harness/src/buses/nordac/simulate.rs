@@ -9,7 +9,7 @@ use harness_proto::nordac::{Parameter, PpoType, Properties};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use harness_sim::nordac::deviation::{Deviant, Deviation, MasterDeviation, MasterLine};
-use harness_sim::nordac::{self, Drive, Member};
+use harness_sim::nordac::{self, Drive, History, Member};
 use harness_sim::octet_segment::{
     LineFault, LineFaultAt, LineHost, LineStation, OctetSegment, Wish,
 };
@@ -85,6 +85,8 @@ pub struct SlaveSetup {
     pub parameters: Vec<(&'static Parameter, Index, i64)>,
     /// The way in which it breaks the bus standard or the manual, if it does.
     pub deviation: Option<&'static Deviation>,
+    /// What it keeps of the time before; nothing where it was just switched on and never had a fault.
+    pub history: History,
 }
 
 impl SlaveSetup {
@@ -98,6 +100,7 @@ impl SlaveSetup {
             properties: Properties::default(),
             parameters: Vec::new(),
             deviation: None,
+            history: History::default(),
         }
     }
 
@@ -122,6 +125,7 @@ impl SlaveSetup {
             properties: self.properties,
             posicon: self.posicon,
             parameters: parameters.collect(),
+            history: self.history.clone(),
         };
         Deviant::new(Drive::new(&setup, rate, power_up), self.deviation)
     }

@@ -61,6 +61,11 @@ pub(crate) trait PortPlayer: Sized {
     fn set_back(&mut self, own: &Self::Own, session: &mut PortSession<Self::Drives>)
     -> Vec<String>;
 
+    /// What the last attempt may have left changed, with what puts it back: for drives that were not seen in their safe state.
+    fn left_changed(&self, _rig: &Rig) -> Vec<String> {
+        Vec::new()
+    }
+
     /// The scenarios that a qualification plays behind the selected ones.
     fn conversations(_rig: &Rig) -> Vec<Source> {
         Vec::new()
@@ -271,7 +276,10 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
     fn close(mut self: Box<Self>, error: bool) -> End {
         if self.unfinished.is_some() {
             self.session.resume();
-            self.clear_up();
+            if !self.clear_up() {
+                let left = self.player.left_changed(self.session.rig());
+                self.notes.extend(left);
+            }
         }
         let notes = self.notes();
         let mut end = self.session.close(error);

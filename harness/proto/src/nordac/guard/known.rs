@@ -16,6 +16,8 @@ use alloc::vec::Vec;
 pub(super) struct KnownSlave {
     /// Where it may be: after a write to 1624 at the old address and at the new one.
     addresses: Vec<u8>,
+    /// Its address in the rig's file.
+    listed: u8,
     ppo: Option<PpoType>,
     /// A word that enables the motor was sent, and none after it that stops it.
     pub(super) enabled: bool,
@@ -39,6 +41,7 @@ impl KnownSlave {
     pub(super) fn new(slave: GuardedSlave) -> Self {
         Self {
             addresses: [slave.address].to_vec(),
+            listed: slave.address,
             ppo: slave.ppo,
             enabled: false,
             waits: false,
@@ -53,6 +56,17 @@ impl KnownSlave {
 
     pub(super) fn is(&self, address: u8) -> bool {
         self.addresses.contains(&address)
+    }
+
+    /// Its address in the rig's file.
+    pub(super) const fn listed(&self) -> u8 {
+        self.listed
+    }
+
+    /// Where it may be but at this address, the last one first.
+    pub(super) fn others(&self, address: u8) -> impl Iterator<Item = u8> {
+        let all = self.addresses.iter().rev().copied();
+        all.filter(move |own| *own != address)
     }
 
     /// Where it was last.

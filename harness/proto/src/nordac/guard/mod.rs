@@ -161,6 +161,13 @@ impl Gate {
         enabled.map(|slave| slave.address())
     }
 
+    /// The addresses at which a slave of the rig's file may be: its own, and behind it those that tasks have given it (1624, 970, 1602).
+    pub fn places(&self, address: u8) -> impl Iterator<Item = u8> {
+        let own = self.slaves.iter().find(move |own| own.listed() == address);
+        let others = own.into_iter().flat_map(move |own| own.others(address));
+        core::iter::once(address).chain(others)
+    }
+
     /// How many tasks that write parameters were sent; a task that is repeated without a change counts once.
     #[must_use]
     pub const fn writes(&self) -> u32 {

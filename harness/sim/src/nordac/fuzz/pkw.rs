@@ -34,7 +34,7 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let setup = InverterSetup {
         properties: properties(head >> 2),
         posicon: head & 2 != 0,
-        parameters: Vec::new(),
+        ..InverterSetup::default()
     };
     let mut inverter = Inverter::new(&setup, Instant::START);
     let mut input = Unstructured::new(&data[..data.len().min(LONGEST)]);

@@ -167,6 +167,7 @@ impl Pair {
                 at(1614, 1, 1),
                 at(1615, 1, 200),
             ],
+            ..InverterSetup::default()
         };
         Self {
             drive: Drive::new(&setup, RATE, Instant::START),

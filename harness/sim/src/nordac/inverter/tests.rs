@@ -47,6 +47,7 @@ impl Bench {
             properties,
             posicon,
             parameters: all,
+            ..InverterSetup::default()
         };
         Self {
             inverter: Inverter::new(&setup, Instant::START),

@@ -7,6 +7,7 @@ mod permitted;
 mod player;
 mod profile;
 mod qualify;
+mod restore;
 mod run;
 mod session;
 mod settle;

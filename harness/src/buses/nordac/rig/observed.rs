@@ -1,10 +1,11 @@
 //! What is noted of a link to NORDAC inverters: which parameters are written, and how late replies come.
 
+use super::known::{ADDRESS, WIPES};
 use crate::medium::{Heard, Medium, Out};
 use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
 use crate::trouble::Trouble;
 use harness_proto::decode::Decoded;
-use harness_proto::nordac::{Image, Pkw, PpoType, Task};
+use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
@@ -21,6 +22,8 @@ pub(super) type Observed<'l> = crate::rig::segment::observed::Observed<'l, Teleg
 pub(super) struct TelegramNotes {
     /// The parameters that telegrams may have written: station, number and IND.
     pub(super) written: BTreeSet<(u8, u16, u16)>,
+    /// The addresses that telegrams may have given to stations: the station, and its new one.
+    pub(super) moved: BTreeSet<(u8, u8)>,
     /// When the last telegram had left.
     asked: Option<Instant>,
     /// The octets that have come since.
@@ -199,7 +202,15 @@ impl LinkNotes for TelegramNotes {
             let Pkw { ind, .. } = image.pkw;
             let changes = image.pkw.task().is_change();
             if changes && image.pkw.task() != Task::ChangeDescription {
-                self.written.insert((pdu.da(), image.pkw.number(), ind));
+                let number = image.pkw.number();
+                self.written.insert((pdu.da(), number, ind));
+                let moved = match number {
+                    ADDRESS => u8::try_from(image.pkw.low_word()).ok(),
+                    number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
+                    _ => None,
+                };
+                let moved = moved.filter(|own| (1..=DEFAULT_ADDRESS).contains(own));
+                self.moved.extend(moved.map(|own| (pdu.da(), own)));
             }
         }
     }

@@ -1,10 +1,9 @@
 //! NORDAC inverters on which scenarios are played: what their player offers, and what is set back behind a scenario.
 
-use super::player::{Own, PPO_TYPE, Player};
+use super::player::{Own, Player};
 use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
-use super::talk::TalkError;
 use super::{Session, limits, rate, slaves};
 use crate::buses::Bus;
 use crate::buses::nordac::simulate::Bench;
@@ -17,9 +16,6 @@ use crate::rig::segment::{OnSegment, Qualified};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
-use harness_proto::nordac::guard::{Class, class};
-use harness_proto::nordac::master::ExchangeError;
-use harness_proto::nordac::{Parameter, Pkw, Task};
 use harness_proto::time::Span;
 use std::sync::Arc;
 
@@ -76,63 +72,13 @@ impl PortPlayer for Player {
         Self::attempt(self, own, link)
     }
 
-    /// Sets parameters back that a scenario has changed.
     fn set_back(&mut self, _: &Own, session: &mut Session) -> Vec<String> {
-        let mut notes = Vec::new();
-        for known in self.known() {
-            let address = known.slave.address;
-            let written = self.written().iter();
-            for (_, number, ind) in written.filter(|own| own.0 == address) {
-                let Some(raw) = known.values.get(&(*number, *ind)) else {
-                    continue;
-                };
-                let Some(parameter) = Parameter::of(*number) else {
-                    continue;
-                };
-                let name = format!("slave {address}: {number} ({})", parameter.name);
-                if class(*number) == Class::Everything {
-                    notes.push(format!("{name} was written: compare every parameter"));
-                    continue;
-                }
-                let mut talk = session.talk();
-                talk.restart(address);
-                let mut task = |ak, pwe| {
-                    // A scenario may have switched it.
-                    let ppo = talk.configuration(address)?.or(known.slave.ppo);
-                    talk.start(address, ppo.unwrap_or_default(), None)?;
-                    let mut known = known.clone();
-                    known.slave.ppo = ppo;
-                    let answer = known.task(&mut talk, Pkw::of(ak, *number, *ind, pwe));
-                    match answer {
-                        // The module begins anew with another PPO type.
-                        Err(TalkError::Exchange {
-                            why: ExchangeError::Left,
-                            ..
-                        }) if *number == PPO_TYPE => Ok(Some(pwe)),
-                        other => other,
-                    }
-                };
-                let reads = match task(Task::read(parameter).ak(), 0) {
-                    Ok(Some(reads)) if reads != *raw => reads,
-                    Ok(_) => continue,
-                    Err(error) => {
-                        notes.push(error.to_string());
-                        continue;
-                    }
-                };
-                let kept = match task(Task::change(parameter).ak(), *raw) {
-                    Ok(Some(_)) => continue,
-                    Ok(None) => "the slave does not take it".to_owned(),
-                    Err(error) => error.to_string(),
-                };
-                drop(talk);
-                session.link().reset_after_denial();
-                notes.push(format!(
-                    "{name} reads {reads} and is not set back to {raw}: {kept}"
-                ));
-            }
-        }
-        notes
+        let origin = session.rig().origin.clone();
+        self.put_back(session.link(), &origin)
+    }
+
+    fn left_changed(&self, rig: &Rig) -> Vec<String> {
+        self.commands(&rig.origin)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

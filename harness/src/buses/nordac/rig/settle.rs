@@ -50,6 +50,9 @@ const TASKS: [Pkw; 13] = [
     Pkw::of(6, 947, 0x0100, 0),
 ];
 
+/// The fault memory (4.1.3, 5.7).
+const FAULT_MEMORY: [u16; 3] = [947, 1801, 1806];
+
 /// In how many points a slave may differ from the default at once.
 const MOST_DIFFERENCES: usize = 12;
 
@@ -103,8 +106,13 @@ pub(super) fn converse(known: &Known, talk: &mut Talk<'_>) -> Result<(), TalkErr
         }
     }
     if ppo.has_pkw() {
-        for task in TASKS {
-            for pkw in [task, Pkw::default()] {
+        // What the fault memory holds of earlier faults is not known.
+        let remembers = !known.history.faults.is_empty();
+        for task in TASKS
+            .iter()
+            .filter(|own| !remembers || !FAULT_MEMORY.contains(&own.number()))
+        {
+            for pkw in [*task, Pkw::default()] {
                 let outputs = Image {
                     pkw,
                     ..Image::default()

@@ -117,9 +117,9 @@ impl Player {
         let came = |all: &Assumed| -> Came {
             let other = Other {
                 properties: Some(all),
-                slow: None,
                 switches: left.switches,
                 came: Some(&left.came),
+                ..Other::default()
             };
             self.rehearse(own, &self.limits, other).came
         };

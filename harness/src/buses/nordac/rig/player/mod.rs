@@ -12,9 +12,10 @@ mod rehearse;
 mod unlock;
 
 pub(in crate::buses::nordac) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
+pub(super) use ready::idle;
 
 use super::RigSlave;
-use super::known::Known;
+use super::known::{INTERFACE, Known};
 use super::observed::{Came, Observed};
 use super::profile::Profiled;
 use super::settle;
@@ -40,14 +41,10 @@ use harness_proto::nordac::properties::Properties;
 use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
+use harness_sim::nordac::History;
+use rehearse::Begun;
 use std::collections::BTreeSet;
 use std::sync::Arc;
-
-/// Who controls an inverter: the first of the settings of the bus in which a scenario may differ from the rig (2.5.1).
-const INTERFACE: u16 = 1621;
-
-/// The PPO type, the other one. The module begins again with it.
-pub(super) const PPO_TYPE: u16 = 1622;
 
 /// A scenario of this bus.
 #[derive(Debug)]
@@ -172,6 +169,11 @@ impl Player {
         &self.limits
     }
 
+    /// How long a reply may take beside its own time on the line.
+    pub(super) const fn patience(&self) -> Span {
+        self.patience
+    }
+
     /// What is known of the slaves; nothing before the first attempt.
     pub(super) fn known(&self) -> &[Known] {
         self.known.as_deref().unwrap_or_default()
@@ -265,14 +267,28 @@ impl Player {
         if let Err(error) = self.learn(link, again.is_none()) {
             return (AttemptCourse::Unanswered(error), false);
         }
-        link.noted.begin_fresh();
-        let switches = match again.map_or_else(|| self.rehearsed(own), Ok) {
-            Ok(switches) => switches,
+        if let Err(error) = self.look(own, link) {
+            return (AttemptCourse::Unanswered(error), false);
+        }
+        let begun = match again {
+            Some(switches) => Ok(Begun {
+                switches,
+                moved: BTreeSet::new(),
+            }),
+            None => self.rehearsed(own),
+        };
+        let switches = match begun {
+            Ok(begun) => match self.other_station(&begun.moved, link) {
+                Ok(None) => begun.switches,
+                Ok(Some(why)) => return (AttemptCourse::Skipped(why.into()), false),
+                Err(error) => return (AttemptCourse::Unanswered(error), false),
+            },
             Err(why) => {
                 let skip = Skip::from(why).and(self.unlocks(own));
                 return (AttemptCourse::Skipped(skip), false);
             }
         };
+        link.noted.begin_fresh();
         let ready = self.prepare(own, link, switches);
         self.before = Some(link.noted.received());
         if let Err(error) = ready {
@@ -327,6 +343,46 @@ impl Player {
         Ok(())
     }
 
+    /// Reads what the slaves of a scenario keep of the time before. Simulated ones are switched off and on for each scenario.
+    fn look(&mut self, own: &Own, link: &mut Observed<'_>) -> Result<(), TalkError> {
+        if self.restarts {
+            return Ok(());
+        }
+        let mut talk = Talk::new(Box::new(&mut *link), self.patience);
+        for known in self.known.iter_mut().flatten() {
+            let address = known.slave.address;
+            let mut slaves = own.plan.setup.slaves.iter();
+            if slaves.any(|own| own.address == address) {
+                talk.restart(address);
+                let now = known.read_history(&mut talk)?;
+                // No word of the bus changes the one in force while the terminals control a right slave (2.5.1, interface 0, 1 and 4).
+                let switched = self.written.contains(&(address, INTERFACE, 0));
+                known.history = History {
+                    stw: if switched { now.stw } else { known.history.stw },
+                    ..now
+                };
+            }
+        }
+        Ok(())
+    }
+
+    /// Why slaves are not given these addresses: another station has one of them.
+    fn other_station(
+        &self,
+        moved: &BTreeSet<(u8, u8)>,
+        link: &mut Observed<'_>,
+    ) -> Result<Option<Why>, TalkError> {
+        let mut talk = Talk::new(Box::new(&mut *link), self.patience);
+        for (slave, to) in moved.iter().filter(|(slave, to)| slave != to) {
+            if !self.restarts && talk.status(*to)? {
+                let why =
+                    format!("it gives slave {slave} the address {to}, at which a station answers");
+                return Ok(Some(Why::OtherDrives(why)));
+            }
+        }
+        Ok(None)
+    }
+
     /// Reads a slave, and holds the conversation that settles what the manual leaves open. Returns what came in it.
     fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<Came, TalkError> {
         let address = known.slave.address;
@@ -336,6 +392,9 @@ impl Player {
         let found = talk.configuration(address)?;
         known.slave.ppo = found.or(known.slave.ppo);
         known.read_all(&mut talk)?;
+        if !self.restarts {
+            known.history = known.read_history(&mut talk)?;
+        }
         let zsw = settle::forget(known, &mut talk)?;
         if zsw & zsw::FAULT != 0 {
             let ppo = known.ppo();

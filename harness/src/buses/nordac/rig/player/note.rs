@@ -4,7 +4,7 @@
 //! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
 
 use super::{AttemptCourse, Own, Player};
-use crate::buses::nordac::rig::known::{Known, Values, stated};
+use crate::buses::nordac::rig::known::{INTERFACE, Known, Values, stated};
 use crate::buses::nordac::rig::observed::{Agreement, Came, Observed, WHOLE};
 use crate::buses::nordac::rig::settle::{Assumed, search};
 use crate::buses::nordac::rig::talk::{Talk, TalkError};
@@ -267,7 +267,7 @@ impl AttemptNote {
         let slaves = self.slaves.iter().zip(properties).enumerate();
         let slaves = slaves.map(|(place, (known, properties))| {
             let mut slave: SlaveSetup = known.model(*properties);
-            let control = Parameter::of(super::INTERFACE).zip(interface);
+            let control = Parameter::of(INTERFACE).zip(interface);
             let control = control.map(|(own, value)| (own, Index::default(), value));
             slave.parameters.extend(control);
             if let Other::WrongSlave(own, deviation) = other {
@@ -289,7 +289,10 @@ impl AttemptNote {
         }
         let gone = match self.was_tried() {
             true => player.go(&self.own, &mut link, Some(self.switches)).0,
-            false => match player.learn(&mut link, false) {
+            false => match player
+                .learn(&mut link, false)
+                .and_then(|()| player.look(&self.own, &mut link))
+            {
                 Ok(()) => AttemptCourse::Skipped(Why::RunEnded.into()),
                 Err(error) => AttemptCourse::Unanswered(error),
             },

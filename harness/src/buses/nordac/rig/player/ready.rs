@@ -1,7 +1,7 @@
 //! Slaves made ready for a scenario: off, with the parameters of its header, and without a master.
 
-use super::{INTERFACE, Own, PPO_TYPE, Player};
-use crate::buses::nordac::rig::known::Known;
+use super::{Own, Player};
+use crate::buses::nordac::rig::known::{INTERFACE, Known, PPO_TYPE};
 use crate::buses::nordac::rig::observed::Observed;
 use crate::buses::nordac::rig::talk::{Talk, TalkError};
 use crate::buses::nordac::simulate::SlaveSetup;
@@ -50,6 +50,10 @@ impl Player {
                 ..Image::default()
             };
             talk.exchange(address, ppo, &off)?;
+            if !self.restarts {
+                // A slave whose terminals control it during the scenario goes on holding this word.
+                idle((address, ppo), &mut talk)?;
+            }
             for (parameter, index, value) in &slave.parameters {
                 let ind = index.ind(parameter);
                 let Some(raw) = parameter.raw_of(*value) else {
@@ -93,14 +97,7 @@ impl Player {
                     if switches {
                         talk.start(slave.address, ppo, None)?;
                     }
-                    let idle = Image {
-                        words: [IDLE, 0, 0, 0, 0, 0],
-                        ..Image::default()
-                    };
-                    let mut zsw = 0;
-                    for _ in 0..IDLE_TIMES {
-                        zsw = talk.exchange(slave.address, ppo, &idle)?.words[0];
-                    }
+                    let zsw = idle((slave.address, ppo), &mut talk)?;
                     self.without_fault((slave.address, ppo), zsw, &mut talk)?;
                     talk.start(slave.address, ppo, Some(FORGET))?;
                 }
@@ -117,7 +114,7 @@ impl Player {
 
 impl Player {
     /// Acknowledges a fault that a slave in the exchange shows, where the bench may: the terminals may start the motor then. It is idle afterwards.
-    pub(super) fn without_fault(
+    pub(in crate::buses::nordac::rig) fn without_fault(
         &self,
         (slave, ppo): (u8, PpoType),
         zsw: u16,
@@ -144,6 +141,22 @@ impl Player {
             _ => Err(TalkError::Fault { slave, zsw: shown }),
         }
     }
+}
+
+/// Gives a slave in the exchange the word that it holds when a scenario begins. Returns its status word.
+pub(in crate::buses::nordac::rig) fn idle(
+    (slave, ppo): (u8, PpoType),
+    talk: &mut Talk<'_>,
+) -> Result<u16, TalkError> {
+    let image = Image {
+        words: [IDLE, 0, 0, 0, 0, 0],
+        ..Image::default()
+    };
+    let mut zsw = 0;
+    for _ in 0..IDLE_TIMES {
+        zsw = talk.exchange(slave, ppo, &image)?.words[0];
+    }
+    Ok(zsw)
 }
 
 /// Switches the settings of the bus of a slave to those of a scenario, the PPO type last.

@@ -3,10 +3,12 @@
 
 use super::{Own, Player};
 use crate::buses::nordac::language::syntax;
+use crate::buses::nordac::rig::MASTER;
 use crate::buses::nordac::rig::known::value_of;
 use crate::buses::nordac::rig::observed::{Came, Observed};
 use crate::buses::nordac::rig::settle::Assumed;
 use crate::buses::nordac::rig::talk::TalkError;
+use crate::buses::nordac::simulate::Bench;
 use crate::link::{Line as _, Link as _, LinkEvent, Recording, Trouble};
 use crate::rig::segment::observed::Slow;
 use crate::scenario::run::outcome::Unready;
@@ -14,6 +16,8 @@ use crate::scenario::run::{AtMismatch, Outcome, Why, play};
 use crate::scenario::verdict::Verdict;
 use harness_proto::nordac::guard::Limits;
 use harness_proto::nordac::words::State;
+use harness_sim::nordac::History;
+use std::collections::BTreeSet;
 
 /// What a model is beside what is known of the slaves.
 #[derive(Clone, Copy, Default)]
@@ -26,6 +30,34 @@ pub(super) struct Other<'o> {
     pub(super) switches: bool,
     /// What came from the slaves, where the model is played up to the first difference from it.
     pub(super) came: Option<&'o Came>,
+    /// What the slaves keep of the time before.
+    pub(super) past: Past,
+}
+
+/// What slaves keep of the time before.
+#[derive(Clone, Copy, Default)]
+pub(super) enum Past {
+    /// What was read of them.
+    #[default]
+    AsRead,
+    /// Nothing: they were just switched on, and never had a fault.
+    Nothing,
+    /// Earlier faults, the oldest first, of those that had one. Only the last one was read.
+    Faults(&'static [u8]),
+}
+
+/// Two fault memories in which every place and the counters of every fault differ.
+const PAST_FAULTS: [&[u8]; 2] = [
+    &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
+    &[25, 24, 23, 22, 21, 20, 19, 18, 17, 16, 15, 14],
+];
+
+/// A scenario that the rig plays.
+pub(super) struct Begun {
+    /// Whether the settings of the bus are switched to those of the scenario.
+    pub(super) switches: bool,
+    /// The addresses that it gives to slaves: the slave, and its new one.
+    pub(super) moved: BTreeSet<(u8, u8)>,
 }
 
 /// A scenario played on the model.
@@ -33,7 +65,11 @@ pub(super) struct Rehearsal {
     pub(super) outcome: Outcome,
     pub(super) denied: Option<String>,
     /// The slave that has a fault at the end.
-    pub(super) faulted: Option<u8>,
+    faulted: Option<u8>,
+    /// Why the slaves could not be put back.
+    lost: Option<String>,
+    /// The addresses that it gives to slaves.
+    moved: BTreeSet<(u8, u8)>,
     /// What came from the first telegram on that makes the slaves ready.
     pub(super) came: Came,
 }
@@ -46,11 +82,10 @@ impl Rehearsal {
 
 impl Player {
     /// Plays a scenario on the model: with the settings of the bus as they are, or if that is permitted and needed with those of the scenario.
-    /// Returns whether they are switched.
     ///
     /// # Errors
     /// Why the rig does not play it.
-    pub(super) fn rehearsed(&self, own: &Own) -> Result<bool, Why> {
+    pub(super) fn rehearsed(&self, own: &Own) -> Result<Begun, Why> {
         let other = self.other_port(own).or_else(|| self.other_properties(own));
         if let Some(why) = other {
             return Err(Why::OtherDrives(why));
@@ -59,16 +94,16 @@ impl Player {
             switches,
             ..Other::default()
         };
-        let first = self.rehearse(own, &self.limits, with(false));
+        let first = self.rehearse_all(own, with(false));
         if first.passes() {
-            return match first.faulted.filter(|_| !self.acknowledges()) {
-                None => Ok(false),
-                Some(slave) => Err(left_in_fault(slave)),
-            };
+            return self.begins(first, false);
         }
         let permitted = may_switch_settings(&self.limits);
-        if permitted && self.rehearse(own, &self.limits, with(true)).passes() {
-            return Ok(true);
+        if permitted {
+            let switched = self.rehearse_all(own, with(true));
+            if switched.passes() {
+                return self.begins(switched, true);
+            }
         }
         if let Some(why) = first.denied {
             return Err(Why::Denied(why));
@@ -83,6 +118,8 @@ impl Player {
             "it is for other settings of the bus (1621, 1622) than the slaves have; the bench switches them with `allow_motion` and \
              --allow-motion, `allow_eeprom` and `allow_bus_settings`"
                 .to_owned()
+        } else if let Some(kept) = self.keeps_too_much(own, permitted) {
+            kept
         } else {
             let finding = first.outcome.finding.map(|own| own.message);
             let remark = first.outcome.remarks.into_iter().next();
@@ -90,6 +127,93 @@ impl Player {
             format!("a right slave with the same parameters does not meet it: {found}")
         };
         Err(Why::OtherDrives(why))
+    }
+
+    /// Whether a scenario that a model meets is begun.
+    ///
+    /// # Errors
+    /// Behind it a slave could not be put back, or stays with a fault.
+    fn begins(&self, played: Rehearsal, switches: bool) -> Result<Begun, Why> {
+        if let Some(why) = played.lost {
+            return Err(Why::Denied(why));
+        }
+        match played.faulted.filter(|_| !self.acknowledges()) {
+            Some(slave) => Err(left_in_fault(slave)),
+            None => Ok(Begun {
+                switches,
+                moved: played.moved,
+            }),
+        }
+    }
+
+    /// Plays a scenario on the model with what was read of the slaves; where they had faults before, with other fault memories too: what these
+    /// hold is not known, and a scenario that would show it is not met.
+    fn rehearse_all(&self, own: &Own, other: Other<'_>) -> Rehearsal {
+        let mut played = self.rehearse(own, &self.limits, other);
+        let had_faults = self
+            .known()
+            .iter()
+            .any(|own| !own.history.faults.is_empty());
+        for past in PAST_FAULTS.iter().filter(|_| had_faults) {
+            if played.passes() {
+                let past = Past::Faults(past);
+                played = self.rehearse(own, &self.limits, Other { past, ..other });
+            }
+        }
+        played
+    }
+
+    /// What the slaves keep of the time before, where that alone keeps a scenario from being played.
+    fn keeps_too_much(&self, own: &Own, permitted: bool) -> Option<String> {
+        let kept = self.known().iter().filter_map(|known| {
+            let word = known
+                .history
+                .stw
+                .map(|own| format!("control word {own:04X} is in force (967)"));
+            let fault = known.history.faults.first();
+            let fault = fault.map(|own| format!("fault {own} was its last one (947)"));
+            let all: Vec<_> = word.into_iter().chain(fault).collect();
+            (!all.is_empty()).then(|| format!("slave {}: {}", known.slave.address, all.join(", ")))
+        });
+        let kept: Vec<_> = kept.collect();
+        let past = Past::Nothing;
+        let meets = |switches| {
+            let other = Other {
+                past,
+                switches,
+                ..Other::default()
+            };
+            self.rehearse(own, &self.limits, other).passes()
+        };
+        let fresh = !kept.is_empty() && (meets(false) || permitted && meets(true));
+        fresh.then(|| {
+            format!(
+                "it is for a slave that was just switched on and had no fault before; {}",
+                kept.join("; ")
+            )
+        })
+    }
+
+    /// Why slaves could not be put back behind a scenario that was played on their model.
+    fn loses(&self, bench: &Bench, moved: &BTreeSet<(u8, u8)>) -> Option<String> {
+        let taken = |to: u8| to == MASTER || self.slaves.iter().any(|own| own.address == to);
+        let moved = moved.iter().find(|(slave, to)| slave != to && taken(*to));
+        if let Some((slave, to)) = moved {
+            return Some(format!(
+                "it gives slave {slave} the address {to}, which another station of the rig has: it is played with simulated slaves only"
+            ));
+        }
+        self.known().iter().find_map(|known| {
+            let slave = known.slave.address;
+            let ppo = bench.drive(slave)?.inverter().settings().ppo;
+            (known.ppo().has_pkw() && !ppo.has_pkw()).then(|| {
+                format!(
+                    "it leaves slave {slave} with PPO type {} (1622), which has no parameter channel to set it back: it is played with simulated \
+                     slaves only",
+                    ppo.number()
+                )
+            })
+        })
     }
 
     /// What of the line and of the addresses and PPO types of its slaves is another than the scenario has, and is not switched.
@@ -154,8 +278,17 @@ impl Player {
     pub(super) fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
         let known = self.known().iter().enumerate();
         let slaves = known.map(|(place, known)| {
-            let other = other.properties.and_then(|all| all.get(place));
-            known.model(*other.unwrap_or(&known.properties))
+            let properties = other.properties.and_then(|all| all.get(place));
+            let mut slave = known.model(*properties.unwrap_or(&known.properties));
+            slave.history = match other.past {
+                Past::Nothing => History::default(),
+                Past::Faults(faults) if !slave.history.faults.is_empty() => History {
+                    faults: faults.to_vec(),
+                    ..slave.history
+                },
+                _ => slave.history,
+            };
+            slave
         });
         let mut link = self.model(slaves.collect(), limits);
         let mut forgotten: Vec<LinkEvent> = Vec::new();
@@ -179,6 +312,7 @@ impl Player {
             }
         };
         let came = observed.noted.came();
+        let moved = std::mem::take(&mut observed.noted.moved);
         let faulted = self.known().iter().map(|own| own.slave.address);
         let faulted = faulted.into_iter().find(|slave| {
             let drive = link.inner().drive(*slave);
@@ -188,10 +322,15 @@ impl Player {
             Some(Trouble::Denied(why)) => Some(why.clone()),
             _ => None,
         };
+        let lost = (!self.restarts)
+            .then(|| self.loses(link.inner(), &moved))
+            .flatten();
         Rehearsal {
             outcome,
             denied,
             faulted,
+            lost,
+            moved,
             came,
         }
     }

@@ -1,8 +1,8 @@
 //! What in the rig's file would let a scenario be played that is skipped.
 
-use super::{INTERFACE, Own, Player};
+use super::{Own, Player};
 use crate::buses::LimitSetting;
-use crate::buses::nordac::rig::known::Known;
+use crate::buses::nordac::rig::known::{INTERFACE, Known};
 use crate::buses::nordac::rig::{MASTER, RigSlave};
 use crate::scenario::run::Unlock;
 use harness_proto::nordac::PpoType;
