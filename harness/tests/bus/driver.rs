@@ -5,7 +5,7 @@ use harness::buses::novobus::driver::{
     Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, SpelledOut, SpellingCause,
     Trigger, count_drives, recover,
 };
-use harness::link::{Line, Link, Moment, Octets, PlacedFault};
+use harness::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault};
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
@@ -372,6 +372,7 @@ fn recovery_of_9_8() {
         after: None,
         zeros_unasked: false,
         drives: Some(size(4)),
+        heard: Vec::new(),
     };
     assert_eq!(recover(&mut link, 0), fine);
     // The second link ends at drive 2.
@@ -386,12 +387,67 @@ fn recovery_of_9_8() {
             drive: 2,
             why: SpellingCause::Fault,
         }),
-        ..fine
+        ..fine.clone()
     };
     assert_eq!(recover(&mut link, 0), damaged);
     assert_eq!(recover(&mut link, 0), fine);
     link.inject(0, PlacedFault::Link(1, LinkFault::Cut), Moment::Now);
-    assert_eq!(recover(&mut link, 0).drives, None);
+    let open = recover(&mut link, 0);
+    assert_eq!((open.drives, &open.heard[..]), (None, &[][..]));
+}
+
+/// ND21 9.8, 9.9: a sound ring that monitors time-outs is brought back and counted behind every silence, however many of its drives have not
+/// noticed that the one before them is in the error mode.
+#[test]
+fn a_sound_ring_is_counted_behind_every_silence() {
+    for drives in [4, 5, 6, 12, 40] {
+        let monitors = |_: u8| {
+            let mut eeprom = factory::eeprom();
+            eeprom[usize::from(ee::SELFTEST)] = 0x80;
+            harness_sim::nd21::set_parity(&mut eeprom);
+            let properties = Nd21Properties::default();
+            Drive::Nd21(Nd21Drive::new(Properties::default(), properties, eeprom))
+        };
+        let ring = Ring::new(size(drives), Rate::Baud38400, monitors);
+        let mut link = SimulatedLink::new(Bench::one(ring));
+        link.send_octets(0, &[0x80]);
+        for round in 0..4 {
+            let end = link.now() + Span::from_millis(500);
+            while link.now() < end {
+                link.wait(end);
+            }
+            assert_eq!(
+                count_drives(&mut link, 0),
+                Ok(size(drives)),
+                "{drives}, {round}"
+            );
+            let end = link.now() + Span::from_millis(500);
+            while link.now() < end {
+                link.wait(end);
+            }
+            let recovery = recover(&mut link, 0);
+            assert_eq!(recovery.drives, Some(size(drives)), "{drives}, {round}");
+        }
+    }
+}
+
+/// ND21 9.7: where a drive's transmitter sends the same byte for ever, that byte comes back, and not nothing.
+#[test]
+fn what_a_defective_transmitter_sends_is_heard() {
+    for (drives, drive, byte, heard) in [(3, 1, 0, 1), (12, 5, 5, 4), (3, 0, 0x55, 0x55)] {
+        let mut link = SimulatedLink::new(Bench::one(ring(drives, Nd21Properties::default())));
+        link.inject(
+            0,
+            PlacedFault::Drive(drive, DriveFault::Stuck(byte)),
+            Moment::Now,
+        );
+        let found = recover(&mut link, 0);
+        assert_eq!(
+            (found.drives, found.heard),
+            (None, vec![heard; 8]),
+            "{drive} {byte}"
+        );
+    }
 }
 
 /// ND21 14.10.6: a recording with a trigger, one without, and one that never triggers.

@@ -444,8 +444,8 @@ fn recover_counts_the_drives() {
     assert_eq!(
         json("recover --rig sim:250,1 --format json")["rings"],
         serde_json::json!([
-            {"reported": null, "missed_master": null, "drives": 250, "still": null, "zeros_unasked": false},
-            {"reported": null, "missed_master": null, "drives": 1, "still": null, "zeros_unasked": false},
+            {"reported": null, "missed_master": null, "drives": 250, "still": null, "zeros_unasked": false, "heard": ""},
+            {"reported": null, "missed_master": null, "drives": 1, "still": null, "zeros_unasked": false, "heard": ""},
         ])
     );
     let folder = folder("recover");

@@ -10,6 +10,7 @@ use crate::cli::output::Output;
 use crate::cli::rig_failure::tell_end;
 use crate::counted::counted;
 use crate::link::Line;
+use harness_proto::novobus::address::MAX_DRIVES;
 use serde_json::json;
 
 /// Recovers every ring of a bench.
@@ -66,6 +67,7 @@ fn show(
                         "drives": recovery.drives.map(|size| size.drives()),
                         "still": recovery.after,
                         "zeros_unasked": recovery.zeros_unasked,
+                        "heard": hex(&recovery.heard),
                     })
                 })
                 .collect();
@@ -76,6 +78,33 @@ fn show(
         Ok(Exit::Passed)
     } else {
         Ok(Exit::RigError)
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let all: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    all.join(" ")
+}
+
+/// What a ring does behind the check sequence that is not back and of which no drive reports.
+fn come_back(heard: &[u8]) -> String {
+    match heard {
+        [] => "nothing comes back behind the check sequence: the ring is broken, or the drive in front of the master has no power (ND21 9.9)"
+            .to_owned(),
+        [first, rest @ ..] if rest.iter().all(|byte| byte == first) => {
+            let spelled = match MAX_DRIVES > u16::from(*first) {
+                true => format!(", or drive {first}, if the ring has it, stays in the error mode and spells out its address (ND21 9.7)"),
+                false => String::new(),
+            };
+            format!(
+                "{first:02X} comes back all the time, whatever is sent: a drive's transmitter sends the same byte for ever{spelled}"
+            )
+        }
+        _ => format!(
+            "bytes come back behind the check sequence, and they are not those of a ring ({} ...): another rate, another device, or a drive that \
+             damages what it passes on",
+            hex(heard)
+        ),
     }
 }
 
@@ -116,9 +145,7 @@ pub(super) fn text(ring: usize, recovery: &Recovery) -> String {
              front of it and monitors time-outs, or it is defective (ND21 9.9)"
                 .to_owned()
         }
-        (None, None) => "nothing comes back behind the check sequence: the ring is broken, or the \
-             drive in front of the master has no power (ND21 9.9)"
-            .to_owned(),
+        (None, None) => come_back(&recovery.heard),
     };
     format!("ring {}: {before}; {behind}\n", ring + 1)
 }

@@ -28,8 +28,22 @@ pub(crate) const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
     let counted = count_behind(link, ring, &[]);
     counted
-        .or_else(|| count_behind(link, ring, &repair()))
+        .or_else(|| count_repaired(link, ring))
         .ok_or_else(|| link.trouble().cloned().map_or_else(no_answer, Error::Link))
+}
+
+/// Brings a ring back and counts its drives.
+///
+/// A check sequence brings back each drive that has noticed the one before it, and one that has not: that one hears its seventeen zeros. In a
+/// silence drives time out one byte apart, and every second one may not notice the one before it (9.9): a sound ring needs as many check
+/// sequences as it has drives at the most. So many are sent where something comes back behind the first two.
+fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
+    let (first, heard) = counted(link, ring, &repair());
+    let more = first.is_none() && !heard.is_empty() && link.trouble().is_none();
+    match more {
+        true => count_behind(link, ring, &CHECK_SEQUENCE.repeat(MAX_DRIVES.into())),
+        false => first,
+    }
 }
 
 /// The bytes that recover a ring: the check sequence behind its 17 zeros (9.8), twice. Drives behind a time-out pass on seven zeros and then
@@ -49,11 +63,16 @@ fn no_answer() -> Error {
 
 /// Sends some bytes and then the telegram that counts; `None` where nothing sensible comes back.
 pub(crate) fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> Option<RingSize> {
+    counted(link, ring, before).0
+}
+
+/// The same with the bytes that came; 0 for a damaged one.
+fn counted(link: &mut dyn Line, ring: usize, before: &[u8]) -> (Option<RingSize>, Vec<u8>) {
     let mut bytes = before.to_vec();
     bytes.extend([SYNCO, SYNCO]);
     bytes.extend(COUNT);
     let mut heard = Vec::new();
-    listen(link, ring, &bytes, |received| {
+    let size = listen(link, ring, &bytes, |received| {
         heard.push(if received.error.is_none() {
             received.byte
         } else {
@@ -65,7 +84,8 @@ pub(crate) fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> O
             }
             _ => None,
         }
-    })
+    });
+    (size, heard)
 }
 
 /// Sends bytes and SYNCO behind them, and shows what comes, until one of them says something or all must have come round.
@@ -116,7 +136,7 @@ pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
 }
 
 /// What a ring reported during its recovery (9.7, 9.8).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recovery {
     /// The drive that spelled out its address before.
     pub before: Option<SpelledOut>,
@@ -127,7 +147,13 @@ pub struct Recovery {
     pub zeros_unasked: bool,
     /// How many drives answer; `None` where the ring is not back.
     pub drives: Option<RingSize>,
+    /// The last bytes that came for those that were sent behind the check sequence, where the ring is not back and no drive spells out its
+    /// address.
+    pub heard: Vec<u8>,
 }
+
+/// How many bytes [`Recovery::heard`] has at the most.
+const SHOWN: usize = 8;
 
 impl Recovery {
     /// The drive that reported a fault in front of it, before the ring was brought back.
@@ -162,9 +188,12 @@ pub enum SpellingCause {
 /// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
 #[must_use]
 pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
-    let before = reported(link, ring);
-    let drives = count_behind(link, ring, &repair());
-    let after = drives.map_or_else(|| reported(link, ring), |_| None);
+    let (before, _) = reported(link, ring);
+    let drives = count_repaired(link, ring);
+    let (after, heard) = match drives {
+        Some(_) => (None, Vec::new()),
+        None => reported(link, ring),
+    };
     let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
     let own = |drive: &u8| !(zeros_unasked && *drive == 0);
     let (before, after) = (before.filter(own), after.filter(own));
@@ -177,6 +206,10 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
         after,
         zeros_unasked,
         drives,
+        heard: match after {
+            Some(_) => Vec::new(),
+            None => heard,
+        },
     }
 }
 
@@ -204,15 +237,18 @@ fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> SpellingC
     }
 }
 
-/// The drive that spells out its address while the master sends SYNCO (9.7, 9.9).
-fn reported(link: &mut dyn Line, ring: usize) -> Option<u8> {
+/// The drive that spells out its address while the master sends SYNCO (9.7, 9.9), and the last bytes that came.
+fn reported(link: &mut dyn Line, ring: usize) -> (Option<u8>, Vec<u8>) {
     // Once round the largest ring, and the zeros in front of the address.
     let mut heard = Vec::new();
     let _all: Option<()> = listen(link, ring, &[SYNCO; 300], |received| {
         heard.push(received);
         None
     });
-    locate(&heard, u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX)).map(|location| location.drive)
+    let located = locate(&heard, u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX));
+    let last = heard[heard.len().saturating_sub(SHOWN)..].iter();
+    let last = last.map(|received| received.byte).collect();
+    (located.map(|location| location.drive), last)
 }
 
 /// The identity that a drive reports (14.3.5, 14.8).
