@@ -26,7 +26,8 @@ fn slcan(server: &mut FrameServer<SharedDrives>, opening: &str) -> usize {
     client
 }
 
-fn socketcand(server: &mut FrameServer<SharedDrives>) -> usize {
+/// A client that has said nothing behind `rawmode`.
+fn silent(server: &mut FrameServer<SharedDrives>) -> usize {
     let client = server.come(Protocol::Socketcand).expect("a place");
     assert_eq!(took(server, client), "< hi >");
     assert_eq!(
@@ -34,6 +35,13 @@ fn socketcand(server: &mut FrameServer<SharedDrives>) -> usize {
         [""; 0]
     );
     assert_eq!(took(server, client), "< ok >< ok >");
+    client
+}
+
+fn socketcand(server: &mut FrameServer<SharedDrives>) -> usize {
+    let client = silent(server);
+    assert_eq!(server.receive(client, b"< echo >"), [""; 0]);
+    assert_eq!(took(server, client), "< echo >");
     client
 }
 
@@ -51,6 +59,46 @@ fn run(server: &mut FrameServer<SharedDrives>, until: Instant) {
         server.advance(server.deadline());
     }
     server.advance(until);
+}
+
+/// A client that waits behind the answer to `rawmode` finds no frame in its segment, and gets what it was not sent in time, with right times.
+#[test]
+fn frames_are_held_back_behind_the_answer_to_rawmode() {
+    let mut server = server(1);
+    let one = slcan(&mut server, "O\r");
+    // A cycle of 10 ms.
+    server.receive(one, b"t20133D300A\r");
+    run(&mut server, at(5_000));
+    let waiting = silent(&mut server);
+    for until in [30_000, 60_000, 104_999] {
+        run(&mut server, at(until));
+        assert_eq!(took(&mut server, waiting), "", "{until}");
+    }
+    assert_eq!(server.deadline(), at(105_000));
+    run(&mut server, at(105_000));
+    let held = took(&mut server, waiting);
+    let times: Vec<_> = held
+        .split("< frame 181 ")
+        .skip(1)
+        .map(|own| &own[..9])
+        .collect();
+    assert_eq!(times.len(), 10, "{held}");
+    assert_eq!((times[0], times[9]), ("1000.5101", "1000.6001"), "{held}");
+
+    // A client that speaks has read the answer.
+    let speaking = silent(&mut server);
+    run(&mut server, at(130_000));
+    assert_eq!(took(&mut server, speaking), "");
+    server.receive(speaking, b"< echo >");
+    run(&mut server, at(130_001));
+    let heard = took(&mut server, speaking);
+    assert!(
+        heard.starts_with("< echo >< frame 181 1000.6101"),
+        "{heard}"
+    );
+    assert_eq!(heard.matches("frame").count(), 2, "{heard}");
+    run(&mut server, at(139_000));
+    assert_eq!(took(&mut server, speaking).matches("frame").count(), 1);
 }
 
 /// The lower identifier wins, each client hears the other and not itself, and the drive answers behind both.

@@ -131,9 +131,9 @@ impl<B: SharedBus> FrameServer<B> {
         let Some(own) = seat.and_then(|seat| seat.client.as_mut()) else {
             return said;
         };
-        let acts = own.session.receive(bytes, &mut answers);
-        own.outbox.extend(answers);
         let now = self.bus.now();
+        let acts = own.session.receive(now, bytes, &mut answers);
+        own.outbox.extend(answers);
         for act in acts {
             match act {
                 Act::Say(text) => said.push(text),
@@ -232,7 +232,10 @@ impl<B: SharedBus> FrameServer<B> {
     pub fn deadline(&self) -> Instant {
         let (from, to) = self.base;
         let clients = self.seats.iter().filter_map(|seat| seat.client.as_ref());
-        let heard = clients.filter_map(|own| own.heard.front().map(|(at, _)| *at));
+        let heard = clients.filter_map(|own| {
+            let (at, _) = own.heard.front()?;
+            Some(own.session.holds_until().max(*at))
+        });
         let leaves = self.seats.iter().filter_map(|seat| seat.leaves);
         let next = heard.chain(leaves).chain(self.bus.next_event()).min();
         let idle = self.clock + IDLE;
@@ -246,7 +249,7 @@ impl Client {
     /// computer did: `base` is a time of the clock, and that of the bus then.
     fn deliver(&mut self, now: Instant, base: (Instant, Instant)) {
         while let Some(&(at, heard)) = self.heard.front()
-            && at <= now
+            && self.session.holds_until().max(at) <= now
         {
             self.heard.pop_front();
             let repeats = matches!(heard, CanEvent::Error(_)) && self.last == Some(heard);

@@ -3,7 +3,7 @@
 use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, flags, rate_of};
 use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest, Stamp, class};
 use harness_proto::can::{BitRate, CanError, CanEvent, Frame};
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use std::time::Duration;
 
 /// The version that an SLCAN client reads: hardware 1.0, software 1.0.
@@ -11,6 +11,10 @@ const VERSION: &str = "1010";
 
 /// The serial number that an SLCAN client reads.
 const SERIAL_NUMBER: &str = "SIM1";
+
+/// How long the daemon reports nothing behind the answer to `rawmode`, unless the client says more. A client may take the answer for the only
+/// message of its segment: the constructor of python-can refuses a frame there.
+const HOLD: Span = Span::from_millis(100);
 
 /// Frames that an adapter takes which runs at another rate than the bus, and so never sends them.
 const STUCK: usize = 64;
@@ -71,16 +75,24 @@ impl Session {
         }
     }
 
-    /// Takes bytes of the client, and writes the answers.
-    pub(super) fn receive(&mut self, bytes: &[u8], out: &mut Vec<u8>) -> Vec<Act> {
+    /// Takes bytes of the client at `now`, and writes the answers.
+    pub(super) fn receive(&mut self, now: Instant, bytes: &[u8], out: &mut Vec<u8>) -> Vec<Act> {
         let mut acts = Vec::new();
         for &byte in bytes {
             match self {
                 Self::Slcan(adapter) => adapter.receive(byte, out, &mut acts),
-                Self::Socketcand(daemon) => daemon.receive(byte, out, &mut acts),
+                Self::Socketcand(daemon) => daemon.receive(now, byte, out, &mut acts),
             }
         }
         acts
+    }
+
+    /// Until when nothing that the station hears is reported to the client.
+    pub(super) const fn holds_until(&self) -> Instant {
+        match self {
+            Self::Slcan(_) => Instant::START,
+            Self::Socketcand(daemon) => daemon.holds_until,
+        }
     }
 
     /// The client's station has heard something that ended at `at`.
@@ -174,7 +186,8 @@ impl Adapter {
             | SlcanCommand::Open
             | SlcanCommand::Listen
             | SlcanCommand::Close
-            | SlcanCommand::Flags => Report::Refused,
+            | SlcanCommand::Flags
+            | SlcanCommand::Silent(_) => Report::Refused,
         }
     }
 
@@ -251,6 +264,7 @@ pub(super) struct Daemon {
     messages: Messages,
     mode: Mode,
     started: Duration,
+    holds_until: Instant,
 }
 
 /// Modes of the protocol.
@@ -267,13 +281,15 @@ impl Daemon {
             messages: Messages::default(),
             mode: Mode::NoBus,
             started,
+            holds_until: Instant::START,
         }
     }
 
-    fn receive(&mut self, byte: u8, out: &mut Vec<u8>, acts: &mut Vec<Act>) {
+    fn receive(&mut self, now: Instant, byte: u8, out: &mut Vec<u8>, acts: &mut Vec<Act>) {
         let Some(message) = self.messages.push(byte) else {
             return;
         };
+        self.holds_until = Instant::START;
         let request = match message.and_then(|message| SocketcandRequest::parse(&message)) {
             Ok(request) => request,
             Err(error) => {
@@ -295,6 +311,7 @@ impl Daemon {
             (Mode::NoBus, _) => "no bus is open; < open can0 > expected first",
             (_, SocketcandRequest::RawMode) => {
                 self.mode = Mode::Raw;
+                self.holds_until = now + HOLD;
                 return SocketcandAnswer::Ok.write(out);
             }
             (_, SocketcandRequest::BcmMode) => {
