@@ -24,6 +24,11 @@ impl BadMessage {
         self.received.starts_with(beginning)
     }
 
+    /// The message, as far as it is shown.
+    pub(crate) fn received(&self) -> &str {
+        &self.received
+    }
+
     fn new(received: &[u8], expected: &'static str) -> Self {
         let shown = received.get(..SHOWN).unwrap_or(received);
         let dots = if shown.len() < received.len() {

@@ -11,6 +11,7 @@
 //! | `sxxyy` | bit timing, while closed: BTR0 and BTR1 of an SJA1000 at 16 MHz |
 //! | `O`, `L`, `C` | open, open listen-only, close |
 //! | `V`, `N`, `F` | version, serial number, status flags |
+//! | `M0`, `M1` | CANable: acknowledge frames, or be silent; taken while closed, and kept while it has power |
 //! | `Z0`, `Z1` | time stamps off or on: milliseconds 0 to 59999, four digits behind each frame |
 
 use super::{BadMessage, digit, hexadecimal};
@@ -128,6 +129,8 @@ pub enum SlcanCommand {
     Open,
     /// `L`: open listen-only; not even acknowledges are sent.
     Listen,
+    /// `M0`, `M1`: acknowledge frames or be silent when open, in the firmware of CANable; LAWICEL's adapters refuse it.
+    Silent(bool),
     /// `C`.
     Close,
     /// `V`.
@@ -171,6 +174,8 @@ impl SlcanCommand {
             }
             b"O" => Self::Open,
             b"L" => Self::Listen,
+            b"M0" => Self::Silent(false),
+            b"M1" => Self::Silent(true),
             b"C" => Self::Close,
             b"V" => Self::Version,
             b"N" => Self::SerialNumber,
@@ -195,6 +200,7 @@ impl SlcanCommand {
             }
             Self::Open => out.push(b'O'),
             Self::Listen => out.push(b'L'),
+            Self::Silent(on) => out.extend([b'M', b'0' + u8::from(on)]),
             Self::Close => out.push(b'C'),
             Self::Version => out.push(b'V'),
             Self::SerialNumber => out.push(b'N'),
@@ -443,6 +449,7 @@ mod tests {
             ("N", SlcanCommand::SerialNumber),
             ("F", SlcanCommand::Flags),
             ("Z1", SlcanCommand::TimeStamps(true)),
+            ("M1", SlcanCommand::Silent(true)),
             ("X1", SlcanCommand::ReportAll),
         ] {
             assert_eq!(SlcanCommand::parse(line.as_bytes()), Ok(command), "{line}");

@@ -10,8 +10,8 @@
 //! client  < echo >                 server  < echo >
 //! ```
 //!
-//! In raw mode every frame of the bus is reported. The protocol has no remote frames. The modes for broadcast manager, ISO-TP and
-//! statistics are not here.
+//! In raw mode every frame of the bus is reported. Remote frames (`rtr`) came late to the protocol: they are read, and neither sent nor served.
+//! The modes for broadcast manager, ISO-TP and statistics are not here.
 
 use super::{BadMessage, hexadecimal};
 use harness_proto::can::{Frame, Id, MAX_DATA};
@@ -99,7 +99,7 @@ pub enum SocketcandAnswer {
     Ok,
     /// `echo`.
     Echo,
-    /// `frame`: a data frame of the bus.
+    /// `frame`, and `rtr` of newer servers: a frame of the bus.
     Frame(Frame, Stamp),
     /// `error` with a class and a time: an error frame of the interface.
     ErrorFrame(u32, Stamp),
@@ -124,6 +124,15 @@ impl SocketcandAnswer {
                     Some(Self::Frame(Frame::new(id, &bytes(data)?).ok()?, stamp))
                 });
                 frame.ok_or_else(|| bad("< frame 181 23.424242 40810100 > expected: identifier, time and data in hexadecimal digits"))
+            }
+            [b"rtr", id, time, [len @ b'0'..=b'8']] => {
+                let frame = identifier(id).zip(stamp(time)).and_then(|(id, stamp)| {
+                    let frame = Frame::remote(id, usize::from(len - b'0')).ok()?;
+                    Some(Self::Frame(frame, stamp))
+                });
+                frame.ok_or_else(|| {
+                    bad("< rtr 181 23.424242 4 > expected: identifier, time and length")
+                })
             }
             [b"error", class, time] if stamp(time).is_some() && hexadecimal(class).is_some() => {
                 let class = hexadecimal(class).unwrap_or_default();
@@ -382,7 +391,10 @@ mod tests {
             spaced,
             Ok(SocketcandAnswer::Frame(a_frame("123#1A22"), half))
         );
+        let remote = SocketcandAnswer::parse(b"< rtr 123 23.424242 4 >");
+        assert_eq!(remote, Ok(SocketcandAnswer::Frame(a_frame("123#R4"), TIME)));
         for text in [
+            "< rtr 123 23.4 9 >",
             "< frame 123 23.4 1A2 >",
             "< frame 1234 1.0 1A >",
             "< frame 123 1A >",

@@ -205,6 +205,7 @@ fn the_bench_s_own_link_talks_to_a_drive() {
             place: place.clone(),
             rate: BitRate::K500,
             listen_only,
+            may_acknowledge: false,
         };
         let drive = vec![(Id::base(0x181).expect("small"), 1)];
         let open = |settings| FrameLink::open(&settings, drive.clone(), Arc::default());

@@ -7,7 +7,7 @@ use crate::capture::live::LiveText;
 use crate::capture::{AWAY, Piece, RecordedPlace};
 use crate::cli::exit::Exit;
 use crate::link::Line as _;
-use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink};
+use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink, Listening};
 use crate::medium;
 use crate::port::{OpenError, PortCounts, SilentTap, TapState};
 use crate::trouble::Trouble;
@@ -63,6 +63,8 @@ pub(super) struct Tap {
     pub(super) at: TapAt,
     pub(super) place: RecordedPlace,
     pub(super) text: Box<dyn LiveText>,
+    /// What is known of a CAN adapter's acknowledgements; the least, where it was opened several times.
+    listening: Option<Listening>,
     ear: Ear,
     settings: TapSettings,
     cutter: Option<TelegramCutter>,
@@ -95,6 +97,7 @@ fn adapter(at: &TapAt, settings: &TapSettings) -> Result<FrameLink, AdapterError
         place: place.clone(),
         rate: *rate,
         listen_only: true,
+        may_acknowledge: settings.may_acknowledge,
     };
     let mut link = FrameLink::open(&own, Vec::new(), Arc::clone(&settings.stop))?;
     link.keep_no_trace();
@@ -139,6 +142,7 @@ impl Tap {
             at: at.clone(),
             text: live_text(&place, drives),
             place,
+            listening: None,
             ear,
             settings,
             cutter,
@@ -149,9 +153,17 @@ impl Tap {
             pieces: 0,
             damaged: 0,
         };
+        own.note_listening();
         own.before = own.counts();
         own.overruns = own.before.map_or(0, |own| own.overruns);
         Ok(own)
+    }
+
+    fn note_listening(&mut self) {
+        if let Ear::Frames(link) = &self.ear {
+            let now = Some(link.listening());
+            self.listening = self.listening.max(now);
+        }
     }
 
     fn counts(&self) -> Option<PortCounts> {
@@ -299,6 +311,7 @@ impl Tap {
             }
             other => self.ear = other,
         }
+        self.note_listening();
         if matches!(self.ear, Ear::Octets(_) | Ear::Frames(_)) {
             pieces.push(Piece::Event(now, "the adapter is back".to_owned()));
         }
@@ -308,17 +321,20 @@ impl Tap {
     pub(super) fn summary(&self) -> (String, bool) {
         let mut spoke = false;
         let silent = match &self.at.port {
-            TapPort::Frames(AdapterPlace::Slcan { .. }, _) => {
-                "the adapter took the listen-only mode (L), in which it sends nothing on the bus"
-                    .to_owned()
-            }
-            TapPort::Frames(AdapterPlace::Kernel { .. }, _) => {
-                "the interface is in listen-only mode, in which it sends nothing on the bus"
-                    .to_owned()
-            }
             TapPort::Frames(AdapterPlace::Socketcand { .. }, _) => {
                 "whether the server's controller acknowledges is not known".to_owned()
             }
+            TapPort::Frames(..) => match self.listening {
+                Some(Listening::Only(mode)) => format!(
+                    "the adapter took the listen-only mode ({mode}), in which it sends nothing on the bus"
+                ),
+                Some(Listening::Unconfirmed(mode)) => format!(
+                    "the adapter was set to its listen-only mode ({mode}), which its firmware never confirms"
+                ),
+                Some(Listening::MayAcknowledge) | None => {
+                    "the adapter does not listen only: it may have acknowledged frames".to_owned()
+                }
+            },
             TapPort::Link(_) | TapPort::Line(..) => match self.before.zip(self.counts()) {
                 None => "bytes sent: not counted by the driver".to_owned(),
                 Some((before, now)) => {

@@ -66,6 +66,14 @@ impl Adapter {
         }
     }
 
+    /// Writes what ends the conversation.
+    pub(super) fn close(&self, out: &mut Vec<u8>) {
+        if let Self::Slcan(own) = self {
+            let commands = closing(own.silenced).iter();
+            commands.for_each(|command| command.write(out));
+        }
+    }
+
     /// Does what is due, and writes it.
     pub(super) fn attend(&mut self, now: Instant, out: &mut Vec<u8>) {
         if let Self::Slcan(own) = self {
@@ -90,6 +98,14 @@ impl Adapter {
     }
 }
 
+/// What closes a channel. An adapter that was told to be silent is put back.
+pub(super) const fn closing(silenced: bool) -> &'static [SlcanCommand] {
+    match silenced {
+        true => &[SlcanCommand::Close, SlcanCommand::Silent(false)],
+        false => &[SlcanCommand::Close],
+    }
+}
+
 /// An SLCAN adapter whose channel is open.
 #[derive(Debug)]
 pub(super) struct Slcan {
@@ -100,23 +116,31 @@ pub(super) struct Slcan {
     /// When the status is asked for again; `None` with an adapter that has none.
     status: Option<Instant>,
     listen_only: bool,
+    /// Whether it answers commands.
+    answers: bool,
+    /// Whether it was told to be silent.
+    silenced: bool,
 }
 
 impl Slcan {
-    pub(super) fn new(listen_only: bool) -> Self {
+    pub(super) fn new(listen_only: bool, answers: bool, silenced: bool) -> Self {
         let period = Span::from_millis(STAMP_PERIOD.into());
         Self {
             lines: slcan::Lines::default(),
             clock: AdapterClock::new(Span::from_millis(1), Some(period)),
             unanswered: VecDeque::new(),
-            status: Some(Instant::START),
+            status: answers.then_some(Instant::START),
             listen_only,
+            answers,
+            silenced,
         }
     }
 
     fn command(&mut self, now: Instant, command: SlcanCommand, out: &mut Vec<u8>) {
         command.write(out);
-        self.unanswered.push_back((command, now));
+        if self.answers {
+            self.unanswered.push_back((command, now));
+        }
     }
 
     fn attend(&mut self, now: Instant, out: &mut Vec<u8>) {
@@ -204,6 +228,8 @@ fn status(bits: u8, read: Instant) -> Vec<Event> {
 pub(super) struct Socketcand {
     messages: Messages,
     clock: AdapterClock,
+    /// Whether the answer to the `echo` of the opening is to come; some servers refuse it.
+    echo: bool,
 }
 
 impl Socketcand {
@@ -211,6 +237,7 @@ impl Socketcand {
         Self {
             messages: Messages::default(),
             clock: AdapterClock::new(Span::ZERO, None),
+            echo: true,
         }
     }
 
@@ -238,8 +265,10 @@ impl Socketcand {
             }
             Ok(SocketcandAnswer::ErrorFrame(..)) => CanError::ErrorFrame,
             Ok(SocketcandAnswer::Hi | SocketcandAnswer::Ok | SocketcandAnswer::Echo) => {
+                self.echo = false;
                 return None;
             }
+            Ok(SocketcandAnswer::Error(_)) if std::mem::take(&mut self.echo) => return None,
             Ok(SocketcandAnswer::Error(text)) => {
                 return Some(Event::Ended(format!(
                     "the server of socketcand reports: {text}"
@@ -280,7 +309,7 @@ mod tests {
 
     #[test]
     fn an_adapter_hears_and_is_asked_for_its_status() {
-        let mut own = Adapter::Slcan(Slcan::new(false));
+        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
         let mut out = Vec::new();
         own.attend(at(1), &mut out);
         assert_eq!(out, b"F\r");
@@ -302,7 +331,7 @@ mod tests {
     /// What is refused is the oldest command; an adapter without status is not asked again.
     #[test]
     fn refusals_belong_to_commands() {
-        let mut own = Adapter::Slcan(Slcan::new(false));
+        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
         own.attend(at(1), &mut Vec::new());
         written(&mut own, at(1), "201#3D4000");
         assert_eq!(events(&mut own, "\x07", at(2)), []);
@@ -318,7 +347,7 @@ mod tests {
     /// An adapter that does not answer frames is given further ones after a while.
     #[test]
     fn answers_that_do_not_come_are_not_waited_for() {
-        let mut own = Adapter::Slcan(Slcan::new(false));
+        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
         for _ in 0..MOST_UNANSWERED {
             assert!(own.is_ready());
             written(&mut own, at(0), "201#3D4000");
@@ -330,6 +359,20 @@ mod tests {
         assert!(own.is_ready());
     }
 
+    /// An adapter that answers nothing is not waited for, and not asked for its status.
+    #[test]
+    fn no_answers_are_expected_of_an_adapter_without() {
+        let mut own = Adapter::Slcan(Slcan::new(false, false, false));
+        let mut out = Vec::new();
+        own.attend(at(1), &mut out);
+        assert_eq!((out, own.due()), (Vec::new(), None));
+        for _ in 0..=MOST_UNANSWERED {
+            assert!(own.is_ready());
+            written(&mut own, at(0), "201#3D4000");
+        }
+        assert_eq!(own.due(), None);
+    }
+
     #[test]
     fn a_daemon_reports_frames_and_errors() {
         let mut own = Adapter::Socketcand(Socketcand::new());
@@ -338,7 +381,7 @@ mod tests {
             "< send 201 3 3d 40 0 >"
         );
         assert!(!own.send(at(0), &frame("201#R3"), &mut Vec::new()));
-        let heard = events(&mut own, "< ok >< frame 181 1700000000.000100 AA >", at(9));
+        let heard = events(&mut own, "< frame 181 1700000000.000100 AA >", at(9));
         assert_eq!(
             heard,
             [Event::Heard(at(9), CanEvent::Frame(frame("181#AA")))]
@@ -357,6 +400,8 @@ mod tests {
                 error(CanError::ErrorFrame)
             ]
         );
+        // A server without `echo`.
+        assert_eq!(events(&mut own, "< error unknown command >", at(9)), []);
         for text in ["< error no bus >", "hello >"] {
             let ended = events(&mut own, text, at(9));
             assert!(matches!(&ended[..], [Event::Ended(_)]), "{text}: {ended:?}");

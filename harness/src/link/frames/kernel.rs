@@ -1,7 +1,7 @@
 //! An interface of Linux's SocketCAN as a way to the bus, by the crate `harness-socketcan`.
 
 use super::adapter::Event;
-use super::open::AdapterError;
+use super::open::{AdapterError, Listening};
 use super::transport::Transport;
 use crate::port::{LastWords, OpenError};
 use crate::trouble::Trouble;
@@ -25,15 +25,29 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// Opens an interface. With `listen_only` it has to be in that mode.
-    pub(super) fn open(name: &str, listen_only: bool) -> Result<Self, AdapterError> {
+    /// Opens an interface. With `listen_only` it has to be in that mode, unless it may acknowledge.
+    pub(super) fn open(
+        name: &str,
+        listen_only: bool,
+        may_acknowledge: bool,
+    ) -> Result<(Self, Listening), AdapterError> {
         let port = name.to_owned();
         match socketcan::Interface::open(name, listen_only) {
-            Ok(interface) => Ok(Self {
-                interface,
-                name: port,
-                queue: VecDeque::new(),
-            }),
+            Ok(interface) => {
+                let own = Self {
+                    interface,
+                    name: port,
+                    queue: VecDeque::new(),
+                };
+                let listening = match listen_only {
+                    true => Listening::Only("LISTEN-ONLY"),
+                    false => Listening::MayAcknowledge,
+                };
+                Ok((own, listening))
+            }
+            Err(socketcan::OpenError::NotListenOnly) if may_acknowledge => {
+                Self::open(name, false, false)
+            }
             Err(socketcan::OpenError::NotBuilt) => Err(AdapterError::NotBuilt(port)),
             Err(socketcan::OpenError::NotListenOnly) => Err(AdapterError::Refused {
                 port,

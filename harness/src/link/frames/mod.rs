@@ -11,9 +11,10 @@ mod adapter;
 mod clock;
 mod kernel;
 mod open;
+mod talk;
 mod transport;
 
-pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD};
+pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD, Listening};
 
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
@@ -48,6 +49,7 @@ pub struct FrameLink {
     transport: Box<dyn Transport>,
     rate: BitRate,
     listen_only: bool,
+    listening: Listening,
     /// The identifier with which each drive sends.
     senders: Vec<(can::Id, u8)>,
     tolerance: Span,
@@ -87,12 +89,13 @@ impl FrameLink {
         interrupt: Arc<AtomicBool>,
     ) -> Result<Self, AdapterError> {
         wake_on_time();
-        let transport = open::open(settings, &interrupt)?;
+        let (transport, listening) = open::open(settings, &interrupt)?;
         let now = time::Instant::now();
         Ok(Self {
             transport,
             rate: settings.rate,
             listen_only: settings.listen_only,
+            listening,
             senders,
             tolerance: SLACK,
             start: now,
@@ -116,6 +119,11 @@ impl FrameLink {
     /// Sets how exact its times are; 30 ms at first.
     pub const fn set_time_tolerance(&mut self, tolerance: Span) {
         self.tolerance = tolerance;
+    }
+
+    /// What is known of the adapter's acknowledgements.
+    pub(crate) const fn listening(&self) -> Listening {
+        self.listening
     }
 
     /// Keeps no trace from now on: a capture takes what is received.

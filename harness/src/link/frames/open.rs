@@ -1,28 +1,16 @@
 //! Opening a CAN adapter: the handshake of its language.
 
-use super::adapter::{Adapter, Slcan, Socketcand};
+use super::adapter::{Adapter, Socketcand};
 use super::kernel::Kernel;
-use super::transport::{Stream, Transport};
-use crate::frames::slcan::{self, BitTiming, Report, SlcanCommand, rate_of};
-use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
-use crate::port::{OpenError, Outgoing, PortAddress, Wire, open_adapter};
+use super::talk::Talk;
+use super::transport::Transport;
+use crate::frames::slcan::{BitTiming, SlcanCommand, rate_of};
+use crate::port::{OpenError, PortAddress, open_adapter};
 use crate::trouble::Trouble;
 use harness_proto::can::BitRate;
-use rustix::event::{Timespec, poll};
-use std::collections::VecDeque;
 use std::fmt;
 use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-/// How long an adapter may take to answer a command of the opening.
-const PATIENCE: Duration = Duration::from_secs(2);
-
-/// How long an adapter without a version is listened to, so that its late answers are not taken for others.
-const QUIET: Duration = Duration::from_millis(100);
-
-/// The longest sleep: a request to end is looked for at least this often.
-const NAP: Duration = Duration::from_millis(50);
+use std::sync::atomic::AtomicBool;
 
 /// The rate of the serial line of adapters with a UART; those on USB ignore it.
 pub const DEFAULT_BAUD: u32 = 115_200;
@@ -114,6 +102,19 @@ pub struct AdapterSettings {
     pub rate: BitRate,
     /// Whether the adapter sends nothing: with SLCAN not even acknowledges.
     pub listen_only: bool,
+    /// Whether an adapter that is to listen only, and cannot or does not confirm that it does, is opened all the same.
+    pub may_acknowledge: bool,
+}
+
+/// What is known of an adapter's acknowledgements, the most first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Listening {
+    /// It took this command or setting, in which it sends nothing on the bus.
+    Only(&'static str),
+    /// It was sent its command, which its firmware never confirms.
+    Unconfirmed(&'static str),
+    /// It acknowledges frames, or may do so.
+    MayAcknowledge,
 }
 
 /// Why a CAN adapter cannot be used.
@@ -174,14 +175,11 @@ pub enum AdapterError {
     Interrupted,
 }
 
-const SLCAN: &str = "SLCAN adapter";
-const SOCKETCAND: &str = "server of socketcand";
-
 /// Opens an adapter: its stream, and the language on it.
 pub(super) fn open(
     settings: &AdapterSettings,
     interrupt: &AtomicBool,
-) -> Result<Box<dyn Transport>, AdapterError> {
+) -> Result<(Box<dyn Transport>, Listening), AdapterError> {
     match &settings.place {
         AdapterPlace::Slcan { at, baud } => {
             let commands = rate_commands(settings.rate)?;
@@ -191,17 +189,20 @@ pub(super) fn open(
             if end.is_err() {
                 talk.close();
             }
-            end?;
-            Ok(talk.opened(Adapter::Slcan(Slcan::new(settings.listen_only))))
+            let (adapter, listening) = end?;
+            Ok((talk.opened(Adapter::Slcan(adapter)), listening))
         }
         AdapterPlace::Socketcand { address, channel } => {
             let wire = open_adapter(&PortAddress::Tcp(address.clone()), DEFAULT_BAUD)?;
             let mut talk = Talk::new(wire, interrupt);
             talk.open_socketcand(channel)?;
-            Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))
+            let opened = talk.opened(Adapter::Socketcand(Socketcand::new()));
+            Ok((opened, Listening::MayAcknowledge))
         }
         AdapterPlace::Kernel { interface } => {
-            Ok(Box::new(Kernel::open(interface, settings.listen_only)?))
+            let (kernel, listening) =
+                Kernel::open(interface, settings.listen_only, settings.may_acknowledge)?;
+            Ok((Box::new(kernel), listening))
         }
     }
 }
@@ -213,238 +214,3 @@ fn rate_commands(rate: BitRate) -> Result<SlcanCommand, AdapterError> {
     let command = code.map(SlcanCommand::Rate).or_else(timing);
     command.ok_or(AdapterError::Rate(rate))
 }
-
-/// A conversation of questions and answers.
-struct Talk<'a> {
-    wire: Wire,
-    interrupt: &'a AtomicBool,
-    lines: slcan::Lines,
-    messages: Messages,
-    /// What has come and was not looked at.
-    come: VecDeque<u8>,
-}
-
-impl<'a> Talk<'a> {
-    fn new(wire: Wire, interrupt: &'a AtomicBool) -> Self {
-        Self {
-            wire,
-            interrupt,
-            lines: slcan::Lines::default(),
-            messages: Messages::default(),
-            come: VecDeque::new(),
-        }
-    }
-
-    fn opened(self, adapter: Adapter) -> Box<dyn Transport> {
-        Box::new(Stream {
-            wire: self.wire,
-            adapter,
-            come: self.come,
-        })
-    }
-
-    fn open_slcan(
-        &mut self,
-        rate: SlcanCommand,
-        settings: &AdapterSettings,
-    ) -> Result<(), AdapterError> {
-        // Ends what another program has begun, and its channel.
-        [
-            SlcanCommand::Nothing,
-            SlcanCommand::Nothing,
-            SlcanCommand::Close,
-            SlcanCommand::Version,
-        ]
-        .into_iter()
-        .try_for_each(|command| self.say(command))?;
-        let end = Instant::now() + PATIENCE;
-        let mut answers = 0;
-        loop {
-            match self.report(end)? {
-                Some(Report::Version(_)) => break,
-                Some(Report::Done | Report::Refused) => answers += 1,
-                Some(_) => {}
-                // It has no version: it has answered the other commands.
-                None if answers > 0 => break,
-                None => return Err(self.silent("C and V", SLCAN)),
-            }
-        }
-        while self.report(Instant::now() + QUIET)?.is_some() {}
-        let speed = settings.rate;
-        self.done(
-            rate,
-            &format!("the rate {speed} while its channel is closed"),
-            RATE,
-        )?;
-        // Without time stamps the time of reading counts.
-        let _stamps = self.ask(SlcanCommand::TimeStamps(true))?;
-        match settings.listen_only {
-            true => self.done(SlcanCommand::Listen, "to listen only (L)", LISTEN),
-            false => self.done(SlcanCommand::Open, "to open its channel (O)", OPEN),
-        }
-    }
-
-    /// A command that has to be done.
-    fn done(
-        &mut self,
-        command: SlcanCommand,
-        what: &str,
-        remedy: &'static str,
-    ) -> Result<(), AdapterError> {
-        match self.ask(command)? {
-            Some(true) => Ok(()),
-            Some(false) => Err(AdapterError::Refused {
-                port: self.wire.name().to_owned(),
-                what: what.to_owned(),
-                remedy,
-            }),
-            None => Err(self.silent("a command", SLCAN)),
-        }
-    }
-
-    /// Whether a command was done; `None` where no answer comes.
-    fn ask(&mut self, command: SlcanCommand) -> Result<Option<bool>, AdapterError> {
-        self.say(command)?;
-        let end = Instant::now() + PATIENCE;
-        loop {
-            match self.report(end)? {
-                Some(Report::Done) => return Ok(Some(true)),
-                Some(Report::Refused) => return Ok(Some(false)),
-                None => return Ok(None),
-                // A frame of the bus, or what only some adapters say.
-                Some(_) => {}
-            }
-        }
-    }
-
-    fn say(&mut self, command: SlcanCommand) -> Result<(), AdapterError> {
-        let mut bytes = Vec::new();
-        command.write(&mut bytes);
-        self.send(&bytes)
-    }
-
-    /// The next line of an SLCAN adapter; `None` where none comes.
-    fn report(&mut self, end: Instant) -> Result<Option<Report>, AdapterError> {
-        loop {
-            let Some(character) = self.next(end)? else {
-                return Ok(None);
-            };
-            if let Some(line) = self.lines.push(character) {
-                let report = line.and_then(|(line, end)| Report::parse(&line, end));
-                return report.map(Some).map_err(|error| self.other(SLCAN, error));
-            }
-        }
-    }
-
-    fn open_socketcand(&mut self, channel: &str) -> Result<(), AdapterError> {
-        const CHANNEL: &str =
-            "name a bus that the server has, such as can0, and let the server bring it up";
-        self.expect("a greeting", &SocketcandAnswer::Hi, "")?;
-        self.request(&SocketcandRequest::Open(channel.to_owned()))?;
-        self.expect("< open >", &SocketcandAnswer::Ok, CHANNEL)?;
-        self.request(&SocketcandRequest::RawMode)?;
-        self.expect(
-            "< rawmode >",
-            &SocketcandAnswer::Ok,
-            "use a server of socketcand with a raw mode",
-        )
-    }
-
-    fn request(&mut self, request: &SocketcandRequest) -> Result<(), AdapterError> {
-        let mut bytes = Vec::new();
-        request.write(&mut bytes);
-        self.send(&bytes)
-    }
-
-    fn expect(
-        &mut self,
-        command: &'static str,
-        wanted: &SocketcandAnswer,
-        remedy: &'static str,
-    ) -> Result<(), AdapterError> {
-        let end = Instant::now() + PATIENCE;
-        loop {
-            let Some(character) = self.next(end)? else {
-                return Err(self.silent(command, SOCKETCAND));
-            };
-            let Some(message) = self.messages.push(character) else {
-                continue;
-            };
-            let answer = message.and_then(|message| SocketcandAnswer::parse(&message));
-            match answer.map_err(|error| self.other(SOCKETCAND, error))? {
-                answer if answer == *wanted => return Ok(()),
-                SocketcandAnswer::Error(text) => {
-                    return Err(AdapterError::Refused {
-                        port: self.wire.name().to_owned(),
-                        what: format!("{command} ({text})"),
-                        remedy,
-                    });
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn send(&mut self, bytes: &[u8]) -> Result<(), AdapterError> {
-        for byte in bytes {
-            let sent = self.wire.send(Outgoing::Byte(*byte));
-            sent.map_err(AdapterError::Trouble)?;
-        }
-        self.wire.flush().map_err(AdapterError::Trouble)
-    }
-
-    /// The next character; `None` where none comes until `end`.
-    fn next(&mut self, end: Instant) -> Result<Option<u8>, AdapterError> {
-        loop {
-            if let Some(character) = self.come.pop_front() {
-                return Ok(Some(character));
-            }
-            if self.interrupt.load(Ordering::Relaxed) {
-                return Err(AdapterError::Interrupted);
-            }
-            let mut read = Vec::new();
-            let result = self.wire.receive(&mut read);
-            self.come.extend(read.iter().map(|own| own.byte));
-            if !self.come.is_empty() {
-                continue;
-            }
-            result.map_err(AdapterError::Trouble)?;
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Ok(None);
-            }
-            let nap = Timespec {
-                tv_sec: 0,
-                tv_nsec: i64::from(left.min(NAP).subsec_nanos()),
-            };
-            // An error shows when the stream is read.
-            let _ready = poll(&mut [self.wire.poll_fd()], Some(&nap));
-            self.wire.flush().map_err(AdapterError::Trouble)?;
-        }
-    }
-
-    fn close(&mut self) {
-        let _gone = self.say(SlcanCommand::Close);
-    }
-
-    fn silent(&self, command: &'static str, expected: &'static str) -> AdapterError {
-        AdapterError::Silent {
-            port: self.wire.name().to_owned(),
-            command,
-            expected,
-        }
-    }
-
-    fn other(&self, expected: &'static str, received: impl ToString) -> AdapterError {
-        AdapterError::Other {
-            port: self.wire.name().to_owned(),
-            expected,
-            received: received.to_string(),
-        }
-    }
-}
-
-const RATE: &str = "use an adapter that has the rate";
-const LISTEN: &str =
-    "use an adapter that can; with `listen_only = false` in a rig's file it acknowledges frames";
-const OPEN: &str = "check that no other program uses it";

@@ -63,6 +63,7 @@ fn settings(address: &str, listen_only: bool) -> AdapterSettings {
         place: AdapterPlace::slcan(address),
         rate: BitRate::K500,
         listen_only,
+        may_acknowledge: false,
     }
 }
 
@@ -140,8 +141,7 @@ fn an_adapter_is_opened_asked_and_closed() {
     assert_eq!(
         commands,
         [
-            "\r",
-            "\r",
+            "N\r",
             "C\r",
             "V\r",
             "S6\r",
@@ -192,8 +192,169 @@ fn a_poor_adapter_will_do() {
     assert_eq!(link.trouble(), None);
 }
 
+/// The firmware of CANable: it has no `L`, `Z`, `F` and `N`, and answers `V` with its commit and its repository.
+fn canable(command: &str) -> &'static str {
+    match command {
+        "V" => "b158aa7 github.com/normaldotcom/canable-fw.git\r\r",
+        "t20133D4000" => "\rt181440810100\r",
+        command if command.starts_with(['O', 'C', 'S', 'M', 't']) => "\r",
+        _ => "\x07",
+    }
+}
+
+/// The same without a word for what was done, as in that of CANable 2.
+fn canable_2(command: &str) -> &'static str {
+    match command {
+        "V" => "b158aa7 canable2\r",
+        "t20133D4000" => "t181440810100\r",
+        "O" => "t1811AA\r",
+        _ => "",
+    }
+}
+
+fn opening(said: &Said, last: &str) -> String {
+    let said = said.lock().expect("a list").concat().replace('\r', " ");
+    let end = said.find(last).expect("said") + last.len();
+    said[..end].to_owned()
+}
+
+/// Both are asked as they can be; the mode that they keep while they have power is set back.
+#[test]
+fn the_firmware_of_canable_is_an_adapter() {
+    let dialects: [(fn(&str) -> &'static str, &str, Listening); 2] = [
+        (canable, "N C V S6 Z1 L M1 O", Listening::Only("M1")),
+        (canable_2, "N C V V S6 M1 O", Listening::Unconfirmed("M1")),
+    ];
+    for (dialect, listening, mode) in dialects {
+        let (address, said) = slcan(dialect);
+        let mut link = opened(&settings(&address, false));
+        for _ in 0..10 {
+            link.send(0, Out::Frames(&[frame("201#3D4000")]));
+            let reply = Some(can::CanEvent::Frame(frame("181#40810100")));
+            assert!(std::iter::from_fn(|| next(&mut link)).any(|own| Some(own) == reply));
+        }
+        assert_eq!(
+            (link.listening(), link.trouble()),
+            (Listening::MayAcknowledge, None)
+        );
+        assert!(
+            opening(&said, "O").ends_with("S6 Z1 M0 O") || opening(&said, "O").ends_with("S6 M0 O")
+        );
+
+        let (address, said) = slcan(dialect);
+        let link = opened(&settings(&address, true));
+        assert_eq!(link.listening(), mode);
+        assert_eq!(opening(&said, "O"), listening);
+        drop(link);
+        while !said.lock().expect("a list").concat().ends_with("C\rM0\r") {
+            std::thread::yield_now();
+        }
+    }
+}
+
+/// What cannot be confirmed is refused, unless it is permitted.
+#[test]
+fn listening_only_is_proven_or_permitted() {
+    let mute = |command: &str| match command {
+        "V" => "version 7 of another firmware\r",
+        _ => "",
+    };
+    let deaf = |command: &str| match command {
+        "L" => "\x07",
+        command => good(command),
+    };
+    let dialects: [(fn(&str) -> &'static str, &str, &str); 2] = [
+        (mute, "to confirm that it listens only", "M1 O"),
+        (deaf, "to listen only (L)", "L O"),
+    ];
+    for (dialect, words, opens) in dialects {
+        let (address, said) = slcan(dialect);
+        let why = refused(&settings(&address, true));
+        assert!(
+            why.contains(words) && why.contains("--may-acknowledge"),
+            "{why}"
+        );
+        assert!(!said.lock().expect("a list").concat().contains('O'));
+        let (address, said) = slcan(dialect);
+        let permitted = AdapterSettings {
+            may_acknowledge: true,
+            ..settings(&address, true)
+        };
+        let mut link = opened(&permitted);
+        assert_eq!(link.listening(), Listening::MayAcknowledge);
+        assert!(opening(&said, "O").ends_with(opens));
+        link.send(0, Out::Frames(&[frame("201#3D4000")]));
+        assert_eq!(link.refused(), 1);
+    }
+}
+
+/// S7 is 750 kbit/s there, and nothing tells whether bit timing registers are taken.
+#[test]
+fn an_adapter_is_not_opened_at_another_rate() {
+    let rate = |bits| BitRate::from_bits_per_second(bits).expect("a rate");
+    let dialects: [(fn(&str) -> &'static str, u32); 3] = [
+        (canable, 800_000),
+        (canable_2, 800_000),
+        (canable_2, 400_000),
+    ];
+    for (dialect, bits) in dialects {
+        let (address, said) = slcan(dialect);
+        let settings = AdapterSettings {
+            rate: rate(bits),
+            ..settings(&address, false)
+        };
+        let why = refused(&settings);
+        assert!(
+            why.contains("refuses the rate") && why.contains("1000 kbit/s"),
+            "{why}"
+        );
+        assert!(
+            !said
+                .lock()
+                .expect("a list")
+                .concat()
+                .contains(['S', 's', 'O'])
+        );
+    }
+}
+
+/// RFC 854: a server begins with its options.
+#[test]
+fn a_port_behind_telnet_is_named() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let client = std::thread::spawn(move || {
+        let (mut client, _) = listener.accept().expect("a client");
+        client
+            .write_all(&[0xFF, 0xFD, 0x2C, 0xFF, 0xFB, 0x00])
+            .expect("room");
+        client
+    });
+    let why = refused(&settings(&address, false));
+    assert!(
+        why.contains("speaks telnet or RFC 2217: its first bytes are FF FD 2C")
+            && why.contains("carry the bytes alone"),
+        "{why}"
+    );
+    drop(client.join());
+}
+
 #[test]
 fn what_is_no_adapter_is_named() {
+    let (echo, _) = slcan(|command| match command {
+        "N" => "N\r",
+        "C" => "C\r",
+        _ => "V\r",
+    });
+    let why = refused(&settings(&echo, false));
+    assert!(why.contains("its own commands come back"), "{why}");
+    let (once, _) = slcan(|command| match command {
+        "C" => "23.5 degrees\r",
+        _ => "",
+    });
+    let why = refused(&settings(&once, false));
+    assert!(why.contains("received \"23.5 degrees\""), "{why}");
+
     let (silent, _) = slcan(|_| "");
     let why = refused(&settings(&silent, false));
     assert!(
@@ -271,6 +432,7 @@ fn socketcand(answer: impl Fn(&str) -> &'static str + Send + 'static) -> Adapter
         },
         rate: BitRate::K500,
         listen_only: false,
+        may_acknowledge: false,
     }
 }
 
@@ -369,6 +531,7 @@ fn an_interface_of_the_kernel_needs_its_feature() {
         },
         rate: BitRate::K500,
         listen_only: true,
+        may_acknowledge: false,
     };
     let why = refused(&settings);
     assert!(

@@ -1,7 +1,6 @@
 //! What carries frames to an adapter and back: a stream in a language of its own, or an interface of the kernel.
 
 use super::adapter::{Adapter, Event};
-use crate::frames::slcan::SlcanCommand;
 use crate::port::{LastWords, Outgoing, Wire};
 use crate::trouble::Trouble;
 use harness_proto::can::Frame;
@@ -58,12 +57,10 @@ impl Stream {
 impl Drop for Stream {
     /// Closes the channel.
     fn drop(&mut self) {
-        if matches!(self.adapter, Adapter::Slcan(_)) {
-            let mut close = Vec::new();
-            SlcanCommand::Close.write(&mut close);
-            // A port that is gone has no channel any more.
-            let _gone = self.put(&close);
-        }
+        let mut close = Vec::new();
+        self.adapter.close(&mut close);
+        // A port that is gone has no channel any more.
+        let _gone = self.put(&close);
     }
 }
 

@@ -188,6 +188,7 @@ fn adapter(
         place,
         rate: rate(port),
         listen_only: port.listen_only,
+        may_acknowledge: false,
     };
     let senders = axes
         .iter()
