@@ -16,6 +16,13 @@ use std::time::Duration;
 /// How long a connection may take.
 const CONNECT: Duration = Duration::from_secs(5);
 
+/// What to do about a server that speaks telnet where bytes alone are expected.
+const RAW: &str = "let the server carry the bytes alone (ser2net: `accepter: tcp,PORT`, without telnet and rfc2217)";
+
+/// The same where the rig's file can name the protocol.
+const RFC_2217_OR_RAW: &str = "say transport = \"rfc2217\" and `port` in the rig's file, or let the server carry the bytes alone (ser2net: \
+                               `accepter: tcp,PORT`, without telnet and rfc2217)";
+
 /// Where a stream is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PortAddress {
@@ -181,7 +188,10 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
             Ok(Wire::new(fd, name, coding))
         }
         PortAddress::Pty(path) => Ok(Wire::new(pty(path)?, name, plain())),
-        PortAddress::Tcp(address) => Ok(Wire::new(connect(address)?.into(), name, plain())),
+        PortAddress::Tcp(address) => {
+            let wire = Wire::new(connect(address)?.into(), name, plain());
+            Ok(wire.without_telnet(RFC_2217_OR_RAW))
+        }
         PortAddress::Rfc2217(address) => {
             let stream = connect(address)?;
             let telnet = rfc2217::negotiate(&stream, settings.format).map_err(|error| {
@@ -215,7 +225,8 @@ pub fn open_adapter(address: &PortAddress, bits_per_second: u32) -> Result<Wire,
             }
         }
         PortAddress::Tcp(address) | PortAddress::Rfc2217(address) => {
-            Ok(Wire::new(connect(address)?.into(), name, Coding::Plain))
+            let wire = Wire::new(connect(address)?.into(), name, Coding::Plain);
+            Ok(wire.without_telnet(RAW))
         }
     }
 }

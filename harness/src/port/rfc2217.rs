@@ -38,6 +38,29 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// And how long to say whether it tells of line errors.
 const FOR_LINE_STATE: Duration = Duration::from_millis(500);
 
+/// Whether a connection begins as one of telnet does: with a command about one of the options that servers of serial ports name first. Lines
+/// of characters, and the telegrams of the buses here, do not begin so.
+pub(super) fn is_telnet(first: [u8; 3]) -> bool {
+    /// Binary, echo, suppress go-ahead, status, timing mark, terminal type and speed, window size, flow control, line mode, environment, COM port.
+    const OPTIONS: [u8; 13] = [
+        BINARY,
+        1,
+        SUPPRESS_GO_AHEAD,
+        5,
+        6,
+        24,
+        31,
+        32,
+        33,
+        34,
+        36,
+        39,
+        COM_PORT,
+    ];
+    let [iac, command, option] = first;
+    iac == IAC && (WILL..=DONT).contains(&command) && OPTIONS.contains(&option)
+}
+
 /// Why a server cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum NegotiationError {
@@ -321,6 +344,45 @@ mod tests {
         ];
         assert_eq!(read(&mut telnet, &stream), [1, IAC, 2]);
         assert_eq!((telnet.take_errors(), telnet.take_errors()), (1, 0));
+    }
+
+    /// RFC 854: IAC, one of WILL, WONT, DO and DONT, and an option.
+    #[test]
+    fn telnet_is_known_by_its_first_bytes() {
+        for first in [[IAC, DO, COM_PORT], [IAC, WILL, 1], [IAC, DONT, 3]] {
+            assert!(is_telnet(first), "{first:?}");
+        }
+        for first in [[IAC, IAC, 0], [IAC, 0, 3], [IAC, WILL, 200], [0xDC, 2, 2]] {
+            assert!(!is_telnet(first), "{first:?}");
+        }
+    }
+
+    /// A connection that should carry bytes alone is not one of telnet, and the remedy is named.
+    #[test]
+    fn a_server_of_telnet_is_not_read_as_bytes() {
+        use crate::port::{PortAddress, PortSettings, open};
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address").to_string();
+        let settings = PortSettings {
+            address: PortAddress::Tcp(address),
+            format: harness_proto::line::Rate::Baud38400.into(),
+            marks: false,
+            low_latency: false,
+        };
+        let mut wire = open(&settings).expect("a connection");
+        let (mut client, _) = listener.accept().expect("a client");
+        client.write_all(&[IAC, DO, COM_PORT]).expect("room");
+        let why = loop {
+            let mut fds = [wire.poll_fd()];
+            poll(&mut fds, None).expect("a wait");
+            if let Err(trouble) = wire.receive(&mut Vec::new()) {
+                break trouble.to_string();
+            }
+        };
+        assert!(
+            why.contains("speaks telnet or RFC 2217") && why.contains("rfc2217"),
+            "{why}"
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One stream with its coding.
 
 use super::last_words::LastWords;
-use super::rfc2217::Telnet;
+use super::rfc2217::{Telnet, is_telnet};
 use super::serial::{Serial, Switch};
 use crate::counted::counted;
 use crate::trouble::Trouble;
@@ -76,6 +76,8 @@ pub struct Wire {
     early: Vec<Received>,
     /// A serial port under plain bytes: its settings are put back with it.
     plain_serial: Option<Box<Serial>>,
+    /// The first bytes of a connection that should carry bytes alone, and what to do if they are telnet's; `None` once they are known.
+    first: Option<(Vec<u8>, &'static str)>,
 }
 
 #[derive(Debug)]
@@ -98,6 +100,15 @@ impl Wire {
             read: 0,
             early: Vec::new(),
             plain_serial: None,
+            first: None,
+        }
+    }
+
+    /// The same over a connection: one that begins as telnet does is refused, with this remedy.
+    pub(super) fn without_telnet(self, remedy: &'static str) -> Self {
+        Self {
+            first: Some((Vec::new(), remedy)),
+            ..self
         }
     }
 
@@ -350,12 +361,32 @@ impl Wire {
                 Err(error) => return Err(self.lost(error)),
             };
             self.read += length as u64;
+            self.look_for_telnet(&buffer[..length])?;
             self.decode(&buffer[..length], into)?;
             if length < CHUNK {
                 return Ok(());
             }
         }
         Ok(())
+    }
+
+    fn look_for_telnet(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
+        let Some((first, remedy)) = &mut self.first else {
+            return Ok(());
+        };
+        first.extend(bytes.iter().take(3 - first.len()));
+        let Ok([iac, command, option]) = <[u8; 3]>::try_from(first.as_slice()) else {
+            return Ok(());
+        };
+        let remedy = *remedy;
+        self.first = None;
+        match is_telnet([iac, command, option]) {
+            true => Err(Trouble::Garbled(format!(
+                "{}: the other end speaks telnet or RFC 2217: its first bytes are {iac:02X} {command:02X} {option:02X}. Next: {remedy}",
+                self.name
+            ))),
+            false => Ok(()),
+        }
     }
 
     fn decode(&mut self, bytes: &[u8], into: &mut Vec<Received>) -> Result<(), Trouble> {

@@ -285,7 +285,7 @@ impl RigCheck<'_> {
     }
 
     /// Ports that fit their transport.
-    fn endpoint(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
+    pub(super) fn endpoint(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
         let at = |key| [path, &[PathStep::Key(key)]].concat();
         let transport = endpoint.transport.name();
         match (endpoint.transport, &endpoint.port, endpoint.udev.is_empty()) {

@@ -1,7 +1,7 @@
 //! The part of the check that is about `[port.1]`.
 
 use super::check::{RigCheck, is_address};
-use super::file::SCHEMA;
+use super::file::{Endpoint, SCHEMA, Transport};
 use super::port_file::{CONFIRMATION, Port};
 use crate::file::schema::PathStep;
 use crate::file::values::MaxSpeed;
@@ -155,6 +155,7 @@ impl RigCheck<'_> {
                 "two adapters are given",
                 "one adapter expected",
             ),
+            (None, None, None) if port.transport.is_some() => {}
             (None, None, None) => self.wrong(
                 &PORT,
                 "the port has no adapter",
@@ -199,6 +200,7 @@ impl RigCheck<'_> {
             let expected = "a device such as \"/dev/ttyUSB0\" expected here";
             self.wrong(&at("serial"), message, expected);
         }
+        self.transport(port);
         let name = |name: &&String| {
             let fits = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
             name.is_empty() || name.len() > 15 || !name.chars().all(fits)
@@ -219,6 +221,40 @@ impl RigCheck<'_> {
         if !port.bus.has_rate(port.rate.bits_per_second()) {
             let message = format!("no bus runs at {} kbit/s", port.rate);
             self.wrong(&at("rate"), message, "such as 500 expected here");
+        }
+    }
+
+    /// A line of octets by its transport, as a ring has it.
+    fn transport(&mut self, port: &Port) {
+        let at = |key| [PORT[0], PORT[1], PathStep::Key(key)];
+        match (port.transport, &port.port) {
+            (None, None) => {}
+            (None, Some(_)) => self.wrong(
+                &at("port"),
+                "`port` needs `transport`",
+                "`transport = \"rfc2217\"`, or another one, expected beside it",
+            ),
+            (Some(Transport::Sim), _) => self.wrong(
+                &at("transport"),
+                "simulated drives stand in a table [sim]",
+                "\"serial\", \"pty\", \"tcp\" or \"rfc2217\" expected here",
+            ),
+            (Some(_), None) if !port.adapters().is_empty() => self.wrong(
+                &at("transport"),
+                "`transport` is for `port`",
+                "`port` expected in place of the other adapter",
+            ),
+            (Some(transport), given) => self.endpoint(
+                &PORT,
+                &Endpoint {
+                    transport,
+                    port: given.clone(),
+                    udev: Default::default(),
+                    line: Default::default(),
+                    marks: port.marks,
+                    low_latency: true,
+                },
+            ),
         }
     }
 

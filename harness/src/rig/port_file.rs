@@ -3,6 +3,8 @@
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;
+use crate::port::PortAddress;
+use crate::rig::file::Transport;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +44,13 @@ pub struct Port {
     /// A line of octets behind a TCP connection that carries the octets and nothing else: `host:port`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tcp: Option<String>,
+    /// In place of `serial` and `tcp`, what carries the octets: `serial`, `pty`, `tcp`, or `rfc2217` for a serial port behind a network, which
+    /// cannot carry the value of a bad octet. It needs `port`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transport: Option<Transport>,
+    /// Where `transport` leads: a device such as `/dev/ttyUSB0` (serial, pty), or `host:port` (tcp, rfc2217).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub port: Option<String>,
     /// Whether line errors stand in the stream itself (a pseudo terminal or `tcp` only); default `none`.
     #[serde(default, skip_serializing_if = "is_unmarked")]
     pub marks: ErrorMarks,
@@ -84,6 +93,26 @@ impl Port {
         slcan.or(server).or(kernel)
     }
 
+    /// Its line of octets, if it has one.
+    #[must_use]
+    pub fn line(&self) -> Option<PortAddress> {
+        let serial = |path: &String| match is_pseudo_terminal(path) {
+            true => PortAddress::Pty(path.into()),
+            false => PortAddress::Serial(path.into()),
+        };
+        let tcp = |address: &String| PortAddress::Tcp(address.clone());
+        let named = self.port.as_ref().zip(self.transport);
+        let named = named.and_then(|(port, transport)| match transport {
+            Transport::Serial => Some(serial(port)),
+            Transport::Pty => Some(PortAddress::Pty(port.into())),
+            Transport::Tcp => Some(tcp(port)),
+            Transport::Rfc2217 => Some(PortAddress::Rfc2217(port.clone())),
+            Transport::Sim => None,
+        });
+        let given = self.serial.as_ref().map(serial);
+        given.or(self.tcp.as_ref().map(tcp)).or(named)
+    }
+
     /// The keys of the adapters that are given, and where these are: one, or none where the drives are simulated.
     pub fn places(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let all = [
@@ -92,6 +121,7 @@ impl Port {
             ("socketcan", &self.socketcan),
             ("serial", &self.serial),
             ("tcp", &self.tcp),
+            ("port", &self.port),
         ];
         let given = all.into_iter();
         given.filter_map(|(key, place)| Some((key, place.as_deref()?)))
@@ -108,12 +138,19 @@ impl Port {
     pub fn more(&self) -> Vec<&'static str> {
         let all = [
             ("channel", self.channel.is_some()),
+            ("transport", self.transport.is_some()),
             ("marks", self.marks != ErrorMarks::None),
             ("echo", self.echo),
         ];
         let given = all.into_iter().filter(|(_, given)| *given);
         given.map(|(key, _)| key).collect()
     }
+}
+
+/// Whether a device is the end of a pseudo terminal, behind links such as those that `sim --pty` makes.
+fn is_pseudo_terminal(path: &str) -> bool {
+    let real = std::fs::canonicalize(path);
+    real.is_ok_and(|own| own.starts_with("/dev/pts"))
 }
 
 /// A drive on a bus: on CAN its number or its identifiers, on a line of octets its address.

@@ -4,6 +4,7 @@ use crate::buses::line_formats;
 use crate::capture::{Carries, RecordedPlace, ends};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;
+use crate::port::PortAddress;
 use crate::rig::Rig;
 use crate::rig::file::Transport;
 use harness_proto::can::BitRate;
@@ -143,14 +144,15 @@ pub(crate) fn taps_of(rig: &Rig) -> Result<(Vec<TapAt>, Rate, bool), String> {
     let file = &rig.file;
     if let Some(port) = rig.port() {
         let bits = port.rate.bits_per_second();
-        let serial = port.serial.clone();
-        let port_at = match (port.can_adapter(), serial) {
+        let port_at = match (port.can_adapter(), port.line()) {
             (Some(place), _) => {
                 let rate = BitRate::from_bits_per_second(bits);
                 TapPort::Frames(place, rate.unwrap_or(BitRate::K500))
             }
-            (None, Some(path)) => TapPort::Line(path.into(), line_format(bits)?),
-            (None, None) => {
+            (None, Some(PortAddress::Serial(path) | PortAddress::Pty(path))) => {
+                TapPort::Line(path, line_format(bits)?)
+            }
+            (None, _) => {
                 return Err("its port is neither a CAN adapter nor a serial port, at which nothing can be sent by opening it".to_owned());
             }
         };

@@ -1,6 +1,7 @@
 //! Rig files with a port of drives on CAN.
 
 use super::*;
+use harness::port::PortAddress;
 
 /// A rig of a UNITEK drive, with more behind it.
 fn port(more: &str) -> String {
@@ -56,6 +57,49 @@ fn a_port_of_slaves_on_a_line() {
     assert!(simulated.is_simulated());
     assert_eq!(addresses, [Some(8), Some(9)]);
     assert!(find("sim:nordac:120", Path::new("nowhere")).is_err());
+}
+
+/// A line of octets by `transport` and `port`, as a ring has them.
+#[test]
+fn a_line_behind_rfc_2217() {
+    let line = |more: &str| {
+        let text = port(more).replace("unitek", "nordac");
+        text.replace("{ node = 1 }", "{ address = 8 }")
+    };
+    let rig = good(&line("transport = \"rfc2217\"\nport = \"lab:4200\""));
+    let place = rig.port().and_then(|own| own.line());
+    assert_eq!(place, Some(PortAddress::Rfc2217("lab:4200".to_owned())));
+    let printed = toml::to_string(&rig.file).expect("a text");
+    assert_eq!(good(&printed).file, rig.file);
+    for (more, words) in [
+        ("transport = \"rfc2217\"", "needs `port`"),
+        (
+            "transport = \"rfc2217\"\ntcp = \"lab:4200\"",
+            "`port` expected in place",
+        ),
+        (
+            "transport = \"rfc2217\"\nport = \"lab\"",
+            "is not an address",
+        ),
+        (
+            "transport = \"rfc2217\"\nport = \"lab:4200\"\nmarks = \"in-band\"",
+            "cannot carry",
+        ),
+        ("transport = \"sim\"", "in a table [sim]"),
+        ("port = \"lab:4200\"", "needs `transport`"),
+        (
+            "tcp = \"lab:1\"\ntransport = \"tcp\"\nport = \"lab:2\"",
+            "two adapters",
+        ),
+    ] {
+        let mistakes = read(&line(more)).expect_err(more).join("\n");
+        assert!(mistakes.contains(words), "{more}: {mistakes}");
+    }
+    let can = read(&port("transport = \"rfc2217\"\nport = \"lab:4200\"")).expect_err("no adapter");
+    assert!(
+        can.join("\n").contains("the bus unitek has no `port`"),
+        "{can:?}"
+    );
 }
 
 #[test]

@@ -49,8 +49,8 @@ const LAST: u8 = 126;
 /// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
     bus: Bus::Nordac,
-    adapters: &["serial", "tcp"],
-    keys: &["marks", "echo"],
+    adapters: &["serial", "tcp", "port"],
+    keys: &["transport", "marks", "echo"],
     limits: &[
         "allow_bus_settings",
         "allow_motor_data",

@@ -209,12 +209,9 @@ fn ends(
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
         return Ok((Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new()));
     }
-    let (address, locks) = match (&port.serial, &port.tcp) {
-        (Some(path), _) if is_pseudo_terminal(path) => (PortAddress::Pty(path.into()), true),
-        (Some(path), _) => (PortAddress::Serial(path.into()), true),
-        (None, Some(address)) => (PortAddress::Tcp(address.clone()), false),
-        (None, None) => return Err(failed(rig, "its port has no adapter")),
-    };
+    let address = port.line();
+    let address = address.ok_or_else(|| failed(rig, "its port has no adapter"))?;
+    let locks = matches!(address, PortAddress::Serial(_) | PortAddress::Pty(_));
     let place = address.to_string();
     let rate = rate(port);
     let wire = crate::port::open(&PortSettings {
@@ -231,12 +228,6 @@ fn ends(
     let how = (patience(port), port.echo);
     let link = SegmentLink::new(wire, rate, addresses, how, options.interrupt.clone());
     Ok((Ends::Ports(Box::new(link)), locks))
-}
-
-/// Whether a device is the end of a pseudo terminal, behind links such as those that `sim --pty` makes.
-fn is_pseudo_terminal(path: &str) -> bool {
-    let real = std::fs::canonicalize(path);
-    real.is_ok_and(|own| own.starts_with("/dev/pts"))
 }
 
 /// How long a reply may take beside its own time on the line, with what an adapter and a busy computer add.
