@@ -185,7 +185,9 @@ pub(super) fn again_on_segment(
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
-    let judged = judge.judge(&source, &recorded.events)?;
+    let mut judged = judge.judge(&source, &recorded.events)?;
+    let unplaced = recorded.verdict.as_ref().map_or(0, |own| own.unplaced);
+    judged.outcome.unplaced(unplaced);
     let (other, made) = match &judged.played {
         Some((events, traces)) => (
             first_difference(&recorded.events, events),
@@ -196,6 +198,7 @@ pub(super) fn again_on_segment(
     Ok(Again {
         attempt: Attempt {
             opening: judged.before,
+            unplaced,
             ..Attempt::on_own_rings(judged.outcome, Vec::new())
         },
         stale: false,

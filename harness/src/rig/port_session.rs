@@ -18,6 +18,9 @@ use std::time::Instant;
 /// How long a port is listened to before anything is sent.
 const LISTEN: Span = Span::from_millis(150);
 
+/// An SLCAN adapter is asked for its status every 250 ms.
+const LOSSES: Span = Span::from_millis(300);
+
 /// What a session asks of the bus of its drives.
 pub trait PortDrives: Clone + std::fmt::Debug {
     /// What a drive is called, and what the stations share.
@@ -190,6 +193,23 @@ impl<D: PortDrives> PortSession<D> {
     #[must_use]
     pub const fn guarded(&self) -> &Guarded<Ends> {
         &self.link
+    }
+
+    /// Waits as long as an adapter may take to report a loss, at ports.
+    pub(crate) fn hear_of_losses(&mut self) {
+        if self.link.inner().ports().is_none() {
+            return;
+        }
+        let end = self.link.now() + LOSSES;
+        while self.link.now() < end && self.link.wait(end) {
+            while self.link.receive(0).is_some() {}
+        }
+    }
+
+    /// Line errors and losses that the transport has reported without their place since the last call.
+    pub(crate) fn take_unplaced(&mut self) -> u64 {
+        let ports = self.link.inner_mut().ports_mut();
+        ports.map_or(0, |ports| ports.take_unplaced())
     }
 
     /// Whether it has been used for longer than its file allows.

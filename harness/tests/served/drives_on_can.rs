@@ -194,6 +194,51 @@ fn scenarios_over(ways: &[&str]) {
     }
 }
 
+/// An adapter in front of another one that says of itself that it has lost frames; returns its address.
+fn losing(adapter: &str) -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let adapter = connect(adapter);
+    std::thread::spawn(move || {
+        let (client, _) = listener.accept().expect("a client");
+        for own in [&client, &adapter] {
+            own.set_nodelay(true).expect("a socket");
+        }
+        let (mut to, mut from) = (
+            adapter.try_clone().expect("one"),
+            client.try_clone().expect("one"),
+        );
+        std::thread::spawn(move || std::io::copy(&mut from, &mut to));
+        let (mut client, lines) = (client, BufReader::new(adapter).split(b'\r'));
+        for mut line in lines.map_while(Result::ok) {
+            line.push(b'\r');
+            if line.starts_with(b"t") {
+                line.extend(b"F08\r");
+            }
+            if client.write_all(&line).is_err() {
+                return;
+            }
+        }
+    });
+    address
+}
+
+/// Frames that an adapter has lost may be replies: neither a pass nor a failure is proven, and the record says so too.
+#[test]
+#[ignore = "takes some seconds; .ci/nightly runs it"]
+fn an_adapter_that_loses_frames_proves_nothing() {
+    let desk = Desk::new("slcan", "");
+    let rig = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&rig).expect("a rig");
+    let text = text.replace(&desk.slcan, &losing(&desk.slcan));
+    let text = text.replace("patience = \"2s\"", "patience = \"200ms\"");
+    std::fs::write(&rig, text).expect("room");
+    let played = desk.run("run --filter unitek-app-2-replies --evidence kept");
+    ended(&played, 5, "reported without a place");
+    let verify = desk.command("verify kept").output().expect("the program");
+    ended(&verify, 0, " 0 things wrong");
+}
+
 /// What the rig's file does not permit is refused before the first frame of the command, and a speed above the highest too.
 #[test]
 fn limits_are_kept_before_anything_is_sent() {

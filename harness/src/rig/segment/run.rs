@@ -183,8 +183,9 @@ impl<P: PortPlayer> PortRun<P> {
         if anew && looked && self.session.sound().is_ok() {
             self.restart();
         }
+        let _before = self.session.take_unplaced();
         let mut recording = Recording::new(self.session.link(), sink);
-        let (outcome, before) = self.player.attempt(own, &mut recording);
+        let (mut outcome, before) = self.player.attempt(own, &mut recording);
         let traces = vec![recording.trace(0)];
         let tripped = matches!(
             self.session.guarded().trouble(),
@@ -204,8 +205,14 @@ impl<P: PortPlayer> PortRun<P> {
                 }
             }
         }
+        if outcome.verdict == Verdict::Failed && self.over.is_none() {
+            self.session.hear_of_losses();
+        }
+        let unplaced = self.session.take_unplaced();
+        outcome.unplaced(unplaced);
         Attempt {
             opening: Some(before),
+            unplaced,
             ..Attempt::on_own_rings(outcome, traces)
         }
     }

@@ -1,6 +1,7 @@
 //! What comes of playing: outcome, finding, and why playing stops.
 
 use super::CellRecord;
+use crate::counted::counted;
 use crate::link::Trouble;
 use crate::scenario::language::Language;
 use crate::scenario::pattern::Expected;
@@ -93,6 +94,23 @@ impl Outcome {
         if self.verdict == Verdict::Passed {
             self.verdict = Verdict::Inconclusive;
             self.remarks.push(NOTHING_JUDGED.to_owned());
+        }
+    }
+
+    /// The same where the transport reported so many line errors or losses without their place: neither a pass nor a failure is proven.
+    pub(crate) fn unplaced(&mut self, count: u64) {
+        let verdict = self.verdict;
+        if count > 0
+            && matches!(
+                verdict,
+                Verdict::Passed | Verdict::Failed | Verdict::Marginal
+            )
+        {
+            self.verdict = Verdict::Inconclusive;
+            self.remarks.push(format!(
+                "{} reported without a place: the transport cannot show what was damaged or lost",
+                counted(count, "line error")
+            ));
         }
     }
 
@@ -225,5 +243,35 @@ impl Stop {
     pub(crate) fn with(mut self, difference: Option<ByteDifference>) -> Self {
         self.finding.difference = difference;
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was damaged or lost without a place may be a reply, or what a reply differed by.
+    #[test]
+    fn losses_without_a_place_prove_nothing() {
+        for verdict in [Verdict::Passed, Verdict::Failed, Verdict::Marginal] {
+            let played = || Outcome {
+                verdict,
+                ..Outcome::rig_error(String::new())
+            };
+            let mut none = played();
+            none.unplaced(0);
+            assert_eq!(none.verdict, verdict);
+            let mut some = played();
+            some.unplaced(1);
+            assert_eq!(some.verdict, Verdict::Inconclusive);
+            let remark = some.remarks.last().expect("a remark");
+            assert!(
+                remark.starts_with("1 line error reported without a place"),
+                "{remark}"
+            );
+        }
+        let mut rig = Outcome::rig_error(String::new());
+        rig.unplaced(1);
+        assert_eq!(rig.verdict, Verdict::RigError);
     }
 }

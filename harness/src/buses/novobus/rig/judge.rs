@@ -75,18 +75,7 @@ pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<E
     if !facts.plan.judges() && !facts.conversations.iter().any(sends) {
         outcome.judged_nothing();
     }
-    if facts.unplaced > 0
-        && matches!(
-            outcome.verdict,
-            Verdict::Passed | Verdict::Failed | Verdict::Marginal
-        )
-    {
-        outcome.verdict = Verdict::Inconclusive;
-        outcome.remarks.push(format!(
-            "{} line errors were reported without their bytes: the transport cannot show which bytes they damaged",
-            facts.unplaced
-        ));
-    }
+    outcome.unplaced(facts.unplaced);
     assumed
 }
 
