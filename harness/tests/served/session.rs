@@ -341,6 +341,36 @@ fn a_capture_is_read_by_import() {
     }
 }
 
+/// One word releases drives on every bus; what is a command only is named as one.
+#[test]
+fn go_is_a_word_of_every_bus() {
+    for (rig, drive, key, released) in [
+        ("sim:2", 0, "mode", "go"),
+        ("sim:unitek:1", 1, "mode", "released"),
+        ("sim:nordac", 8, "status", "operation enabled"),
+    ] {
+        let desk = Desk::new("drives = 3\ntransport = \"sim\"\n");
+        let mut session = Session::open(&desk, &["--rig", rig, "--move"]);
+        let go = session.ask(&json!({"id": 1, "do": "go", "drive": drive}));
+        assert!(go.get("result").is_some(), "{rig}: {go}");
+        let state = session.ask(&json!({"id": 2, "do": "state", "drive": drive}));
+        let own = state["result"]["data"]["drives"][0][key].to_string();
+        assert!(
+            own.trim_matches('"').starts_with(released),
+            "{rig}: {state}"
+        );
+        let start = session.ask(&json!({"id": 3, "do": "exchange", "drive": drive}));
+        let what = start["error"]["what"].as_str().expect("an error");
+        assert!(
+            what.contains(r#"{"do": "command", "words": ["exchange", ...]}"#),
+            "{what}"
+        );
+        let stop = session.ask(&json!({"id": 4, "do": "stop"}));
+        assert!(stop.get("result").is_some(), "{rig}: {stop}");
+        session.end();
+    }
+}
+
 /// A denial is an answer, and the session goes on, where the limits allow some things and not others.
 #[test]
 fn a_denial_does_not_end_a_session() {

@@ -380,11 +380,13 @@ fn info_top_watch_and_cells() {
 /// Commands of another bus are refused, and say which there are.
 #[test]
 fn commands_of_other_buses() {
-    let (code, complaint) = fails(&["go", "8", "--move"]);
-    assert!(
-        code == 2 && complaint.contains("on NORDAC inverters there are start, exchange, on"),
-        "{complaint}"
-    );
+    for (command, words) in [
+        ("reset", "on NORDAC inverters there are start, exchange, on"),
+        ("go", "use `on` with --for or --hold; `go` is for a session"),
+    ] {
+        let (code, complaint) = fails(&[command, "8", "--move"]);
+        assert!(code == 2 && complaint.contains(words), "{complaint}");
+    }
     for rig in ["sim:1", "sim:unitek:1"] {
         let (code, _, complaint) = run(&["start", "0", "--rig", rig]);
         assert_eq!(code, 2, "{rig}: {complaint}");

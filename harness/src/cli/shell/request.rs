@@ -1,5 +1,6 @@
 //! What a session is asked, as JSON, and which command line that is.
 
+use super::session::COMMANDS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -269,6 +270,13 @@ pub(crate) fn parse(line: &[u8]) -> (Value, Result<SessionRequest, String>) {
         let what = format!("`id`: a number, or a text of at most {LONGEST_ID} bytes expected");
         return (Value::Null, Err(what));
     }
+    let named = object.get("do").and_then(Value::as_str).map(str::to_owned);
     let request = serde_json::from_value(Value::Object(object));
-    (id, request.map_err(|error| error.to_string()))
+    let request = request.map_err(|error| match named {
+        Some(name) if COMMANDS.contains(&name.as_str()) && error.to_string().contains("variant") => {
+            format!("`{name}` is a command, which `command` runs: {{\"do\": \"command\", \"words\": [\"{name}\", ...]}} expected")
+        }
+        _ => error.to_string(),
+    });
+    (id, request)
 }

@@ -1,11 +1,11 @@
-//! `drivebench start`, `exchange`, `on`, `off`, `quick-stop` and `acknowledge` on NORDAC inverters, and their names on other buses: `go`,
-//! `stop`, `block` and `delete-error`.
+//! `drivebench start`, `exchange`, `on`, `off`, `quick-stop` and `acknowledge` on NORDAC inverters, and what other buses have too: `stop`,
+//! `block`, and `go` in a session.
 
 use super::args::{
     AcknowledgeArguments, ExchangeArguments, OnArguments, StartArguments, StayArguments,
 };
 use super::bench::driver;
-use crate::buses::commands::{OutputForm, SelectArguments, Use};
+use crate::buses::commands::{MoveArguments, OutputForm, SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
 use crate::buses::nordac::rig::{Inverters, Session};
 use crate::buses::nordac::value::{ExchangeStep, Setpoint, percentage, status, steps};
@@ -25,6 +25,58 @@ const TIME_OUT: &str = "1625";
 
 /// As long as a rig may be held, in seconds.
 const YEAR: u64 = 365 * 24 * 3_600;
+
+/// Switches slaves on with this setpoint.
+fn switch_on(
+    driver: &mut Driver<'_>,
+    command: &str,
+    slaves: &[u8],
+    setpoint: Setpoint,
+    output: &mut Output,
+) -> Result<(), Failure> {
+    let mut orders = Vec::new();
+    let in_hertz = matches!(setpoint, Setpoint::Tenths(_));
+    for slave in slaves {
+        driver.join(*slave)?;
+        let maximum = supervised(driver, *slave, in_hertz)?;
+        let setpoint = word(setpoint, *slave, maximum)?;
+        refuse_denied(driver, *slave, [stw::START, setpoint, 0, 0])?;
+        orders.push((*slave, setpoint));
+    }
+    let named = Inverters::named(slaves);
+    output.say(&format!("{command}: {named}: motors may turn\n"));
+    for (slave, setpoint) in orders {
+        let reached = driver.on(slave, setpoint)?;
+        output.result(&format!("slave {slave}: {}\n", sent(&reached)))?;
+    }
+    Ok(())
+}
+
+/// Switches slaves on in a session, which goes on exchanging their words: the setpoint is 0 until `exchange` gives another one.
+pub(super) fn go(
+    bench: PortBench<'_, Inverters>,
+    arguments: &MoveArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    if let PortBench::Rig(_) = bench {
+        return Err(Failure::refused(
+            "an inverter is switched on as long as words are exchanged: use `on` with --for or --hold; `go` is for a session (`shell`)",
+        ));
+    }
+    let as_what = Use {
+        purpose: "go",
+        moves: arguments.leave,
+        holds: false,
+    };
+    let select = &arguments.select;
+    with(bench, &select.rig, as_what, output, |session, output| {
+        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
+        refuse_motion(arguments.leave, "go", &slaves)?;
+        let mut driver = driver(session);
+        switch_on(&mut driver, "go", &slaves, Setpoint::Raw(0), output)?;
+        Ok(Exit::Passed)
+    })
+}
 
 /// Brings slaves into the exchange.
 pub(super) fn start(
@@ -187,23 +239,7 @@ pub(super) fn on(
         refuse_motion(arguments.leave, "on", &slaves)?;
         let longest = longest_hold(session);
         let mut driver = driver(session);
-        let mut orders = Vec::new();
-        let in_hertz = matches!(arguments.setpoint, Setpoint::Tenths(_));
-        for slave in &slaves {
-            driver.join(*slave)?;
-            let maximum = supervised(&mut driver, *slave, in_hertz)?;
-            let setpoint = word(arguments.setpoint, *slave, maximum)?;
-            refuse_denied(&driver, *slave, [stw::START, setpoint, 0, 0])?;
-            orders.push((*slave, setpoint));
-        }
-        output.say(&format!(
-            "on: {}: motors may turn\n",
-            Inverters::named(&slaves)
-        ));
-        for (slave, setpoint) in &orders {
-            let reached = driver.on(*slave, *setpoint)?;
-            output.result(&format!("slave {slave}: {}\n", sent(&reached)))?;
-        }
+        switch_on(&mut driver, "on", &slaves, arguments.setpoint, output)?;
         hold(&mut driver, arguments.stay, longest, output)?;
         driver.run(arguments.stay.length)?;
         for slave in &slaves {

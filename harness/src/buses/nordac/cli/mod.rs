@@ -61,8 +61,8 @@ pub(crate) fn drive(
         DriveCommand::Cyclic(CyclicCommand::Acknowledge(own)) => {
             control::acknowledge(bench, own, output)
         }
-        DriveCommand::Go(_)
-        | DriveCommand::DeleteError(_)
+        DriveCommand::Go(own) => control::go(bench, own, output),
+        DriveCommand::DeleteError(_)
         | DriveCommand::Position(_)
         | DriveCommand::Scope(_)
         | DriveCommand::Reset(_)
