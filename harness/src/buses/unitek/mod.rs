@@ -20,3 +20,4 @@ pub(crate) mod serve;
 mod serve_tests;
 pub mod simulate;
 pub mod value;
+mod whereabouts;

@@ -2,13 +2,16 @@
 
 use super::driver::{Driver, Error};
 use super::rig::Axis;
+use super::whereabouts::{Search, still_sent};
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
-use crate::medium::Out;
+use crate::medium::Medium;
 use harness_proto::can::Frame;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
+use harness_proto::unitek::bit_timing::Nbt;
 use harness_proto::unitek::frame::{Data, Reply, Request};
+use harness_proto::unitek::guard::{Gate, Places};
 use harness_proto::unitek::units::{Given, Scaling, shown};
 use harness_proto::unitek::words::{ERRORS, MODE_LOCK, set_bits, status};
 use std::fmt::Write as _;
@@ -18,6 +21,9 @@ const COMMANDS: [u8; 2] = [0x31, 0x90];
 
 /// MODE (ex 2).
 const MODE: u8 = 0x51;
+
+/// How often a register is written that does not take its value: a frame may be lost.
+const TRIES: usize = 3;
 
 /// How often the speed of a drive is looked at that does not stand yet.
 const AGAIN: Span = Span::from_millis(20);
@@ -42,80 +48,169 @@ pub fn last_words(axes: &[Axis]) -> Vec<Frame> {
 }
 
 /// Takes every drive to its safe state and reads it back: a stop on the ramp, where the rig's file permits commands to a drive that is
-/// not locked; locked; commands 0; every cycle that was started stopped. Ready, status and errors are read for the report. Changed
-/// identifiers are set back.
+/// not locked; locked; commands 0; every cycle that was started stopped. Ready, status and errors are read for the report. A drive whose
+/// identifiers were written is looked for, and they are set back.
 ///
-/// A drive is confirmed if it reads locked, not enabled, with commands 0, and stands.
+/// A drive is confirmed if it reads locked, not enabled, with commands 0, and stands, and if it is found where the rig's file says.
+/// `way_back` is what the rig's file says of a drive with another bit rate.
 pub fn safe_state<L: Line>(
     line: &mut Guarded<L>,
     axes: &[Axis],
     patience: Span,
     standing: &Standstill,
+    way_back: Option<&str>,
 ) -> Safe {
-    let (cycles, moved) = line.segment().map_or_else(Default::default, |gate| {
-        let cycles: Vec<_> = gate.cycles().collect();
-        let moved: Vec<_> = gate.moved().collect();
-        (cycles, moved)
-    });
-    let latest = |axis: &Axis| {
-        let moved = moved.iter().find(|(first, _)| *first == (axis.rx, axis.tx));
-        moved.map_or(*axis, |(_, (rx, tx))| Axis {
-            rx: *rx,
-            tx: *tx,
-            ..*axis
-        })
-    };
-    let now: Vec<_> = axes.iter().map(latest).collect();
+    let gate = line.segment();
+    let cycles: Vec<_> = gate.map_or_else(Vec::new, |own| own.cycles().collect());
+    let places: Vec<_> = gate.map_or_else(Vec::new, |own| own.places().collect());
     let mut reports = String::new();
-    let mut confirmed = true;
-    let known: Vec<_> = now.iter().chain(axes).copied().collect();
-    let mut driver = Driver::new(Box::new(&mut *line), &known, patience);
-    for (axis, first) in now.iter().zip(axes) {
-        // A drive may change its identifiers at the next power-up only, or not take them (3.1, ex 1).
-        let moved = axis != first && driver.read(*axis, MODE).is_ok();
-        let axis = if moved { axis } else { first };
-        let made = make_safe(&mut driver, *axis, &cycles, standing);
-        // Writing to a String cannot fail.
-        let _infallible = match made {
-            Ok(report) => write!(reports, "\n  drive {}: {report}", axis.node),
+    let (mut safe, mut back) = (true, true);
+    for axis in axes {
+        let places = places.iter().find(|own| own.first == (axis.rx, axis.tx));
+        let mut place = Place {
+            line,
+            first: *axis,
+            patience,
+            places,
+        };
+        let at = place.find();
+        let mut driver = Driver::new(Box::new(&mut *place.line), &[at], patience);
+        let own = cycles.iter().filter(|(rx, _)| *rx == axis.rx);
+        let own: Vec<_> = own.map(|(_, register)| *register).collect();
+        let made = make_safe(&mut driver, at, &own, standing);
+        drop(driver);
+        let sent = match made {
+            Ok(_) => still_sent(place.line, axis.rx, (at.rx, at.tx)),
+            Err(_) => Vec::new(),
+        };
+        let sent = sent.iter().map(|register| {
+            let rx = at.rx;
+            format!("; register {register:02X} is still sent: {rx:03X}#3D{register:02X}FF has not ended it")
+        });
+        let made = made.map(|report| report + &sent.collect::<String>());
+        let words = match made {
+            Ok(report) => match place.bring_back(at) {
+                Ok(None) => report,
+                Ok(Some(note)) => format!("{report}; {note}"),
+                Err(why) => {
+                    back = false;
+                    format!("{report}; NOT as it was found: {why}")
+                }
+            },
             Err(why) => {
-                confirmed = false;
-                write!(reports, "\n  drive {}: NOT confirmed: {why}", axis.node)
+                safe = false;
+                let lost = place.lost(way_back);
+                format!("NOT confirmed: {why}{lost}")
             }
         };
+        // Writing to a String cannot fail.
+        let _infallible = write!(reports, "\n  drive {}: {words}", axis.node);
     }
-    drop(driver);
-    for (first, (rx, tx)) in &moved {
-        restore(line, (*rx, *tx), *first);
-    }
-    let words = match confirmed {
-        true => format!("safe state: every drive is locked and stands, with commands 0{reports}"),
-        false => format!("the safe state is NOT confirmed; use the emergency stop{reports}"),
+    let words = match (safe, back) {
+        (true, true) => "safe state: every drive is locked and stands, with commands 0",
+        (true, false) => {
+            "every drive is locked and stands, with commands 0, but not every one is as it was found"
+        }
+        (false, _) => "the safe state is NOT confirmed; use the emergency stop",
     };
-    Safe { confirmed, words }
+    Safe {
+        confirmed: safe && back,
+        words: format!("{words}{reports}"),
+    }
 }
 
-/// Sets the identifiers of a drive back to those of the rig's file.
-fn restore<L: Line>(line: &mut Guarded<L>, latest: (u16, u16), first: (u16, u16)) {
-    let write = |register, value| Request::Write {
-        register,
-        data: Data::Short(value),
-    };
-    let frames = [
-        write(0x69, first.1).encode(latest.0),
-        write(0x68, first.0).encode(latest.0),
-    ];
-    for frame in frames.into_iter().flatten() {
-        let end = line.send(0, Out::Frames(&[frame]));
-        while line.now() < end && line.wait(end) {}
+/// Where a drive is, as far as the gate knows.
+struct Place<'p, L> {
+    line: &'p mut Guarded<L>,
+    /// The drive as the rig's file names it.
+    first: Axis,
+    patience: Span,
+    places: Option<&'p Places>,
+}
+
+impl<L: Line> Place<'_, L> {
+    fn search(&mut self) -> Option<Search<'_, L>> {
+        Some(Search {
+            line: &mut *self.line,
+            places: self.places?,
+            patience: self.patience,
+        })
     }
+
+    /// Whether identifiers were written to any drive: another one may have taken them.
+    fn may_have_moved(&self) -> bool {
+        let given = self.line.segment().map(Gate::given);
+        given.is_some_and(|given| given.iter().any(|own| !own.is_empty()))
+    }
+
+    /// The drive where it answers; where the rig's file says if it was not moved, or is not found.
+    fn find(&mut self) -> Axis {
+        let first = self.first;
+        let moved = self.may_have_moved();
+        let found = self
+            .search()
+            .filter(|_| moved)
+            .and_then(|mut own| own.find());
+        found.map_or(first, |(rx, tx)| Axis { rx, tx, ..first })
+    }
+
+    /// Sets the identifiers back. Returns what is to be said all the same.
+    fn bring_back(&mut self, at: Axis) -> Result<Option<String>, String> {
+        let moved = self.places.is_some_and(Places::has_moved) || at != self.first;
+        let Some(mut search) = self.search().filter(|_| moved) else {
+            return Ok(None);
+        };
+        search.bring_back((at.rx, at.tx))?;
+        let still = search.settle();
+        Ok(still.map(|rx| format!("it still obeys {rx:03X}, which was given to it for a while")))
+    }
+
+    /// Where a drive that does not answer was looked for, and where it may be.
+    fn lost(&self, way_back: Option<&str>) -> String {
+        let mut words = String::new();
+        if let Some(places) = self.places.filter(|_| self.may_have_moved()) {
+            let ids: Vec<_> = places.rx.iter().map(|own| format!("{own:03X}")).collect();
+            words = format!("; it was looked for on {}", ids.join(", "));
+        }
+        let Medium::Frames(own) = self.line.medium(0) else {
+            return words;
+        };
+        let timing = self.places.and_then(|places| places.timing).map(Nbt);
+        if let Some(nbt) = timing.filter(|nbt| nbt.rate() != Some(own)) {
+            let rate = nbt.rate().map_or_else(
+                || "another bit rate".to_owned(),
+                |rate| format!("{} kbit/s", rate.bits_per_second() / 1000),
+            );
+            let rx = self.first.rx;
+            let [low, high] = Nbt::for_rate(own).unwrap_or(Nbt::DEFAULT).0.to_le_bytes();
+            words += &format!(
+                "; it may be at {rate}, since register 73 (CAN_BTR) was set to {:04X}: there, {rx:03X}#73{low:02X}{high:02X} sets it back",
+                nbt.0
+            );
+            if let Some(way) = way_back {
+                words += &format!(" (`bit_rate_way_back`: {way})");
+            }
+        }
+        words
+    }
+}
+
+/// Writes a register, again where a frame was lost.
+fn insist(driver: &mut Driver<'_>, axis: Axis, register: u8, value: u16) -> Result<(), Error> {
+    let mut written = driver.write(axis, register, Data::Short(value));
+    for _ in 1..TRIES {
+        if let Err(Error::Differs { .. }) = written {
+            written = driver.write(axis, register, Data::Short(value));
+        }
+    }
+    written.map(|_| ())
 }
 
 /// Takes one drive to its safe state. Returns what it reads, or why it is not confirmed.
 fn make_safe(
     driver: &mut Driver<'_>,
     axis: Axis,
-    cycles: &[(u16, u8)],
+    cycles: &[u8],
     standing: &Standstill,
 ) -> Result<String, String> {
     let mut why = Ok(());
@@ -126,15 +221,17 @@ fn make_safe(
     };
     if standing.order.contains(&StandstillStep::Stop) && driver.permits_write(axis, COMMANDS[0], 0)
     {
-        note(driver.write(axis, COMMANDS[0], Data::Short(0)).map(|_| ()));
+        note(insist(driver, axis, COMMANDS[0], 0));
         // A torque command would end the ramp. A drive that does not stand in time is locked all the same.
         let _seen_again_below = stands(driver, axis, standing);
-        note(driver.write(axis, COMMANDS[1], Data::Short(0)).map(|_| ()));
+        note(insist(driver, axis, COMMANDS[1], 0));
     }
     if standing.order.contains(&StandstillStep::Block) {
-        note(driver.lock(axis));
+        let locked = insist(driver, axis, MODE, MODE_LOCK);
+        let zero = |driver: &mut _, command| insist(driver, axis, command, 0);
+        note(locked.and_then(|()| COMMANDS.iter().try_for_each(|own| zero(driver, *own))));
     }
-    for (_, register) in cycles.iter().filter(|(rx, _)| *rx == axis.rx) {
+    for register in cycles {
         note(driver.stop_every(axis, *register));
     }
     why?;
@@ -211,8 +308,11 @@ mod tests {
     use super::*;
     use crate::buses::unitek::gate::guarded;
     use crate::buses::unitek::simulate::{Bench, Setup};
-    use crate::link::{DriveFault, Link, Moment, PlacedFault};
+    use crate::link::{DriveFault, FrameFault, Link, Moment, PlacedFault};
+    use crate::medium::Out;
     use harness_proto::unitek::guard::Limits;
+    use harness_proto::unitek::properties::{IdChange, RateChange};
+    use harness_sim::unitek::deviation::deviations;
 
     const PATIENCE: Span = Span::from_millis(20);
 
@@ -230,8 +330,12 @@ mod tests {
         for drive in &mut setup.drives {
             (drive.inputs.run, drive.inputs.rfe) = (true, true);
         }
+        of(&setup, limits)
+    }
+
+    fn of(setup: &Setup, limits: Limits) -> Guarded<Bench> {
         let drives: Vec<_> = setup.drives.iter().map(|own| own.identifiers).collect();
-        guarded(Bench::new(&setup), limits, &drives, false)
+        guarded(Bench::new(setup), limits, &drives, false)
     }
 
     fn send(line: &mut dyn Line, texts: &[&str]) {
@@ -248,7 +352,7 @@ mod tests {
     }
 
     fn safe(line: &mut Guarded<Bench>) -> Safe {
-        safe_state(line, &axes(), PATIENCE, &Standstill::default())
+        safe_state(line, &axes(), PATIENCE, &Standstill::default(), None)
     }
 
     fn registers(line: &Guarded<Bench>, node: u8) -> [u32; 4] {
@@ -286,7 +390,7 @@ mod tests {
             within: Span::from_millis(50),
             ..Standstill::default()
         };
-        let coasts = safe_state(&mut line, &axes(), PATIENCE, &standing);
+        let coasts = safe_state(&mut line, &axes(), PATIENCE, &standing, None);
         let why = "drive 1: NOT confirmed: waited 50.000 ms for it to stand";
         assert!(coasts.words.contains(why), "{coasts}");
         assert!(!coasts.confirmed);
@@ -335,6 +439,123 @@ mod tests {
             line.wait(end);
         }
         assert_eq!(line.inner().carried(), carried);
+    }
+
+    fn identifiers(line: &Guarded<Bench>, node: u8) -> (u32, u32) {
+        let drive = line.inner().drive(node).expect("a drive");
+        (drive.register(0x68), drive.register(0x69))
+    }
+
+    /// Whichever frame is lost on the way, also one of a scenario's own way back: both drives end on the identifiers of the rig's file,
+    /// locked (UNITEK 3.1).
+    #[test]
+    fn two_drives_are_set_back_whichever_frame_is_lost() {
+        let moves = [
+            "201#31FF7F",
+            "201#687E02",
+            "27E#690101",
+            "202#687D02",
+            "27D#3132F3",
+            "27E#698101",
+            "27E#680102",
+        ];
+        for lost in 1..60 {
+            let mut line = line(Limits::unlimited());
+            let fault = PlacedFault::Frame(FrameFault::Lost);
+            line.inject(0, fault, Moment::Byte(lost));
+            send(&mut line, &moves);
+            let safe = safe(&mut line);
+            assert!(safe.confirmed, "frame {lost}: {safe}");
+            assert_eq!(identifiers(&line, 1), (0x201, 0x181), "frame {lost}");
+            assert_eq!(identifiers(&line, 2), (0x202, 0x182), "frame {lost}");
+            for node in [1, 2] {
+                assert_eq!(registers(&line, node)[..3], [4, 0, 0], "frame {lost}");
+            }
+            let gate = line.segment().expect("a gate");
+            assert!(!gate.places().any(|own| own.has_moved()), "frame {lost}");
+        }
+    }
+
+    /// A cycle whose stop a drive has not heard is stopped, whether a scenario or the safe state has sent it (5.2).
+    #[test]
+    fn a_cycle_is_stopped_although_its_stop_was_lost() {
+        let mut met = 0;
+        for texts in [&["201#3D1B64", "201#3D1BFF"][..], &["201#3D1B64"]] {
+            for lost in 6..40 {
+                let mut line = line(Limits::unlimited());
+                let fault = PlacedFault::Frame(FrameFault::Lost);
+                line.inject(0, fault, Moment::Byte(lost));
+                send(&mut line, texts);
+                let safe = safe(&mut line);
+                let ended = safe.confirmed && !safe.words.contains("still sent");
+                assert!(ended, "{texts:?}, frame {lost}: {safe}");
+                let drive = line.inner().drive(1).expect("a drive");
+                let running = drive.running_cycles().count();
+                assert_eq!(running, 0, "{texts:?}, frame {lost}");
+                let trace = line.inner().trace(0);
+                let frames = trace.channels[0].frames().iter();
+                let stops = frames.filter(|own| own.frame.to_string() == "201#3D1BFF");
+                met += usize::from(stops.count() == 2);
+            }
+        }
+        assert!(met >= 2, "no stop was lost");
+    }
+
+    /// A new identifier that is used from the next power-up on (`id-change`) is set back in the register.
+    #[test]
+    fn an_identifier_that_is_not_used_yet_is_set_back() {
+        let mut setup = Setup::of(2);
+        setup.drives[0].properties.id_change = IdChange::Restart;
+        let mut line = of(&setup, Limits::unlimited());
+        send(&mut line, &["201#681002", "201#699001"]);
+        assert_eq!(identifiers(&line, 1), (0x210, 0x190));
+        let safe = safe(&mut line);
+        assert!(safe.confirmed, "{safe}");
+        assert_eq!(identifiers(&line, 1), (0x201, 0x181));
+    }
+
+    /// A drive that takes what is meant for another one is found where that one was sent. The two cannot be told apart there: nothing is
+    /// written that both would obey, and the report has the frame that sets each of them back.
+    #[test]
+    fn two_drives_on_one_identifier_are_named() {
+        let mut setup = Setup::of(2);
+        let wrong = deviations().find(|own| own.name == "hears-its-neighbour");
+        setup.drives[0].deviation = wrong;
+        let mut line = of(&setup, Limits::unlimited());
+        send(&mut line, &["202#687E02"]);
+        let safe = safe(&mut line);
+        assert!(!safe.confirmed, "{safe}");
+        for words in [
+            "but not every one is as it was found",
+            "drive 1: ready, STATUS 0, no errors; NOT as it was found: it receives on 27E and sends on 181",
+            "with no other drive that receives on 27E on the bus, 27E#680102 sets it back",
+            "27E#680202 sets it back",
+        ] {
+            assert!(safe.words.contains(words), "{words}: {safe}");
+        }
+        for node in [1, 2] {
+            assert_eq!(registers(&line, node)[..3], [4, 0, 0]);
+        }
+    }
+
+    /// A drive that uses a new bit rate at once is lost; the report says at which rate it may be, and what brings it back (3.1).
+    #[test]
+    fn a_drive_at_another_bit_rate_is_named() {
+        let mut setup = Setup::of(2);
+        setup.drives[0].properties.rate_change = RateChange::Immediate;
+        let mut line = of(&setup, Limits::unlimited());
+        send(&mut line, &["201#735C40"]);
+        let way = Some("a second adapter");
+        let safe = safe_state(&mut line, &axes(), PATIENCE, &Standstill::default(), way);
+        assert!(!safe.confirmed, "{safe}");
+        for words in [
+            "drive 1: NOT confirmed: drive 1 does not answer",
+            "it may be at 250 kbit/s, since register 73 (CAN_BTR) was set to 405C: there, 201#732540 sets it back (`bit_rate_way_back`: a \
+             second adapter)",
+            "drive 2: ready",
+        ] {
+            assert!(safe.words.contains(words), "{words}: {safe}");
+        }
     }
 
     #[test]

@@ -85,6 +85,13 @@ pub enum Denial {
         /// Thousandths of the bit rate.
         permille: u64,
     },
+    /// The drive would get an identifier that another drive may use, or that it uses itself for the other direction.
+    Taken {
+        /// The register.
+        register: u8,
+        /// The identifier.
+        identifier: u16,
+    },
     /// 84 was written less than a minute ago.
     EepromWear,
     /// New bus settings would be stored, after which the drive may be reachable by RS232 only.
@@ -159,6 +166,11 @@ impl fmt::Display for Denial {
                 "the cyclic replies would take {}.{} % of the bit rate, at most 50 % are permitted: stop a cycle, or ask less often",
                 permille / 10,
                 permille % 10
+            ),
+            Self::Taken { register, identifier } => write!(
+                f,
+                "register {register:02X} ({}) would get the identifier {identifier:03X}, which is in use or may be: each identifier has one drive and one direction (UNITEK 3.1); use another one",
+                name(register)
             ),
             Self::EepromWear => {
                 f.write_str("the EEPROM was written less than a minute ago: wait before the next write of 84")

@@ -7,6 +7,7 @@
 
 mod class;
 mod denial;
+mod drive;
 mod speed;
 
 pub use class::{Class, NAMED, class};
@@ -14,12 +15,11 @@ pub use denial::{Denial, Fast, Missing};
 
 use super::frame::{Data, Ignored, Request, low};
 use super::properties::Dlc4;
-use super::words::MODE_LOCK;
 use crate::can::{BitRate, Frame};
 use crate::time::{Instant, Span};
 use alloc::vec::Vec;
 use class::need;
-use speed::Speed;
+use drive::Guarded;
 
 /// What the rig's file permits.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -72,31 +72,32 @@ impl Limits {
     }
 }
 
+/// Where a drive may be reached: on the identifiers of the rig's file, and on every one that was written to it since it was last found there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Places {
+    /// Those of the rig's file, to receive and to send.
+    pub first: (u16, u16),
+    /// On which it may receive: the first one, then the latest.
+    pub rx: Vec<u16>,
+    /// On which it may send, in the same order.
+    pub tx: Vec<u16>,
+    /// What was written to 73 last, if it was written.
+    pub timing: Option<u16>,
+}
+
+impl Places {
+    /// Whether it was given other identifiers.
+    #[must_use]
+    pub fn has_moved(&self) -> bool {
+        self.rx.len() > 1 || self.tx.len() > 1
+    }
+}
+
 /// Bits of the longest reply on the bus: 6 data bytes and all stuff bits.
 const REPLY_BITS: u64 = Frame::worst_wire_bits(false, 6) as u64;
 
 /// The shortest time between two writes of 84.
 const EEPROM_REST: Span = Span::from_millis(60_000);
-
-/// What the gate knows of a drive.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Guarded {
-    /// As the rig's file names it.
-    first_rx: u16,
-    first_tx: u16,
-    /// On which it may receive: after a write to 68 the old and the new one, since it is open when the drive changes.
-    rx: Vec<u16>,
-    tx: Vec<u16>,
-    /// On which it may receive as well: what has been written to 88 (`second-identifiers`).
-    second: Vec<u16>,
-    /// A lock written through this gate is in force.
-    locked: bool,
-    /// Registers with a cycle and their intervals in ms.
-    cycles: Vec<(u8, u8)>,
-    /// New bus settings have been written since the last restart.
-    moved: bool,
-    speed: Speed,
-}
 
 /// Judges every frame of a bus before it is sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -104,6 +105,8 @@ pub struct Gate {
     limits: Limits,
     rate: BitRate,
     drives: Vec<Guarded>,
+    /// Every identifier that was written to a drive: to receive, and to send.
+    given: [Vec<u16>; 2],
     eeprom_at: Option<Instant>,
     eeprom_writes: u32,
 }
@@ -112,21 +115,11 @@ impl Gate {
     /// A gate in front of a bus of this rate with drives that receive and send on these identifiers.
     #[must_use]
     pub fn new(limits: Limits, rate: BitRate, drives: &[(u16, u16)]) -> Self {
-        let drives = drives.iter().map(|&(rx, tx)| Guarded {
-            first_rx: rx,
-            first_tx: tx,
-            rx: [rx].to_vec(),
-            tx: [tx].to_vec(),
-            second: Vec::new(),
-            locked: false,
-            cycles: Vec::new(),
-            moved: false,
-            speed: Speed::default(),
-        });
         Self {
             limits,
             rate,
-            drives: drives.collect(),
+            drives: drives.iter().copied().map(Guarded::new).collect(),
+            given: Default::default(),
             eeprom_at: None,
             eeprom_writes: 0,
         }
@@ -156,11 +149,19 @@ impl Gate {
             return Err(Denial::Load { permille: load });
         }
         for drive in self.drives.iter_mut().filter(|drive| meant(drive)) {
-            drive.follow(request, sure && !drive.is_second(number));
+            drive.follow(request, sure && drive.hears(number));
         }
-        if let Request::Write { register: 0x84, .. } = request {
-            self.eeprom_at = Some(now);
-            self.eeprom_writes += 1;
+        if let Request::Write { register, data } = request {
+            let value = low(data.bits());
+            match register {
+                0x84 => {
+                    self.eeprom_at = Some(now);
+                    self.eeprom_writes += 1;
+                }
+                0x68 | 0x88 if !self.given[0].contains(&value) => self.given[0].push(value),
+                0x69 | 0x89 if !self.given[1].contains(&value) => self.given[1].push(value),
+                _ => {}
+            }
         }
         Ok(())
     }
@@ -181,10 +182,7 @@ impl Gate {
 
     /// Forgets every lock and every speed: the drives were restarted, or frames were lost.
     pub fn doubt(&mut self) {
-        for drive in &mut self.drives {
-            drive.locked = false;
-            drive.speed = Speed::default();
-        }
+        self.drives.iter_mut().for_each(Guarded::doubt);
     }
 
     /// Takes notice of C8, the rpm of 100 % speed, and of 34, the limit of the speed, as they were read from the drive that receives
@@ -214,23 +212,59 @@ impl Gate {
         self.drives.clone_from(&other.drives);
     }
 
-    /// The drives whose identifiers were changed, as identifiers to receive and to send: those of the rig's file, and the latest.
-    pub fn moved(&self) -> impl Iterator<Item = ((u16, u16), (u16, u16))> {
-        self.drives.iter().filter_map(|drive| {
-            let first = (drive.first_rx, drive.first_tx);
-            let latest = (*drive.rx.last()?, *drive.tx.last()?);
-            (first != latest).then_some((first, latest))
+    /// Where each drive may be reached.
+    pub fn places(&self) -> impl Iterator<Item = Places> {
+        self.drives.iter().map(|drive| Places {
+            first: (drive.first_rx, drive.first_tx),
+            rx: drive.receives().collect(),
+            tx: drive.sends().collect(),
+            timing: drive.timing,
         })
     }
 
-    /// The cycles that were started and not stopped: identifier of the drive, register.
+    /// Every identifier that was written to a drive since the gate was made: to receive on, and to send on.
+    #[must_use]
+    pub const fn given(&self) -> &[Vec<u16>; 2] {
+        &self.given
+    }
+
+    /// Takes notice that the drive whose first identifier is `first_rx` has answered on `rx`.
+    pub fn found(&mut self, first_rx: u16, rx: u16) {
+        self.with(first_rx, |drive| drive.found(rx));
+    }
+
+    /// Takes notice that this drive answers on the identifiers of the rig's file, and on no other that was given to it.
+    pub fn settled(&mut self, first_rx: u16) {
+        self.with(first_rx, Guarded::settled);
+    }
+
+    /// Takes notice that this drive sends nothing by itself.
+    pub fn sends_nothing(&mut self, first_rx: u16) {
+        self.with(first_rx, Guarded::sends_nothing);
+    }
+
+    fn with(&mut self, first_rx: u16, act: impl FnOnce(&mut Guarded)) {
+        let mut all = self.drives.iter_mut();
+        if let Some(drive) = all.find(|own| own.first_rx == first_rx) {
+            act(drive);
+        }
+    }
+
+    /// The registers of which this drive was told to send cycles since it was last seen to send none, with their longest intervals in ms.
+    pub fn started(&self, first_rx: u16) -> impl Iterator<Item = (u8, u8)> + '_ {
+        let own = self
+            .drives
+            .iter()
+            .filter(move |own| own.first_rx == first_rx);
+        own.flat_map(|own| own.started.iter().copied())
+    }
+
+    /// The cycles that were started and not stopped: identifier of the drive in the rig's file, register.
     pub fn cycles(&self) -> impl Iterator<Item = (u16, u8)> {
         self.drives.iter().flat_map(|drive| {
-            let rx = drive.rx.last().copied().unwrap_or(drive.first_rx);
-            drive
-                .cycles
-                .iter()
-                .map(move |(register, _)| (rx, *register))
+            let rx = drive.first_rx;
+            let registers = drive.cycles.iter().map(|(register, _)| *register);
+            registers.map(move |register| (rx, register))
         })
     }
 
@@ -277,6 +311,12 @@ impl Gate {
         if let Some(missing) = need.iter().find(|need| !need.held(limits)) {
             return denied(*missing);
         }
+        if let Some(identifier) = drive.taken(register, low(data.bits()), &self.drives) {
+            return Err(Denial::Taken {
+                register,
+                identifier,
+            });
+        }
         let denies = |max| drive.speed.denies(max, register, low(data.bits()));
         if let Some(fast) = limits.max_speed.and_then(denies) {
             return Err(Denial::Speed { register, fast });
@@ -305,69 +345,4 @@ fn read(frame: &Frame) -> Option<(Request, bool)> {
     let request = Request::decode(frame, rx, Dlc4::As3).ok()?;
     let sure = Request::decode(frame, rx, Dlc4::Ignore) != Err(Ignored::FourBytes);
     Some((request, sure))
-}
-
-impl Guarded {
-    /// Whether it may hear a frame with this identifier of 11 bits.
-    fn may_hear(&self, number: u32) -> bool {
-        let mut all = self.rx.iter().chain(&self.second);
-        all.any(|&rx| u32::from(rx) == number)
-    }
-
-    /// Whether it hears frames with this identifier at most as those of a second one.
-    fn is_second(&self, number: u32) -> bool {
-        !self.rx.iter().any(|&rx| u32::from(rx) == number)
-    }
-
-    fn remember_second(&mut self, raw: u32) {
-        let id = u16::try_from(raw)
-            .ok()
-            .filter(|id| (1..=0x7FF).contains(id));
-        if let Some(id) = id.filter(|id| !self.second.contains(id)) {
-            self.second.push(id);
-        }
-    }
-
-    /// Keeps the state that an admitted frame leads to. `sure`: every drive reads the frame so.
-    fn follow(&mut self, request: Request, sure: bool) {
-        match request {
-            Request::Read { .. } => {}
-            Request::Cycle { register, every } => {
-                self.cycles.retain(|(with, old)| {
-                    // An interval that may still be in force counts until it is certain.
-                    *with != register || (!sure && *old < every)
-                });
-                if !self.cycles.iter().any(|(with, _)| *with == register) {
-                    self.cycles.push((register, every));
-                }
-            }
-            Request::Stop { register } if sure => {
-                self.cycles.retain(|(with, _)| *with != register);
-            }
-            Request::Stop { .. } => {}
-            Request::Write { register, data } => self.written(register, data, sure),
-        }
-    }
-
-    fn written(&mut self, register: u8, data: Data, sure: bool) {
-        let value = low(data.bits());
-        self.speed.written(register, value, sure);
-        // With a number that is none of 11 bits no drive can be reached.
-        let remember = |list: &mut Vec<u16>| {
-            if !(1..=0x7FF).contains(&value) {
-                return;
-            }
-            list.retain(|id| *id != value);
-            list.push(value);
-        };
-        match register {
-            0x51 if value & MODE_LOCK == 0 => self.locked = false,
-            0x51 => self.locked |= sure,
-            0x68 => remember(&mut self.rx),
-            0x69 => remember(&mut self.tx),
-            0x88 => self.remember_second(data.bits()),
-            _ => {}
-        }
-        self.moved |= matches!(register, 0x68 | 0x69 | 0x73);
-    }
 }

@@ -164,17 +164,89 @@ fn a_drive_that_moves() {
         denied(&mut gate, "201#510000"),
         missing(0x51, Missing::Motion)
     );
+    let places: Vec<_> = gate.places().map(|own| (own.rx, own.tx)).collect();
     assert_eq!(
-        gate.moved().collect::<Vec<_>>(),
-        [((0x201, 0x181), (0x210, 0x181))]
+        places,
+        [
+            ([0x201, 0x210].to_vec(), [0x181].to_vec()),
+            ([0x202].to_vec(), [0x182].to_vec())
+        ]
     );
     assert_eq!(denied(&mut gate, "210#840000"), Some(Denial::LostDrive));
     assert_eq!(
         denied(&mut gate, "210#732540"),
         missing(0x73, Missing::WayBack)
     );
+    // It may not have taken that.
     assert_eq!(denied(&mut gate, "210#680102"), None);
-    assert_eq!(gate.moved().count(), 0);
+    assert!(gate.places().any(|own| own.has_moved()));
+    gate.settled(0x201);
+    assert!(!gate.places().any(|own| own.has_moved()));
+}
+
+/// UNITEK 3.1: an identifier has one drive and one direction, from the moment it may be in use until the drive is found elsewhere.
+#[test]
+fn an_identifier_has_one_drive() {
+    let limits = Limits {
+        bus_settings: true,
+        ..Limits::default()
+    };
+    let mut gate = gate(limits);
+    let taken = |register, identifier| {
+        Some(Denial::Taken {
+            register,
+            identifier,
+        })
+    };
+    for (text, register, identifier) in [
+        ("201#680202", 0x68, 0x202),
+        ("201#688201", 0x68, 0x182),
+        ("201#698201", 0x69, 0x182),
+        ("201#690202", 0x69, 0x202),
+        ("201#8802020000", 0x88, 0x202),
+        ("201#898201", 0x89, 0x182),
+        // Its own, for the other direction.
+        ("201#688101", 0x68, 0x181),
+        ("201#690102", 0x69, 0x201),
+        ("201#68020200", 0x68, 0x202),
+    ] {
+        assert_eq!(
+            denied(&mut gate, text),
+            taken(register, identifier),
+            "{text}"
+        );
+    }
+    for text in ["201#681002", "210#680102", "201#691002"] {
+        let denied = denied(&mut gate, text);
+        assert_eq!(denied.is_some(), text == "201#691002", "{text}");
+    }
+    // Drive 1 may still be there: it would obey what is meant for drive 2.
+    for (text, register) in [("202#681002", 0x68), ("202#8810020000", 0x88)] {
+        assert_eq!(denied(&mut gate, text), taken(register, 0x210), "{text}");
+    }
+    gate.settled(0x201);
+    assert_eq!(denied(&mut gate, "202#681002"), None);
+    assert_eq!(denied(&mut gate, "201#681002"), taken(0x68, 0x210));
+}
+
+/// A lock counts where the drive is known to receive: after a new identifier, on neither of the two until it has answered there.
+#[test]
+fn a_lock_is_booked_where_the_drive_is() {
+    let limits = Limits {
+        bus_settings: true,
+        ..Limits::default()
+    };
+    let stop = missing(0x31, Missing::Motion);
+    let mut gate = gate(limits);
+    for text in ["201#681002", "201#510400", "210#510400"] {
+        assert_eq!(denied(&mut gate, text), None);
+        assert_eq!(denied(&mut gate, "201#310000"), stop, "{text}");
+    }
+    gate.found(0x201, 0x210);
+    assert_eq!(denied(&mut gate, "201#510400"), None);
+    assert_eq!(denied(&mut gate, "210#310000"), stop);
+    assert_eq!(denied(&mut gate, "210#510400"), None);
+    assert_eq!(denied(&mut gate, "210#310000"), None);
 }
 
 /// 84 at most once a minute; 35 and ED only whole.

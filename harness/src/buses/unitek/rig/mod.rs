@@ -10,6 +10,7 @@ mod profile;
 mod qualify;
 mod run;
 mod session;
+mod set_back;
 
 pub use permitted::limits;
 use permitted::special_register;

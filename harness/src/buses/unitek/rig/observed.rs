@@ -14,11 +14,18 @@ const MOST_KEPT: usize = 100_000;
 /// A link to drives, observed.
 pub(super) type Observed<'l> = crate::rig::segment::observed::Observed<'l, FrameNotes>;
 
+/// A drive, by the identifier that it had before the first frame.
+type Addressed = u16;
+
 /// What was noted.
 #[derive(Default)]
 pub(super) struct FrameNotes {
-    /// The registers that frames may have written, with the identifiers that the frames had.
-    pub(super) written: BTreeSet<(u16, u8)>,
+    /// The registers that frames may have written, with the drives.
+    written: BTreeSet<(Addressed, u8)>,
+    /// The levels of the EEPROM that frames may have stored (84), with the drives.
+    stored: BTreeSet<(Addressed, u16)>,
+    /// The identifiers that were written to 68 and 88, with the drives to which they were.
+    given: Vec<(u16, Addressed)>,
     /// The last request, by register, and when it had left.
     asked: Option<(u8, Instant)>,
     /// The shortest time from the end of a request to the end of its reply.
@@ -46,6 +53,22 @@ impl FrameNotes {
         })
     }
 
+    /// The drive to which a frame with this identifier goes.
+    fn addressed(&self, id: u16) -> Addressed {
+        let mut given = self.given.iter().rev();
+        given.find(|own| own.0 == id).map_or(id, |own| own.1)
+    }
+
+    /// The registers that may have been written, with the drives.
+    pub(super) fn written(&self) -> impl Iterator<Item = (u16, u8)> {
+        self.written.iter().copied()
+    }
+
+    /// The levels of the EEPROM that may have been stored, with the drives.
+    pub(super) fn stored(&self) -> impl Iterator<Item = (u16, u16)> {
+        self.stored.iter().copied()
+    }
+
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
         let ReceivedSum { pieces, sum } = self.heard;
@@ -60,8 +83,16 @@ impl LinkNotes for FrameNotes {
                 continue;
             };
             match Request::decode(frame, rx, Dlc4::As3) {
-                Ok(Request::Write { register, .. }) => {
-                    self.written.insert((rx, register));
+                Ok(Request::Write { register, data }) => {
+                    let (drive, value) = (self.addressed(rx), (data.bits() & 0xFFFF) as u16);
+                    self.written.insert((drive, register));
+                    match register {
+                        0x68 | 0x88 if value != drive => self.given.push((value, drive)),
+                        0x84 => {
+                            self.stored.insert((drive, value));
+                        }
+                        _ => {}
+                    }
                 }
                 Ok(Request::Read { register }) => self.asked = Some((register, end)),
                 Ok(Request::Cycle { .. } | Request::Stop { .. }) | Err(_) => {}

@@ -28,9 +28,8 @@ const TORQUE: u8 = 0x90;
 const WIDTH: u8 = 0xDC;
 const WIDE: u32 = 0x0100;
 
-/// The second pair of identifiers, and an identifier that is tried in it: as printed, of node 126.
+/// The second pair of identifiers.
 const SECOND: u8 = 0x88;
-const TRIED: u16 = 0x27E;
 
 /// The interval of a probe's cycle, in ms.
 const EVERY: u8 = 100;
@@ -84,7 +83,7 @@ pub(super) fn settle(
 }
 
 /// Settles what shows only within limits: where bus settings may be changed, which are as before afterwards and not stored, and where the
-/// motor of a drive may turn. It is locked afterwards.
+/// motor of a drive may turn. It is locked afterwards. No drive of the rig uses the identifier `free`.
 ///
 /// # Errors
 /// As [`settle`].
@@ -93,6 +92,7 @@ pub(super) fn settle_within(
     link: &mut Observed<'_>,
     (patience, rate): (Span, BitRate),
     limits: &Limits,
+    free: u16,
 ) -> Result<(), Error> {
     let mut probe = Probe {
         known,
@@ -101,7 +101,7 @@ pub(super) fn settle_within(
     };
     if limits.bus_settings {
         probe.wide()?;
-        probe.second()?;
+        probe.second(free)?;
     }
     if limits.motion {
         probe.homing(rate)?;
@@ -155,6 +155,18 @@ impl Probe<'_, '_> {
             Ok(_) | Err(Error::Differs { .. }) => Ok(()),
             Err(error) => Err(error),
         }
+    }
+
+    /// Writes what a register held before, again where a frame was lost. A drive that never takes it is reported at the end of the attempt.
+    fn set_back(&mut self, register: u8, data: Data) -> Result<(), Error> {
+        let axis = self.known.axis;
+        for _ in 0..TRIES {
+            match self.driver().write(axis, register, data) {
+                Err(Error::Differs { .. }) => {}
+                other => return other.map(|_| ()),
+            }
+        }
+        Ok(())
     }
 
     /// Sends data bytes as they are. Returns when the frame has left.
@@ -244,7 +256,7 @@ impl Probe<'_, '_> {
         let falls = self.status_by((TORQUE, zero))?;
         let rises = self.status_by((SPEED, zero))?;
         self.write(MODE, Data::Short(MODE_LOCK))?;
-        self.write(MASK, Data::Long(mask))?;
+        self.set_back(MASK, Data::Long(mask))?;
         let edges = match (rises.is_some(), falls.is_some()) {
             (true, true) => "both",
             (true, false) => "rising",
@@ -285,7 +297,7 @@ impl Probe<'_, '_> {
         self.write(MASK, Data::Long(WHOLE))?;
         self.send(&[MASK, 0x66, 0x55, 0x77])?;
         let four = self.read(MASK)?.data.bits();
-        self.write(MASK, Data::Long(mask))?;
+        self.set_back(MASK, Data::Long(mask))?;
         match short {
             0x0000_5566 => self.known.settle("short-write", "extend"),
             0x1122_5566 => self.known.settle("short-write", "keep-high"),
@@ -321,18 +333,18 @@ impl Probe<'_, '_> {
         let written = |raw: u32| Data::Short((raw & 0xFFFF) as u16);
         self.write(WIDTH, written(width | WIDE))?;
         let reply = self.read(register);
-        self.write(WIDTH, written(width))?;
+        self.set_back(WIDTH, written(width))?;
         self.extended(&reply?);
         Ok(())
     }
 
     /// Whether the second identifiers are used at once. A drive that does not answer there may use them from its next start on.
-    fn second(&mut self) -> Result<(), Error> {
+    fn second(&mut self, free: u16) -> Result<(), Error> {
         let before = self.known.cell(SECOND);
-        self.write(SECOND, Data::Long(TRIED.into()))?;
-        let sent = self.send_on(TRIED, &[0x3D, FIRMWARE, 0])?;
+        self.write(SECOND, Data::Long(free.into()))?;
+        let sent = self.send_on(free, &[0x3D, FIRMWARE, 0])?;
         let heard = self.listen(sent + self.patience.max(SLACK))?;
-        self.write(SECOND, Data::Long(before))?;
+        self.set_back(SECOND, Data::Long(before))?;
         if heard.iter().any(|(_, reply)| reply.register == FIRMWARE) {
             self.known.settle("second-identifiers", "immediate");
         }

@@ -11,12 +11,30 @@ use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
+use std::ops::RangeInclusive;
 
 /// The conversations that are played with each drive behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/unitek");
 
-/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of the first one, and the next higher one.
-const DRIVE: [&str; 6] = ["{node}", "{rx}", "{tx}", "{low}", "{high}", "{next}"];
+/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of the first one, the next higher one, and
+/// two that no drive of the rig uses, each with its bytes: one as printed and one that is not.
+const DRIVE: [&str; 12] = [
+    "{node}",
+    "{rx}",
+    "{tx}",
+    "{low}",
+    "{high}",
+    "{next}",
+    "{free}",
+    "{free-low}",
+    "{free-high}",
+    "{other}",
+    "{other-low}",
+    "{other-high}",
+];
+
+/// The identifiers in which a drive may receive (UNITEK 3.1).
+const PRINTED: RangeInclusive<u16> = 0x201..=0x27F;
 
 /// What a probe needs that is not made by default.
 #[derive(Clone, Copy)]
@@ -79,11 +97,27 @@ fn why_open(property: &Description, limits: &Limits) -> String {
     why.to_owned()
 }
 
+/// Two identifiers for a drive to be tried with, which no drive of the rig uses, and which are those of no other drive either: one as
+/// printed (UNITEK 3.1), while there are some left, and one that is not.
+pub(super) fn free(axes: &[Axis], axis: Axis) -> [u16; 2] {
+    let place = axes.iter().position(|own| *own == axis).unwrap_or(0);
+    let used = |id: &u16| axes.iter().any(|own| own.rx == *id || own.tx == *id);
+    let other = || (0x100..=0x7FF).filter(|id| !PRINTED.contains(id) && !used(id));
+    // Not the last one, which is the highest neighbour that a drive may hear.
+    let printed = PRINTED.rev().skip(1).filter(|id| !used(id));
+    let free = printed.chain(other().skip(axes.len())).nth(place);
+    [free, other().nth(place)].map(|own| own.unwrap_or(axis.rx))
+}
+
 /// The conversations with these drives.
 pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
     let mut files: Vec<_> = CONVERSATIONS.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let of_drive = |axis: &Axis| {
+        let [free, other] = free(axes, *axis);
+        let bytes = |id: u16| [id, id & 0xFF, id >> 8];
+        let [free, free_low, free_high] = bytes(free);
+        let [other, other_low, other_high] = bytes(other);
         let values = [
             axis.node.to_string(),
             format!("{:03X}", axis.rx),
@@ -91,6 +125,12 @@ pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
             format!("{:02X}", axis.rx & 0xFF),
             format!("{:02X}", axis.rx >> 8),
             format!("{:03X}", axis.rx + 1),
+            format!("{free:03X}"),
+            format!("{free_low:02X}"),
+            format!("{free_high:02X}"),
+            format!("{other:03X}"),
+            format!("{other_low:02X}"),
+            format!("{other_high:02X}"),
         ];
         let several = axes.len() > 1;
         let node = axis.node;
@@ -237,6 +277,25 @@ impl Attempts for Notes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// No drive is tried with an identifier of another one, or with that which another one is tried with.
+    #[test]
+    fn each_drive_is_tried_with_identifiers_of_its_own() {
+        for drives in [1u8, 2, 126, 127] {
+            let axis = |node: u8| Axis {
+                node,
+                rx: 0x200 + u16::from(node),
+                tx: 0x180 + u16::from(node),
+            };
+            let axes: Vec<_> = (1..=drives).map(axis).collect();
+            let tried = axes.iter().flat_map(|own| free(&axes, *own));
+            let own = axes.iter().flat_map(|own| [own.rx, own.tx]);
+            let all: Vec<_> = tried.chain(own).collect();
+            let each: std::collections::BTreeSet<_> = all.iter().collect();
+            assert_eq!(each.len(), all.len(), "{drives} drives");
+            assert!(all.iter().all(|own| (1..=0x7FF).contains(own)));
+        }
+    }
 
     #[test]
     fn every_need_is_of_a_property_and_its_conversation_is_there() {

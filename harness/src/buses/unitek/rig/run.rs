@@ -1,12 +1,12 @@
-//! UNITEK drives on which scenarios are played: what their player offers, and what is set back behind a scenario.
+//! UNITEK drives on which scenarios are played: what their player offers.
 
 use super::player::{Own, Player, stores};
 use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
-use super::{Axis, Session, axes, limits, rate};
+use super::set_back::set_back;
+use super::{Session, axes, limits, rate};
 use crate::buses::Bus;
-use crate::buses::unitek::driver::{Driver, Error};
 use crate::buses::unitek::simulate::Bench;
 use crate::link::frames::SLACK;
 use crate::link::{Link, LinkEvent, Replay};
@@ -21,9 +21,6 @@ use crate::scenario::run::{Outcome, Skip};
 use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
 use harness_proto::time::Span;
-use harness_proto::unitek::frame::Data;
-use harness_proto::unitek::master::Job;
-use harness_proto::unitek::{Access, Register};
 use std::sync::Arc;
 
 /// The shortest time between two writes of 84 (UNITEK ex 7: our choice).
@@ -31,9 +28,6 @@ const EEPROM_REST: Span = Span::from_millis(60_000);
 
 /// How long one wait lasts at most: a request to end is looked for between them.
 const NAP: Span = Span::from_millis(50);
-
-/// Registers that commands and functions change, which the safe state sets.
-const COMMANDS: [u8; 4] = [0x31, 0x51, 0x6E, 0x90];
 
 impl PortPlayer for Player {
     const BUS: Bus = Bus::Unitek;
@@ -105,34 +99,10 @@ impl PortPlayer for Player {
 
     /// Sets registers back that a scenario has changed.
     fn set_back(&mut self, own: &Own, session: &mut Session) -> Vec<String> {
-        let stored = own.frames().any(stores);
-        if stored {
+        if own.frames().any(stores) {
             self.note_stored();
         }
-        let mut notes = Vec::new();
-        for known in self.known() {
-            let axis = known.axis;
-            let all = self.written().contains(&(axis.rx, 0x83));
-            let changed = |register: &u8| {
-                let access = Register::of(*register).access;
-                let written = self.written().contains(&(axis.rx, *register));
-                (all || written)
-                    && matches!(access, Access::RW | Access::SP)
-                    && !COMMANDS.contains(register)
-            };
-            let before = known.cells.iter().filter(|(register, _)| changed(register));
-            let mut driver = session.driver();
-            for (register, raw) in before {
-                notes.extend(set_back(&mut driver, axis, (*register, *raw)));
-            }
-            if stored && !all {
-                notes.push(format!(
-                    "drive {}: its EEPROM keeps what the scenario stored; `params save` and `params load` compare and set it",
-                    axis.node
-                ));
-            }
-        }
-        notes
+        set_back(self, session)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {
@@ -141,32 +111,5 @@ impl PortPlayer for Player {
 
     fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
         Some(qualify(parts, rig, began, whole))
-    }
-}
-
-/// Sets a register back to what it was. Returns what is left to say.
-fn set_back(driver: &mut Driver<'_>, axis: Axis, (register, raw): (u8, u32)) -> Option<String> {
-    let name = Register::of(register).name;
-    let reads = match driver.read(axis, register) {
-        Ok(reply) => reply.data.bits() & Register::of(register).mask(),
-        Err(error) => return Some(error.to_string()),
-    };
-    if reads == raw {
-        return None;
-    }
-    let data = Data::of(Register::of(register), raw);
-    let kept = |why: &str| {
-        format!(
-            "drive {}: register {register:02X} ({name}) reads {reads:X} and is not set back to {raw:X}: {why}",
-            axis.node
-        )
-    };
-    if let Some(why) = driver.denied(&[(axis, Job::Write { register, data })]) {
-        return Some(kept(&why));
-    }
-    match driver.write(axis, register, data) {
-        Ok(_) => None,
-        Err(Error::Differs { .. }) => Some(kept("the drive does not take it")),
-        Err(error) => Some(kept(&error.to_string())),
     }
 }

@@ -30,6 +30,8 @@ const SPEEDS: [u8; 2] = [0xC8, 0x34];
 pub struct UnitekDrives {
     axes: Vec<Axis>,
     patience: Span,
+    /// How a drive with another bit rate is reached, by the rig's file.
+    way_back: Option<String>,
 }
 
 /// A rig in use.
@@ -56,7 +58,13 @@ impl PortDrives for UnitekDrives {
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &identifiers, port.listen_only);
         let patience = patience(port);
-        Ok((Self { axes, patience }, link, locks))
+        let way_back = rig.file.limits.port.bit_rate_way_back.clone();
+        let own = Self {
+            axes,
+            patience,
+            way_back,
+        };
+        Ok((own, link, locks))
     }
 
     /// Asks every drive for its firmware.
@@ -79,7 +87,8 @@ impl PortDrives for UnitekDrives {
     }
 
     fn safe_state(&self, line: &mut Guarded<Ends>, standing: &Standstill) -> Safe {
-        safe_state(line, &self.axes, self.patience, standing)
+        let way_back = self.way_back.as_deref();
+        safe_state(line, &self.axes, self.patience, standing, way_back)
     }
 
     fn last_words(&self) -> Pieces {

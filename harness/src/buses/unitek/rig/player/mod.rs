@@ -7,16 +7,17 @@
 
 mod note;
 mod own;
+mod ready;
 
 pub(in crate::buses::unitek) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
 
+use super::Axis;
 use super::known::Known;
-use super::observed::Observed;
+use super::observed::{FrameNotes, Observed};
 use super::profile::Profiled;
-use super::{Axis, probe};
 use crate::buses::LimitSetting;
-use crate::buses::unitek::driver::{Driver, Error};
+use crate::buses::unitek::driver::Error;
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::language::plan::{node, octet_time};
@@ -26,23 +27,16 @@ use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble}
 use crate::medium::Medium;
 use crate::rig::segment::observed::{Beats, LinkTimes, Slow};
 use crate::scenario::expression::Scope;
-use crate::scenario::run::outcome::Unready;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
-use harness_proto::unitek::words::MODE_LOCK;
 use harness_proto::unitek::{Register, guard};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-
-const MODE: u8 = 0x51;
-/// The commands of torque and of speed. The last one decides what the drive controls.
-const COMMANDS: [u8; 2] = [0x90, 0x31];
 
 /// Identifiers and bit rate: a drive that stores new ones may be lost.
 const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
@@ -105,6 +99,8 @@ pub(crate) struct Player {
     written: BTreeSet<(u16, u8)>,
     /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
     moved: BTreeSet<u16>,
+    /// The levels of the EEPROM that the last attempt may have stored, with the drives.
+    levels: BTreeSet<(u16, u16)>,
     /// Whether something that was played may have stored parameters.
     stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
@@ -137,6 +133,7 @@ impl Player {
             partly: Vec::new(),
             written: BTreeSet::new(),
             moved: BTreeSet::new(),
+            levels: BTreeSet::new(),
             stored: false,
             before: None,
             qualifies: false,
@@ -171,7 +168,23 @@ impl Player {
         self.known.as_deref().unwrap_or_default()
     }
 
-    /// The registers that may differ from what is known.
+    /// What was read of the drives, also where not everything could be.
+    pub(super) fn read_so_far(&self) -> &[Known] {
+        self.known.as_deref().unwrap_or(&self.partly)
+    }
+
+    /// The levels of the EEPROM that the last attempt may have stored, with the drives.
+    pub(super) const fn stored_levels(&self) -> &BTreeSet<(u16, u16)> {
+        &self.levels
+    }
+
+    /// Remembers what was written.
+    fn take_notes(&mut self, noted: &FrameNotes) {
+        self.written.extend(noted.written());
+        self.levels.extend(noted.stored());
+    }
+
+    /// The registers that may differ from what was read at first.
     pub(super) const fn written(&self) -> &BTreeSet<(u16, u8)> {
         &self.written
     }
@@ -270,7 +283,9 @@ impl Player {
     /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
     fn go(&mut self, own: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
         self.before = None;
+        self.levels.clear();
         if let Err(error) = self.learn(link) {
+            self.take_notes(&link.noted);
             return Gone::Unanswered(error);
         }
         let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
@@ -279,7 +294,7 @@ impl Player {
         };
         let at_rest = self.prepare(own, self.limits.motion, link);
         self.before = Some(link.noted.received());
-        self.written.extend(&link.noted.written);
+        self.take_notes(&link.noted);
         let at_rest = match at_rest {
             Ok(at_rest) => at_rest,
             Err(error) => return Gone::Unanswered(error),
@@ -290,61 +305,13 @@ impl Player {
         link.begin();
         link.take_late();
         let outcome = play(&own.plan, link, AtMismatch::Stop);
-        self.written.extend(&link.noted.written);
-        let written = link.noted.written.iter();
-        let settings = written.filter(|(_, register)| BUS_SETTINGS.contains(register));
-        self.moved.extend(settings.map(|(rx, _)| rx));
+        self.take_notes(&link.noted);
+        let settings = link
+            .noted
+            .written()
+            .filter(|own| BUS_SETTINGS.contains(&own.1));
+        self.moved.extend(settings.map(|own| own.0));
         Gone::Played(Box::new(outcome), [at_rest, model])
-    }
-
-    /// Reads the drives; the first time everything, and what the manual leaves open is settled.
-    fn learn(&mut self, link: &mut Observed<'_>) -> Result<(), Error> {
-        let mut drives = match self.known.take() {
-            Some(drives) => drives,
-            None => self.axes.iter().copied().map(Known::new).collect(),
-        };
-        let learnt = drives
-            .iter_mut()
-            .try_for_each(|known| self.learn_of(known, link));
-        match learnt {
-            Ok(()) => {
-                self.written.clear();
-                self.known = Some(drives);
-            }
-            Err(_) => self.partly = drives,
-        }
-        learnt
-    }
-
-    /// The same of one drive.
-    fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<(), Error> {
-        let axes = [known.axis];
-        let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
-        if known.cells.is_empty() {
-            known.read_all(&mut driver)?;
-            drop(driver);
-            probe::settle(known, link, self.patience)?;
-            if self.qualifies {
-                probe::settle_within(known, link, (self.patience, self.rate), &self.limits)?;
-            }
-            self.profile.settle(known, self.rate)?;
-            driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
-        }
-        known.read_again(&mut driver, &self.written)
-    }
-
-    /// The outcome where the drives could not be made ready.
-    fn unanswered(&self, error: &Error) -> Outcome {
-        let remark = error.to_string();
-        match error {
-            Error::Link(trouble) => Outcome::trouble(trouble),
-            Error::OtherThanProfile { .. } => Outcome::rig_error(remark),
-            // Nothing was ever heard of it.
-            Error::NoReply { .. } if self.known.is_none() => Outcome::rig_error(remark),
-            Error::NoReply { .. } => Outcome::not_ready(Verdict::Failed, Unready::NoAnswer, remark),
-            // A drive may have reasons of its own to refuse a parameter.
-            _ => Outcome::not_ready(Verdict::Inconclusive, Unready::Differs, remark),
-        }
     }
 
     /// Plays a scenario on the model.
@@ -489,40 +456,6 @@ impl Player {
             gate.learn(known.axis.rx, full, limit);
         }
         self.moved.iter().for_each(|rx| gate.note_moved(*rx));
-    }
-
-    /// Makes the drives ready: locked, without commands, with the registers of the header, and released where motors may turn.
-    fn prepare(&self, own: &Own, release: bool, link: &mut dyn Link) -> Result<AtRest, Error> {
-        let mut driver = Driver::new(Box::new(&mut *link), &self.axes, self.patience);
-        for axis in &self.axes {
-            driver.write(*axis, MODE, Data::Short(MODE_LOCK))?;
-            for register in COMMANDS {
-                driver.write(*axis, register, Data::Short(0))?;
-            }
-        }
-        let mut at_rest = Vec::new();
-        for drive in &own.plan.setup.drives {
-            let known = self.known().iter().find(|own| own.axis.node == drive.node);
-            let Some(known) = known else { continue };
-            for (register, raw) in &drive.registers {
-                if known.cells.get(register) != Some(raw) {
-                    let data = Data::of(Register::of(*register), *raw);
-                    driver.write(known.axis, *register, data)?;
-                }
-            }
-            if release {
-                driver.write(known.axis, MODE, Data::Short(0))?;
-            }
-            for register in AT_REST {
-                let bits = match driver.read(known.axis, register) {
-                    Ok(reply) => reply.data.bits(),
-                    Err(Error::NoReply { .. }) => continue,
-                    Err(error) => return Err(error),
-                };
-                at_rest.push((drive.node, register, bits));
-            }
-        }
-        Ok(at_rest)
     }
 
     /// Whether a line that was not met accuses the drive.
