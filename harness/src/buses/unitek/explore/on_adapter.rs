@@ -4,6 +4,7 @@ use super::act::FrameActKind;
 use super::generate::FrameSpice;
 use super::oracle::FrameDifference;
 use super::{FrameTalk, FramesSeen};
+use crate::buses::unitek::driver::Error;
 use crate::buses::unitek::judge::{Breach, Follower};
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives, axes, limits};
@@ -15,14 +16,21 @@ use crate::rig::Rig;
 use harness_proto::can::Frame;
 use harness_proto::time::Span;
 use harness_proto::unitek::master::Job;
+use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::{Data, Register, Request};
 use harness_sim::record::LineFrame;
 
 /// How long frames that are under way may take.
 const UNDER_WAY: Span = Span::from_millis(60);
 
+/// The safe state sets MODE.
+const MODE: u8 = 0x51;
+
 /// What cases write, and what is written back at the end of a run.
 const WRITTEN: [u8; 9] = [0xD1, 0xD2, 0xD3, 0xD4, 0x35, 0xED, 0x34, 0x79, 0x52];
+
+/// How often a register is written back that does not take its value: a frame may be lost.
+const TRIES: usize = 3;
 
 /// Frames that are sent at a time between cases.
 const BURST: usize = 16;
@@ -101,7 +109,13 @@ impl LineRig for Unitek {
             if !driver.permits(*axis, job) {
                 continue;
             }
-            if let Err(error) = driver.write(*axis, *register, *data) {
+            let mut written = driver.write(*axis, *register, *data);
+            for _ in 1..TRIES {
+                if let Err(Error::Differs { .. }) = written {
+                    written = driver.write(*axis, *register, *data);
+                }
+            }
+            if let Err(error) = written {
                 let name = Register::of(*register).name;
                 remarks.push(format!(
                     "drive {}: register {register:02X} ({name}) was not restored: {error}",
@@ -119,7 +133,8 @@ impl LineRig for Unitek {
         acts.find_map(|(act, at)| match &act.what {
             FrameActKind::Send(frame) => {
                 let now = began + at.since_start();
-                gate.admit(now, frame).err().map(|why| why.to_string())
+                let denied = gate.admit(now, frame).err().map(|why| why.to_string());
+                denied.or_else(|| not_restored(frame))
             }
             _ => Some("only a simulated drive can be switched".to_owned()),
         })
@@ -158,6 +173,21 @@ impl LineRig for Unitek {
     }
 }
 
+/// Why a frame is not sent that may change something which the end of a run does not restore, such as identifiers or the EEPROM; `None` if
+/// it is sent. A case of which one byte was changed may hold any.
+fn not_restored(frame: &Frame) -> Option<String> {
+    let rx = u16::try_from(frame.id().number()).ok()?;
+    match Request::decode(frame, rx, Dlc4::As3) {
+        Ok(Request::Write { register, .. }) if register != MODE && !WRITTEN.contains(&register) => {
+            Some(format!(
+                "{frame} is not sent: it may change register {register:02X} ({}), which the end of a fuzz run does not restore",
+                Register::of(register).name
+            ))
+        }
+        _ => None,
+    }
+}
+
 impl From<Breach> for FrameDifference {
     fn from(own: Breach) -> Self {
         Self {
@@ -168,6 +198,40 @@ impl From<Breach> for FrameDifference {
             frame: own.frame,
             under: Vec::new(),
             about: own.about,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A byte of a case may be changed into a write of identifiers, bit rate, EEPROM, time-out or position: none is sent to a real drive.
+    #[test]
+    fn what_is_not_restored_is_not_sent() {
+        for text in [
+            "201#68",
+            "201#6810",
+            "201#3D4000",
+            "201#3D40FF",
+            "201#D411223344",
+            "201#510400",
+            "201#3412FF",
+        ] {
+            let frame: Frame = text.parse().expect("a frame");
+            assert_eq!(not_restored(&frame), None, "{text}");
+        }
+        for text in [
+            "201#681002",
+            "201#735C40",
+            "201#840000",
+            "201#D00500",
+            "202#6E00000100",
+            "201#8E444D",
+            "27E#68010200",
+        ] {
+            let frame: Frame = text.parse().expect("a frame");
+            assert!(not_restored(&frame).is_some(), "{text}");
         }
     }
 }
