@@ -44,6 +44,8 @@ fn open_points_are_settled_and_no_correct_drive_is_blamed() {
         ("event-edges", "falling"),
         ("event-at-set-up", "at-once"),
         ("second-identifiers", "immediate"),
+        ("time-out-clear", "lock"),
+        ("enable-after-lock", "yes"),
     ] {
         let desk = desk(&format!("property {name} = {value}"), ALL);
         let output = qualify(&desk);
@@ -104,7 +106,7 @@ fn wrong_drives_are_named() {
 #[test]
 #[ignore = "takes a minute; .ci/nightly runs it"]
 fn more_wrong_drives_are_named() {
-    named(&["names-read", "ramps-swapped", "stop-answers"]);
+    named(&["names-read", "ramps-swapped", "stop-answers", "errors-stay"]);
 }
 
 fn named(names: &[&str]) {

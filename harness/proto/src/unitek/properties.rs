@@ -159,6 +159,22 @@ words! {
         Restart "restart",
         Immediate "immediate",
     }
+    /// `time-out-clear`: what clears a time-out of the bus (8E: dump; the lock: field, two teams quote the maker).
+    TimeOutClear {
+        /// A write of 8E.
+        #[default]
+        Cancel "cancel",
+        /// A lock and its release (MODE bit 2 from 1 to 0), and 8E alone does not.
+        Lock "lock",
+    }
+    /// `enable-after-lock`: whether a drive that was switched on, or was not ready, is enabled only by a lock and its release (ex 11; field,
+    /// two teams quote the maker).
+    EnableAfterLock {
+        #[default]
+        No "no",
+        /// MODE bit 2 has to go from 1 to 0 while it is ready.
+        Yes "yes",
+    }
     /// `second-identifiers`: what the drive does with 88 and 89 (dump).
     SecondIdentifiers {
         /// It stores them.
@@ -218,6 +234,10 @@ pub struct Properties {
     pub event_at_set_up: EventAtSetUp,
     /// `rate-change`.
     pub rate_change: RateChange,
+    /// `time-out-clear`.
+    pub time_out_clear: TimeOutClear,
+    /// `enable-after-lock`.
+    pub enable_after_lock: EnableAfterLock,
     /// `second-identifiers`.
     pub second_identifiers: SecondIdentifiers,
     /// `reply-delay`: from the end of a request to the begin of its reply on a free bus (ex 8).
@@ -252,6 +272,8 @@ impl Default for Properties {
             event_edges: EventEdges::default(),
             event_at_set_up: EventAtSetUp::default(),
             rate_change: RateChange::default(),
+            time_out_clear: TimeOutClear::default(),
+            enable_after_lock: EnableAfterLock::default(),
             second_identifiers: SecondIdentifiers::default(),
             reply_delay: Span::ZERO,
             homing_time: Span::from_millis(500),
@@ -445,4 +467,6 @@ pub const PROPERTIES: &[Description] = properties! {
     "event-at-set-up" event_at_set_up: EventAtSetUp "5.2" "whether a bit that is set when MODE bit 4 is set is an event";
     "rate-change" rate_change: RateChange "3.1" "when a new bit timing in 73 is used";
     "second-identifiers" second_identifiers: SecondIdentifiers "dump" "what the drive does with 88 and 89";
+    "time-out-clear" time_out_clear: TimeOutClear "dump" "what clears a time-out of the bus";
+    "enable-after-lock" enable_after_lock: EnableAfterLock "ex 11" "whether a drive that was not ready is enabled only after a lock and its release";
 };

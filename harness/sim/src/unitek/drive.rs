@@ -55,6 +55,8 @@ pub struct Drive {
     calibrated: bool,
     /// The time-out of the bus has occurred and was not cleared.
     timed_out: bool,
+    /// A lock was released while the drive was ready, and it has been ready since.
+    released: bool,
     /// The end of the last accepted frame.
     last_frame: Instant,
     cycles: Cycles,
@@ -91,6 +93,7 @@ impl Drive {
             homing: None,
             calibrated: false,
             timed_out: false,
+            released: false,
             last_frame: power_up,
             cycles: Cycles::default(),
             outbox: Outbox::default(),
@@ -140,6 +143,14 @@ impl Drive {
         self
     }
 
+    /// The drive with a lock that was released after its power-up.
+    #[must_use]
+    pub fn with_release(mut self) -> Self {
+        self.released = self.is_ready();
+        self.last_status = self.status();
+        self
+    }
+
     /// Switches the drive off: nothing is heard, sent or moved until [`Drive::restart`].
     pub fn switch_off(&mut self, at: Instant) {
         self.advance(at);
@@ -178,6 +189,7 @@ impl Drive {
         self.homing = None;
         self.calibrated = false;
         self.timed_out = false;
+        self.released = false;
         self.last_frame = at;
         self.cycles = Cycles::default();
         self.outbox.clear();
@@ -401,6 +413,7 @@ impl Drive {
         if self.times_out_at().is_some_and(|at| at <= now) {
             self.timed_out = true;
         }
+        self.released &= self.is_ready();
         let status = self.status();
         if self.cell16(0x51) & MODE_EVENT != 0 && self.is_event(status) {
             self.send(now, 0x40, Cause::Event);

@@ -36,6 +36,7 @@ pub struct Reference {
     homing: i64,
     cal: bool,
     timeout: bool,
+    free: bool,
     /// Milliseconds since power-up.
     pub now: u64,
     last: u64,
@@ -97,6 +98,7 @@ impl Reference {
             homing: 0,
             cal: false,
             timeout: false,
+            free: false,
             now: 0,
             last: 0,
             table: [None; 8],
@@ -139,7 +141,8 @@ impl Reference {
     }
 
     fn enabled(&self) -> bool {
-        self.inputs.run && self.inputs.rfe && self.ready() && self.at(0x51) & 4 == 0
+        let waits = self.p.enable_after_lock.word() == "yes" && !self.free;
+        self.inputs.run && self.inputs.rfe && self.ready() && self.at(0x51) & 4 == 0 && !waits
     }
 
     fn tolerance(&self) -> bool {
@@ -352,6 +355,10 @@ impl Reference {
                     }
                     _ => {}
                 }
+                if number == 0x51 && before / 4 % 2 == 1 && (value / 4).is_multiple_of(2) {
+                    self.timeout &= self.p.time_out_clear.word() == "cancel";
+                    self.free = self.ready();
+                }
                 match number {
                     0x51 if value / 4 % 2 == 1 && self.p.lock_clears_command.word() == "yes" => {
                         self.held[0x31] = 0;
@@ -385,7 +392,7 @@ impl Reference {
     }
 
     fn function(&mut self, number: u8, value: u32) {
-        if number == 0x8E {
+        if number == 0x8E && self.p.time_out_clear.word() == "cancel" {
             self.timeout = false;
         }
         if number == 0x84 && value < 2 {
@@ -416,6 +423,7 @@ impl Reference {
         if limit > 0 && self.now - self.last >= limit {
             self.timeout = true;
         }
+        self.free = self.free && self.ready();
         let mut out = Vec::new();
         let status = self.read(0x40);
         let (rises, falls) = (status & !self.before, self.before & !status);

@@ -35,6 +35,8 @@ pub struct DriveSetup {
     pub registers: Vec<(u8, u32)>,
     /// What it controls at first; `None` leaves it to its properties.
     pub control: Option<Control>,
+    /// Whether a lock was released after its power-up (`enable-after-lock`).
+    pub released: bool,
     /// How it breaks the manual.
     pub deviation: Option<&'static Deviation>,
 }
@@ -51,6 +53,7 @@ impl DriveSetup {
             inputs: Inputs::default(),
             registers: Vec::new(),
             control: None,
+            released: false,
             deviation: None,
         }
     }
@@ -65,6 +68,9 @@ impl DriveSetup {
         drive = drive.on_bus_of(rate);
         if let Some(control) = self.control {
             drive = drive.with_control(control);
+        }
+        if self.released {
+            drive = drive.with_release();
         }
         Deviant::new(drive, self.deviation)
     }

@@ -3,7 +3,7 @@
 use super::Drive;
 use crate::unitek::plant::Control;
 use harness_proto::unitek::Register;
-use harness_proto::unitek::properties::StatusBits;
+use harness_proto::unitek::properties::{EnableAfterLock, StatusBits};
 use harness_proto::unitek::words::{
     ERROR_NO_POWER, ERROR_TIME_OUT, ERRORS_FAULT, ERRORS_NOT_READY, MODE_LOCK, status,
 };
@@ -68,11 +68,12 @@ impl Drive {
         self.errors() & ERRORS_NOT_READY == 0
     }
 
-    /// Whether the drive is enabled: both inputs closed, ready, not locked.
+    /// Whether the drive is enabled: both inputs closed, ready, not locked; and the lock released, where it needs that.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         let locked = self.cell16(0x51) & MODE_LOCK != 0;
-        self.inputs.run && self.inputs.rfe && self.is_ready() && !locked
+        let released = self.properties.enable_after_lock == EnableAfterLock::No || self.released;
+        self.inputs.run && self.inputs.rfe && self.is_ready() && !locked && released
     }
 
     /// Whether homing runs (ex 12).

@@ -6,7 +6,7 @@ use crate::unitek::plant::Control;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Occasion, reply_data};
 use harness_proto::unitek::properties::{
-    EventAtSetUp, IdRange, LockClearsCommand, UnknownRegister,
+    EventAtSetUp, IdRange, LockClearsCommand, TimeOutClear, UnknownRegister,
 };
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Reply};
@@ -30,7 +30,7 @@ impl Drive {
                     if number == 0x51 && new & u32::from(MODE_EVENT) != 0 {
                         self.sets_up = self.properties.event_at_set_up == EventAtSetUp::AtOnce;
                     }
-                    self.act(number, raw);
+                    self.act(number, raw, held);
                 }
             }
         }
@@ -47,13 +47,14 @@ impl Drive {
     }
 
     /// What a write causes besides the new contents.
-    fn act(&mut self, number: u8, raw: u32) {
+    fn act(&mut self, number: u8, raw: u32, held: u32) {
         match number {
             0x31 => self.control = Control::Speed,
             0x90 => self.control = Control::Torque,
             0x6E => self.control = Control::Position,
             0x35 | 0xED | 0xC7 => self.plant.forget_ramp(),
             0x51 if raw & u32::from(MODE_LOCK) != 0 => self.lock(),
+            0x51 if held & u32::from(MODE_LOCK) != 0 => self.release(),
             0x68 | 0x69 | 0x73 | 0x88 | 0x89 => self.use_bus_settings(false),
             0x7A => self.plant.preset(raw.cast_signed()),
             _ => {}
@@ -65,6 +66,13 @@ impl Drive {
             self.cells[0x31] = 0;
             self.cells[0x90] = 0;
         }
+    }
+
+    fn release(&mut self) {
+        if self.properties.time_out_clear == TimeOutClear::Lock {
+            self.timed_out = false;
+        }
+        self.released = self.is_ready();
     }
 
     /// A function; values that it does not know are ignored.
@@ -82,7 +90,7 @@ impl Drive {
             (0x84, 0 | 1) => {
                 self.eeprom[usize::from(value == 1)] = Some(Arc::new(self.cells));
             }
-            (0x8E, _) => self.timed_out = false,
+            (0x8E, _) => self.timed_out &= self.properties.time_out_clear == TimeOutClear::Lock,
             _ => {}
         }
     }

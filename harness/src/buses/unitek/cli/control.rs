@@ -12,7 +12,7 @@ use crate::rig::port_session::PortDrives as _;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;
-use harness_proto::unitek::words::{ERRORS, MODE_LOCK, set_bits};
+use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS, MODE_LOCK, set_bits};
 
 /// What a drive needs to take notice: some of its scans of 1 ms.
 const SCANS: Span = Span::from_millis(5);
@@ -142,10 +142,17 @@ fn with_errors(
     for axis in drives {
         // A drive that does not answer has been reported.
         let errors = session.driver().read(*axis, 0x8F);
-        if errors.is_ok_and(|read| read.data.bits() != 0) {
+        let errors = errors.map_or(0, |read| read.data.bits());
+        if errors != 0 {
             let node = axis.node;
+            let hint = match errors & ERROR_TIME_OUT {
+                0 => "",
+                _ => {
+                    "; a time-out of the bus may need a lock and its release: `block`, then `write` with MODE=0x0000 --move"
+                }
+            };
             output.complain(&format!(
-                "drive {node}: its errors stay: their causes are there"
+                "drive {node}: its errors stay: their causes are there{hint}"
             ));
             exit = Exit::Failed;
         }

@@ -67,7 +67,8 @@ impl From<driver::Error> for Failure {
         let exit = match &error {
             driver::Error::NoReply { .. }
             | driver::Error::Differs { .. }
-            | driver::Error::NotReady { .. } => Exit::Failed,
+            | driver::Error::NotReady { .. }
+            | driver::Error::TimeOutStays { .. } => Exit::Failed,
             driver::Error::OtherThanProfile { .. } => Exit::RigError,
             driver::Error::Refused(_) | driver::Error::NoSuchDrive(_) => Exit::Usage,
             driver::Error::Link(trouble) => exit_of_trouble(trouble),

@@ -62,6 +62,14 @@ pub enum Error {
         /// What the drive has shown.
         shows: String,
     },
+    /// A time-out of the bus was provoked, and nothing clears it.
+    #[error(
+        "drive {node}: its BUS-TIMEOUT stays: neither 8E (FUN_ERRCANCEL) nor a lock and its release clears it (UNITEK dump)"
+    )]
+    TimeOutStays {
+        /// Which drive.
+        node: u8,
+    },
     /// The request is impossible.
     #[error("{0}")]
     Refused(Refused),

@@ -182,6 +182,7 @@ impl Known {
                 .map(|(register, raw)| (*register, *raw))
                 .collect(),
             control: Some(Control::Speed),
+            released: self.cell(0x40) & status::ENABLED != 0,
             ..DriveSetup::new(self.axis.node)
         }
     }

@@ -13,7 +13,7 @@ use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::MapReply;
-use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
+use harness_proto::unitek::words::{ERROR_TIME_OUT, MODE_EVENT, MODE_LOCK, status};
 use harness_proto::unitek::{Register, Width};
 
 /// A register to which nothing is assigned (dump).
@@ -41,6 +41,12 @@ const SLACK: Span = Span::from_millis(30);
 
 /// Nine registers, one more than there are cycles (App 8).
 const NINE: [u8; 9] = [0x1B, 0x30, 0x31, 0x90, 0x51, 0x52, 0x6D, 0x6E, 0x11];
+
+/// The time-out of the bus, one that is tried, in ms, and the function that clears errors.
+const TIME_OUT: u8 = 0xD0;
+const TIMED_OUT_AFTER: u16 = 40;
+const ERROR_MAP: u8 = 0x8F;
+const CANCEL: u8 = 0x8E;
 
 /// The function that starts homing.
 const HOMING: u8 = 0x78;
@@ -105,6 +111,10 @@ pub(super) fn settle_within(
     }
     if limits.motion {
         probe.homing(rate)?;
+        probe.write(MODE, Data::Short(MODE_LOCK))?;
+    }
+    if limits.motion && limits.bus_settings {
+        probe.time_out()?;
         probe.write(MODE, Data::Short(MODE_LOCK))?;
     }
     Ok(())
@@ -232,6 +242,9 @@ impl Probe<'_, '_> {
                 self.known.settle("status-bits", "printed");
             }
         }
+        if self.waits_for_a_lock() {
+            self.known.settle("enable-after-lock", "yes");
+        }
         if self.known.is_wide() {
             let replies: Vec<_> = self.known.replies.values().copied().collect();
             replies.iter().for_each(|reply| self.extended(reply));
@@ -243,6 +256,17 @@ impl Probe<'_, '_> {
         };
         self.known.settle("unknown-register", word);
         Ok(())
+    }
+
+    /// Whether the drive is not enabled although it is ready, both of its inputs are closed and it is not locked.
+    fn waits_for_a_lock(&self) -> bool {
+        let on = |register, bit: u32| self.known.cell(register) >> bit & 1 == 1;
+        let closed = on(0xE8, 0) && on(0xD8, 5) && on(0xE2, 0);
+        let enabled = self.known.cell(STATUS) & status::ENABLED != 0;
+        let known = [0xE8, 0xD8, 0xE2, MODE, STATUS]
+            .iter()
+            .all(|own| self.known.cells.contains_key(own));
+        known && closed && self.known.cell(MODE) & u32::from(MODE_LOCK) == 0 && !enabled
     }
 
     /// What is sent by event: a locked drive shows it, since a torque command of 0 clears bit 8 of STATUS and a speed command of 0 sets it.
@@ -426,6 +450,52 @@ impl Probe<'_, '_> {
         let took = Span::from_millis(took.div_ceil(1_000_000));
         self.known
             .measure_homing(took, self.link.time_tolerance() == Span::ZERO);
+        Ok(())
+    }
+
+    /// What clears a time-out of the bus, and whether the drive is enabled again behind it.
+    ///
+    /// # Errors
+    /// Nothing clears it: no value of an open point explains that.
+    fn time_out(&mut self) -> Result<(), Error> {
+        let read = |probe: &mut Self, register, mask| {
+            let reply = probe.read(register)?;
+            Ok(reply.data.bits() & mask != 0)
+        };
+        let timed_out = |probe: &mut Self| read(probe, ERROR_MAP, ERROR_TIME_OUT);
+        let enabled = |probe: &mut Self| read(probe, STATUS, status::ENABLED);
+        let before = self.known.cell(TIME_OUT);
+        if timed_out(self)? {
+            return Ok(());
+        }
+        self.write(MODE, Data::Short(0))?;
+        let was_enabled = enabled(self)?;
+        self.write(TIME_OUT, Data::Short(TIMED_OUT_AFTER))?;
+        let now = self.link.now();
+        self.listen(now + CYCLE)?;
+        let found = timed_out(self)?;
+        self.set_back(TIME_OUT, Data::Short((before & 0xFFFF) as u16))?;
+        if !found {
+            return Ok(());
+        }
+        self.write(CANCEL, Data::Short(0))?;
+        let stays = timed_out(self)?;
+        let again = enabled(self)?;
+        self.write(MODE, Data::Short(MODE_LOCK))?;
+        self.write(MODE, Data::Short(0))?;
+        match (stays, timed_out(self)?) {
+            (false, _) => self.known.settle("time-out-clear", "cancel"),
+            (true, false) => self.known.settle("time-out-clear", "lock"),
+            (true, true) => {
+                let node = self.known.axis.node;
+                return Err(Error::TimeOutStays { node });
+            }
+        }
+        // One that its lock has cleared was locked and released by that.
+        if !stays && was_enabled && enabled(self)? {
+            let word = if again { "no" } else { "yes" };
+            self.known.settle("enable-after-lock", word);
+        }
         Ok(())
     }
 

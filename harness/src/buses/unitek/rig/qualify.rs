@@ -43,6 +43,8 @@ enum Needs {
     Nothing,
     /// Motors may turn.
     Motion,
+    /// Motors may turn, and the time-out may be set.
+    MotionAndBusSettings,
     /// Identifiers may be changed, and not stored.
     BusSettings,
     /// The same, and where that shows nothing, the drive is switched off and on.
@@ -56,7 +58,7 @@ enum Needs {
 }
 
 /// What the probe of a property needs, and the conversation whose frames show it; nothing for those that are not listed.
-const NEEDS: [(&str, Needs, &str); 12] = [
+const NEEDS: [(&str, Needs, &str); 14] = [
     ("id-change", Needs::BusSettings, "write-identifier"),
     ("id-range", Needs::BusSettings, "write-identifier-range"),
     ("event-mask", Needs::PowerUp, ""),
@@ -64,6 +66,8 @@ const NEEDS: [(&str, Needs, &str); 12] = [
     ("power-up-mode", Needs::PowerUp, ""),
     ("lock-clears-command", Needs::Motion, "lock-and-commands"),
     ("homing-time", Needs::Motion, ""),
+    ("time-out-clear", Needs::MotionAndBusSettings, ""),
+    ("enable-after-lock", Needs::MotionAndBusSettings, ""),
     ("reply-delay", Needs::ExactTime, ""),
     ("interval-accuracy", Needs::ExactTime, ""),
     ("wide-replies", Needs::BusSettings, ""),
@@ -75,14 +79,16 @@ const NEEDS: [(&str, Needs, &str); 12] = [
 fn why_open(property: &Description, limits: &Limits) -> String {
     let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
     let why = match needs.map_or(Needs::Nothing, |(_, needs, _)| *needs) {
-        Needs::Motion if !limits.motion => {
+        Needs::Motion | Needs::MotionAndBusSettings if !limits.motion => {
             "not asked: this needs `allow_motion` in [limits] and --allow-motion"
         }
-        Needs::Motion => {
-            "the drive did not show it: its hardware enable is open, or it is not ready"
-        }
-        Needs::BusSettings | Needs::BusSettingsAndPowerUp if !limits.bus_settings => {
+        Needs::BusSettings | Needs::BusSettingsAndPowerUp | Needs::MotionAndBusSettings
+            if !limits.bus_settings =>
+        {
             "not asked: this needs `allow_bus_settings` in [limits]"
+        }
+        Needs::Motion | Needs::MotionAndBusSettings => {
+            "the drive did not show it: its hardware enable is open, or it is not ready"
         }
         Needs::BusSettingsAndPowerUp => {
             "it does not use them at once; whether it does later shows when it is switched on"

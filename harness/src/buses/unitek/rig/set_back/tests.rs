@@ -234,3 +234,20 @@ fn two_drives_are_qualified_one_after_the_other() {
         assert_eq!(run.notes(), Vec::<String>::new());
     }
 }
+
+/// A drive whose time-out nothing clears is not passed: the probe that has provoked it accuses the drive.
+#[test]
+fn a_time_out_that_nothing_clears_accuses_the_drive() {
+    let (mut run, _) = bench(ALL, &["drive 1 deviates errors-stay"], true);
+    let source = source("own", "title own\nbus unitek\ndrive 1\nread 1 1B");
+    let played = run.play(&source, None).expect("a rig");
+    assert_eq!(played.outcome.verdict, Verdict::Inconclusive);
+    let remarks = played.outcome.remarks.join("\n");
+    assert!(
+        remarks.contains("drive 1: its BUS-TIMEOUT stays"),
+        "{remarks}"
+    );
+    let notes = run.notes().join("\n");
+    let words = "drive 1: BUS-TIMEOUT was not there before: 8E does not clear it; `drivebench write 1 MODE=0x0004 MODE=0x0000 --move";
+    assert!(notes.contains(words), "{notes}");
+}
