@@ -4,7 +4,7 @@ use super::player::{Own, Player, stores};
 use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
-use super::set_back::set_back;
+use super::set_back::{left_changed, set_back};
 use super::{Session, axes, limits, rate};
 use crate::buses::Bus;
 use crate::buses::unitek::simulate::Bench;
@@ -103,6 +103,10 @@ impl PortPlayer for Player {
             self.note_stored();
         }
         set_back(self, session)
+    }
+
+    fn left_changed(&self, rig: &Rig) -> Vec<String> {
+        left_changed(self, rig)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

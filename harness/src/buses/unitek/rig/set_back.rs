@@ -59,6 +59,52 @@ pub(super) fn set_back(player: &Player, session: &mut Session) -> Vec<String> {
     notes
 }
 
+/// What is said of drives that were not seen in their safe state: what their registers held before those that may have been written were, and
+/// the command that writes it.
+pub(super) fn left_changed(player: &Player, rig: &Rig) -> Vec<String> {
+    let of_drive = |known: &Known| {
+        let before = held_before(known, player);
+        let moves = before.iter().any(|own| needs_motion(own.0));
+        let values = before.iter().map(|own| assignment(own.0, own.1));
+        let values = values.collect::<Vec<_>>().join(" ");
+        let (node, rig) = (known.axis.node, &rig.origin);
+        let moves = if moves { " --move" } else { "" };
+        let command = format!("drivebench write {node} {values}{moves} --rig {rig}");
+        let note =
+            format!("drive {node}: registers may be left changed; `{command}` sets them back");
+        (!before.is_empty()).then_some(note)
+    };
+    player.read_so_far().iter().filter_map(of_drive).collect()
+}
+
+/// What the registers held at first that may have been written, CAN_TIMEOUT before the others.
+fn held_before(known: &Known, player: &Player) -> Vec<(u8, u32)> {
+    let written = |register| player.written().contains(&(known.axis.rx, register));
+    // 83 has loaded all parameters.
+    let all = written(0x83);
+    let changed = |register: &u8| {
+        let access = Register::of(*register).access;
+        (all || written(*register))
+            && matches!(access, Access::RW | Access::SP)
+            && !COMMANDS.contains(register)
+    };
+    let before = known.first.iter().filter(|(register, _)| changed(register));
+    let mut before: Vec<_> = before.map(|(register, raw)| (*register, *raw)).collect();
+    before.sort_by_key(|(register, _)| *register != TIME_OUT);
+    before
+}
+
+/// A register and its value for `drivebench write`.
+fn assignment(register: u8, raw: u32) -> String {
+    let digits = digits(Register::of(register));
+    format!("0x{register:02X}=0x{raw:0digits$X}")
+}
+
+/// Whether `drivebench write` needs `--move` for a register.
+fn needs_motion(register: u8) -> bool {
+    matches!(class(register), Class::Motion | Class::EepromAndMotion)
+}
+
 /// How many hexadecimal digits a register has.
 const fn digits(register: &Register) -> usize {
     match register.width {
@@ -77,20 +123,8 @@ struct SetBack<'d, 'l> {
 impl SetBack<'_, '_> {
     /// Sets registers back that may have been written.
     fn registers(&mut self, known: &Known, player: &Player) -> Result<Vec<String>, Error> {
-        let written = |register| player.written().contains(&(self.axis.rx, register));
-        // 83 has loaded all parameters.
-        let all = written(0x83);
-        let changed = |register: &u8| {
-            let access = Register::of(*register).access;
-            (all || written(*register))
-                && matches!(access, Access::RW | Access::SP)
-                && !COMMANDS.contains(register)
-        };
-        let before = known.first.iter().filter(|(register, _)| changed(register));
-        let mut before: Vec<_> = before.map(|(register, raw)| (*register, *raw)).collect();
-        before.sort_by_key(|(register, _)| *register != TIME_OUT);
         let mut notes = Vec::new();
-        for (register, raw) in before {
+        for (register, raw) in held_before(known, player) {
             notes.extend(self.register(register, raw)?);
         }
         Ok(notes)
@@ -128,14 +162,16 @@ impl SetBack<'_, '_> {
 
     /// The command that writes a register.
     fn write(&self, register: u8, raw: u32) -> String {
-        let digits = digits(Register::of(register));
-        let moves = match class(register) {
-            Class::Motion | Class::EepromAndMotion => " --move",
-            _ => "",
+        let moves = if needs_motion(register) {
+            " --move"
+        } else {
+            ""
         };
         format!(
-            "drivebench write {} 0x{register:02X}=0x{raw:0digits$X}{moves} --rig {}",
-            self.axis.node, self.rig.origin
+            "drivebench write {} {}{moves} --rig {}",
+            self.axis.node,
+            assignment(register, raw),
+            self.rig.origin
         )
     }
 

@@ -251,3 +251,29 @@ fn a_time_out_that_nothing_clears_accuses_the_drive() {
     let words = "drive 1: BUS-TIMEOUT was not there before: 8E does not clear it; `drivebench write 1 MODE=0x0004 MODE=0x0000 --move";
     assert!(notes.contains(words), "{notes}");
 }
+
+/// A drive that uses a new bit rate at once is lost: the report says where it may be, and what its registers held.
+#[test]
+fn a_drive_that_is_lost_is_reported_with_what_it_held() {
+    let limits = format!("{ALL}bit_rate_way_back = \"a second adapter\"\n");
+    let (mut run, _) = bench(
+        &limits,
+        &["drive 1 property rate-change = immediate"],
+        false,
+    );
+    let text = "
+> 201 D4 44 33 22 11
+> 201 73 5C 40";
+    assert_eq!(play(&mut run, text), Verdict::Passed);
+    let over = run.over().unwrap_or_default();
+    assert!(over.contains("it may be at 250 kbit/s"), "{over}");
+    let end = Box::new(run).close(true);
+    let words = "drive 1: registers may be left changed; `drivebench write 1 ";
+    let own = end.remarks.iter().find(|own| own.starts_with(words));
+    let own = own.unwrap_or_else(|| panic!("{:?}", end.remarks));
+    assert!(own.contains("0x73=0x4025 "), "{own}");
+    assert!(
+        own.contains("0xD4=0x00000000 --move --rig desk.toml` sets them back"),
+        "{own}"
+    );
+}
