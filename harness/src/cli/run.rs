@@ -448,6 +448,24 @@ pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
 mod tests {
     use super::*;
 
+    /// A filter does not look at steps, although the first look at a text does.
+    #[test]
+    fn what_does_not_match_is_not_selected() {
+        let selected = |text: &str| {
+            let selection = Selection {
+                paths: Vec::new(),
+                filter: Some(text.to_owned()),
+            };
+            let entries = select_by(&selection, |source| Entry::new(source, None));
+            entries.expect("no mistakes").len()
+        };
+        assert_eq!(selected("10.5-silent-self-test"), 1);
+        let step = "read-byte 1 FE10";
+        let built_in = sources(&[]).expect("the built-in ones");
+        assert!(built_in.iter().any(|own| may_match(own, step)));
+        assert_eq!(selected(step), 0);
+    }
+
     /// No scenario that a filter selects is left unread.
     #[test]
     fn what_matches_may_match() {

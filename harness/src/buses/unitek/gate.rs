@@ -243,9 +243,22 @@ mod tests {
         assert_eq!(line.denying(), [LimitSetting::Motion]);
         assert!(!line.permits(0, Out::Frames(&[frame("201#310100")])));
         assert!(!line.permits(0, Out::Octets(&[0x88])));
+        let idle = |line: &mut Guarded<Bench>| {
+            while line.inner().busy() && line.wait(Instant::NEVER) {}
+        };
+        idle(&mut line);
         let carried = line.inner().carried();
         line.send(0, Out::Octets(&[0x88]));
         assert_eq!(line.inner().carried(), carried);
+        // Behind a denial nothing passes, whatever is permitted, until it is reset.
+        let passes = |line: &mut Guarded<Bench>| {
+            line.send(0, Out::Frames(&[frame("201#3D4000")]));
+            idle(line);
+            line.inner().carried() > carried
+        };
+        assert!(!passes(&mut line));
+        line.reset_after_denial();
+        assert!(passes(&mut line));
     }
 
     #[test]

@@ -424,6 +424,9 @@ mod tests {
         assert_eq!(differs.judged(), Verdict::Inconclusive);
         differs.failed = true;
         assert_eq!(differs.judged(), Verdict::Failed);
+        let mut open = played();
+        open.note_open("the run ended before everything was played".to_owned());
+        assert_eq!(open.judged(), Verdict::Inconclusive);
     }
 
     #[test]
