@@ -165,6 +165,26 @@ pub struct Trace {
     pub channels: Vec<Channel>,
     /// The remarks in order of time; at one instant, in order of the stations on the bus.
     pub remarks: Vec<Remark>,
+    /// Where times do not go on, in order.
+    pub seams: Vec<Seam>,
+}
+
+/// A place in a trace of frames where times do not go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seam {
+    /// The first frame behind it, counted from 0.
+    pub piece: usize,
+    /// What is there.
+    pub kind: SeamKind,
+}
+
+/// Why times do not go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SeamKind {
+    /// The clock was set: no frame is missing.
+    ClockSet,
+    /// A new recording begins: what was on the bus before is not known.
+    Recording,
 }
 
 impl Trace {
@@ -244,6 +264,7 @@ mod tests {
                 at: at(9),
                 bits: 1,
             }],
+            ..Trace::default()
         };
         trace.count_from(Span::from_millis(3));
         assert_eq!(trace.channels[0].octets()[0].at, at(0));

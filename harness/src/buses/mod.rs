@@ -315,13 +315,14 @@ pub(crate) struct JudgedFrames {
     pub(crate) remarks: Vec<String>,
 }
 
-/// Judges a capture of a shared line; `setup` describes the drives.
+/// Judges a capture of a shared line; `setup` describes the drives, and times may be off by `tolerance`.
 ///
 /// # Errors
 /// It does not say enough of the drives, in a sentence.
 pub(crate) fn judge_shared(
     traces: &[Trace],
     setup: Option<&Source>,
+    tolerance: Span,
 ) -> Result<JudgedFrames, String> {
     match shared(traces) {
         Some(Bus::Nordac) if setup.is_some() => Err(
@@ -329,8 +330,8 @@ pub(crate) fn judge_shared(
              leave it out"
                 .to_owned(),
         ),
-        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces)),
-        _ => unitek::capture::judged(traces, setup),
+        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces, tolerance)),
+        _ => unitek::capture::judged(traces, setup, tolerance),
     }
 }
 

@@ -23,6 +23,8 @@ pub struct FrameSummary {
     pub late: usize,
     /// The largest distance of times.
     pub apart: Span,
+    /// Whether times are not compared: they do not go on somewhere on one side.
+    pub untimed: bool,
 }
 
 impl FrameSummary {
@@ -42,6 +44,11 @@ impl FrameSummary {
         }
         if self.alone.len() > LISTED {
             let _infallible = writeln!(text, "... and {} more", self.alone.len() - LISTED);
+        }
+        if self.untimed {
+            text.push_str(
+                "times not compared: a clock was set in one of them, or recordings are joined\n",
+            );
         }
         let same = if self.same() { "same: " } else { "differ: " };
         let _infallible = writeln!(
@@ -63,7 +70,11 @@ impl FrameSummary {
 #[must_use]
 pub fn frame_diff(left: &Capture, right: &Capture, tolerance: Span) -> FrameSummary {
     let sides = [frames(left), frames(right)];
-    let mut summary = FrameSummary::default();
+    let seams = |own: &Capture| own.traces.iter().any(|trace| !trace.seams.is_empty());
+    let mut summary = FrameSummary {
+        untimed: seams(left) || seams(right),
+        ..FrameSummary::default()
+    };
     let mut at = [0, 0];
     while at[0] < sides[0].len() || at[1] < sides[1].len() {
         let (left, right) = (sides[0].get(at[0]), sides[1].get(at[1]));
@@ -94,6 +105,9 @@ pub fn frame_diff(left: &Capture, right: &Capture, tolerance: Span) -> FrameSumm
 impl FrameSummary {
     fn meet(&mut self, left: Span, right: Span, tolerance: Span) {
         self.common += 1;
+        if self.untimed {
+            return;
+        }
         let apart = left.max(right).saturating_sub(left.min(right));
         self.apart = self.apart.max(apart);
         self.late += usize::from(apart > tolerance);

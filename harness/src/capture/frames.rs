@@ -1,6 +1,7 @@
 //! Captures of frames: link type 227 of pcapng, the log of candump, the JSON of `drivebench trace`.
 
 use super::import::Logged;
+use super::order::{Counts, Place, ordered};
 use super::telegrams::LATEST;
 use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
 use crate::buses::sender_of;
@@ -8,13 +9,10 @@ use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
 use harness_proto::can::{BitRate, CanError, Frame, Id};
 use harness_proto::line::Rate;
-use harness_proto::time::{Instant, Span};
+use harness_proto::time::Span;
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-
-/// The longest time, in nanoseconds, that is one since the start, and not one since 1970: a day.
-const DAY: u64 = 86_400_000_000_000;
 
 /// Who sent a frame, as far as the file says it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,38 +43,38 @@ pub(super) struct FrameRead {
     pub(super) sender: Sender,
     pub(super) frame: Frame,
     pub(super) ended: FrameEnd,
+    pub(super) place: Place,
 }
 
-/// The capture of these frames.
-pub(super) fn assemble(mut frames: Vec<FrameRead>, rate: Option<BitRate>) -> Capture {
+/// The capture of these frames, which are in the order of their file.
+pub(super) fn assemble(frames: Vec<FrameRead>, counts: Counts, rate: Option<BitRate>) -> Imported {
     let rate = rate.unwrap_or(BitRate::K500);
     let length = |frame: &Frame| rate.time_of(frame.wire_bits());
-    // Frames of one time are in order already; other tools may write packets late.
-    frames.sort_by_key(|own| own.nanos);
-    let base = frames.first().filter(|first| first.nanos > DAY);
-    let base = base.map_or(0, |first| first.nanos - length(&first.frame).as_nanos());
-    let line = frames.iter().map(|own| {
-        let at = Instant::START + Span::from_nanos(own.nanos - base);
-        LineFrame {
-            from: match own.sender {
-                Sender::Known(from) => from,
-                Sender::ByIdentifier => sender_of(&own.frame),
-            },
-            start: at - length(&own.frame),
-            at,
-            frame: own.frame,
-            ended: own.ended,
-        }
+    let ordered = ordered(frames, counts, |own| length(&own.frame));
+    let line = ordered.frames.into_iter().map(|(at, own)| LineFrame {
+        from: match own.sender {
+            Sender::Known(from) => from,
+            Sender::ByIdentifier => sender_of(&own.frame),
+        },
+        start: at - length(&own.frame),
+        at,
+        frame: own.frame,
+        ended: own.ended,
     });
     let line: Vec<_> = line.collect();
     let drives: BTreeSet<u8> = line.iter().filter_map(|own| own.from).collect();
-    Capture {
+    let capture = Capture {
         rate: Rate::default(),
         traces: vec![Trace {
             channels: vec![Channel::of_frames(line)],
+            seams: ordered.seams,
             ..Trace::empty(u8::try_from(drives.len()).unwrap_or(u8::MAX))
         }],
         listened: None,
+    };
+    Imported {
+        notes: ordered.notes,
+        ..capture.into()
     }
 }
 
@@ -150,7 +148,8 @@ pub(super) fn candump(bytes: &[u8], links: &[NamedLink]) -> Result<Imported, Cap
         })?;
         errors += usize::from(read.is_none());
         let interface = line.split_whitespace().nth(1).unwrap_or_default();
-        frames.extend(read.map(|own| (interface, own)));
+        let place = Place::of(number + 1);
+        frames.extend(read.map(|own| (interface, FrameRead { place, ..own })));
     }
     let mut notes = Vec::new();
     if errors > 0 {
@@ -160,11 +159,9 @@ pub(super) fn candump(bytes: &[u8], links: &[NamedLink]) -> Result<Imported, Cap
         ));
     }
     let frames = one_bus(frames, links, &mut notes)?;
-    let capture = assemble(frames, None);
-    Ok(Imported {
-        notes,
-        ..capture.into()
-    })
+    let imported = assemble(frames, Counts::Lines, None);
+    notes.extend(imported.notes);
+    Ok(Imported { notes, ..imported })
 }
 
 /// The capture of a log in ASC, of which the times may be before 0.
@@ -189,11 +186,9 @@ pub(super) fn asc(
         frames.push((own.channel.as_str(), FrameRead { nanos, ..own.frame }));
     }
     let frames = one_bus(frames, links, &mut notes)?;
-    let capture = assemble(frames, None);
-    Ok(Imported {
-        notes,
-        ..capture.into()
-    })
+    let imported = assemble(frames, Counts::Lines, None);
+    notes.extend(imported.notes);
+    Ok(Imported { notes, ..imported })
 }
 
 /// The frames of one interface: that which `links` names, or the only one.
@@ -265,7 +260,29 @@ fn logged(line: &str) -> Result<Option<FrameRead>, String> {
         sender: Sender::ByIdentifier,
         frame,
         ended: FrameEnd::Good,
+        place: Place::default(),
     }))
+}
+
+/// Puts logs in order of time where each ends before another one begins.
+pub(super) fn in_order_of_time<L: AsRef<[u8]>>(logs: &mut [L]) {
+    let span = |log: &L| {
+        let text = String::from_utf8_lossy(log.as_ref());
+        let times = text.lines().filter_map(|line| logged(line.trim()).ok()?);
+        times.map(|own| own.nanos).fold(None, |span, at| {
+            let (first, last) = span.unwrap_or((at, at));
+            Some((at.min(first), at.max(last)))
+        })
+    };
+    let mut spans: Vec<_> = logs.iter().map(span).collect();
+    spans.sort_unstable();
+    let follow = |two: &[Option<(u64, u64)>]| match (two[0], two[1]) {
+        (Some((_, last)), Some((first, _))) => last <= first,
+        _ => true,
+    };
+    if spans.windows(2).all(follow) {
+        logs.sort_by_cached_key(span);
+    }
 }
 
 /// Seconds with up to nine places, in nanoseconds.
@@ -313,18 +330,21 @@ pub(super) fn is_json(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// What is wrong, and at which frame.
-pub(super) fn json(bytes: &[u8]) -> Result<Capture, CaptureError> {
+pub(super) fn json(bytes: &[u8]) -> Result<Imported, CaptureError> {
     let object: Object = serde_json::from_slice(bytes).map_err(|error| CaptureError::Link {
         place: format!("line {}, column {}", error.line(), error.column()),
         what: format!("{error}"),
     })?;
     let frames = object.frames.iter().enumerate().map(|(number, own)| {
-        own.read().map_err(|what| CaptureError::Link {
+        let place = Place::of(number + 1);
+        let read = own.read().map(|own| FrameRead { place, ..own });
+        read.map_err(|what| CaptureError::Link {
             place: format!("frame {}", number + 1),
             what,
         })
     });
-    Ok(assemble(frames.collect::<Result<_, _>>()?, None))
+    let frames = frames.collect::<Result<_, _>>()?;
+    Ok(assemble(frames, Counts::Frames, None))
 }
 
 impl FrameObject {
@@ -355,6 +375,7 @@ impl FrameObject {
             sender: Sender::Known(from.ok_or("`from` is \"master\" or a drive's number")?),
             frame: frame.map_err(|bad| bad.to_string())?,
             ended: ended.ok_or("`fault` is null, \"lost\", or the name of an error")?,
+            place: Place::default(),
         })
     }
 }
@@ -363,6 +384,7 @@ impl FrameObject {
 mod tests {
     use super::*;
     use crate::report::pcapng_frames;
+    use harness_proto::time::Instant;
 
     fn frames(capture: &Capture) -> &[LineFrame] {
         capture.traces[0].channels[0].frames()
@@ -446,8 +468,9 @@ mod tests {
                 sender: Sender::Known(*from),
                 frame: frame(text),
                 ended: *ended,
+                place: Place::default(),
             });
-        assemble(read.collect(), None)
+        assemble(read.collect(), Counts::Frames, None).capture
     }
 
     #[test]

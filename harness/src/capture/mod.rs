@@ -15,6 +15,7 @@ mod frames;
 pub mod fuzz;
 mod import;
 pub(crate) mod live;
+mod order;
 mod pcap;
 mod pcapng;
 mod recorder;
@@ -243,6 +244,7 @@ impl Assembly {
                 stations: drives,
                 channels: channels.collect(),
                 remarks,
+                seams: Vec::new(),
             });
         }
         let mut capture = Capture {

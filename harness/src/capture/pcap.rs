@@ -1,7 +1,7 @@
 //! Captures in pcap, the format before pcapng: one interface without a name, times in microseconds or nanoseconds.
 
 use super::pcapng::{Reader, finish, nanoseconds};
-use super::{Capture, CaptureError};
+use super::{CaptureError, Imported};
 use crate::report::pcapng::{LINK_TYPE, NANOSECONDS};
 use crate::report::pcapng_frames;
 use harness_proto::line::Rate;
@@ -35,7 +35,7 @@ pub(super) fn read(
     bytes: &[u8],
     rate: Option<Rate>,
     link: Option<&str>,
-) -> Result<Capture, CaptureError> {
+) -> Result<Imported, CaptureError> {
     let mut reader = Reader::new(bytes);
     let Some((big, resolution)) = kind(bytes) else {
         return reader.wrong(0, "no magic number of pcap is here");

@@ -13,6 +13,7 @@ mod values;
 pub(super) use values::nanoseconds;
 
 use super::frames::{FrameRead, Sender, assemble, packet};
+use super::order::{Counts, Place};
 use super::telegrams::{self, DAY};
 use super::{Assembly, Capture, CaptureError, Imported, NamedLink, ends, line_byte};
 use crate::buses;
@@ -87,10 +88,13 @@ pub(crate) fn read(
         offset = reader.block(offset)?;
     }
     let events = std::mem::take(&mut reader.events);
-    let imported = Imported::from(finish(reader, rate, links)?);
+    let imported = finish(reader, rate, links)?;
+    let lost = events.iter().any(|own| means_loss(own));
+    let mut notes = noted(events);
+    notes.extend(imported.notes);
     Ok(Imported {
-        lost: events.iter().any(|own| means_loss(own)),
-        notes: noted(events),
+        lost,
+        notes,
         ..imported
     })
 }
@@ -100,7 +104,7 @@ pub(super) fn finish(
     reader: Reader<'_>,
     rate: Option<Rate>,
     links: &[NamedLink],
-) -> Result<Capture, CaptureError> {
+) -> Result<Imported, CaptureError> {
     if reader.parts.is_empty() {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
@@ -131,19 +135,19 @@ pub(super) fn finish(
                 Carries::Link(..) | Carries::Frames(_) | Carries::Line => None,
             });
             let octets = octets.map(|(_, from, own)| (from, own)).collect();
-            return Ok(telegrams::assemble(senders, octets, octet));
+            return Ok(telegrams::assemble(senders, octets, octet).into());
         }
         Part::Line(_) => {
             let mut octets: Vec<_> = octets.map(|(_, _, own)| own).collect();
             octets.sort_by_key(|own| own.nanos);
             let senders = buses::senders(&octets, octet);
             let sent = senders.into_iter().zip(octets).collect();
-            return Ok(telegrams::assemble(std::iter::empty(), sent, octet));
+            return Ok(telegrams::assemble(std::iter::empty(), sent, octet).into());
         }
         Part::Senders | Part::Frames(_) => {
             let frames = reader.frames.into_iter().filter(|own| own.0 == wanted);
             let frames = frames.map(|(_, own)| own).collect();
-            return Ok(assemble(frames, reader.bit_rate));
+            return Ok(assemble(frames, Counts::Packets, reader.bit_rate));
         }
     }
     let byte_time = rate.or(reader.speed).unwrap_or_default().byte_time();
@@ -175,10 +179,11 @@ pub(super) fn finish(
     let listened = listened.map(|(first, own)| listened_to(own, first, base));
     let rate = rate.or(reader.speed);
     let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
-    Ok(Capture {
+    let capture = Capture {
         listened,
         ..capture
-    })
+    };
+    Ok(capture.into())
 }
 
 pub(super) struct Reader<'b> {
@@ -189,6 +194,8 @@ pub(super) struct Reader<'b> {
     interfaces: Vec<Option<Interface>>,
     /// The first interface of the present section.
     section: usize,
+    /// Packets so far.
+    packets: usize,
     speed: Option<Rate>,
     bit_rate: Option<BitRate>,
     found: Vec<Byte>,
@@ -211,6 +218,7 @@ impl<'b> Reader<'b> {
             big: false,
             interfaces: Vec::new(),
             section: 0,
+            packets: 0,
             speed: None,
             bit_rate: None,
             found: Vec::new(),
@@ -422,6 +430,7 @@ impl<'b> Reader<'b> {
         (interface, nanos): (usize, u64),
         (data, captured, end): (usize, usize, usize),
     ) -> Result<(), CaptureError> {
+        self.packets += 1;
         let Some(Some(known)) = self.interfaces.get(interface) else {
             return Ok(());
         };
@@ -521,6 +530,10 @@ impl<'b> Reader<'b> {
             Ok(found) => found,
             Err(what) => return self.wrong(data, what),
         };
+        let place = Place {
+            section: self.section,
+            ..Place::of(self.packets)
+        };
         if found.is_none() {
             self.events.extend(comment.map(Cow::into_owned));
         }
@@ -530,6 +543,7 @@ impl<'b> Reader<'b> {
                 sender,
                 frame,
                 ended,
+                place,
             };
             (part, read)
         }));

@@ -363,8 +363,9 @@ pub struct ImportArguments {
     /// the first value that they report for each cell.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     pub setup: Option<PathBuf>,
-    /// Permitted difference of times, such as 2ms for a real clock; by default 2 ns.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    /// How far the time of a byte, frame or telegram may be off, such as 2ms for a real clock, or 16ms where a computer stamps what a USB
+    /// adapter gives it; by default 2 ns.
+    #[arg(long, value_name = "TIME", value_parser = duration, conflicts_with = "format")]
     pub tolerance: Option<Duration>,
     /// How the file is read.
     #[command(flatten)]

@@ -184,7 +184,11 @@ fn of_shared_line(
 ) -> std::io::Result<Exit> {
     let path = title;
     if !arguments.scenario {
-        return match buses::judge_shared(&capture.traces, setup) {
+        // Times of a log are those of the bus unless the user says how far they are off.
+        let tolerance = arguments
+            .tolerance
+            .map_or(Span::ZERO, |_| span(arguments.tolerance));
+        return match buses::judge_shared(&capture.traces, setup, tolerance) {
             Ok(judged) => {
                 let verdict = settled(judged.verdict, lost, output);
                 let judged = JudgedFrames { verdict, ..judged };
@@ -195,6 +199,12 @@ fn of_shared_line(
                 Ok(Exit::Usage)
             }
         };
+    }
+    if arguments.tolerance.is_some() {
+        output.complain(
+            "--tolerance changes nothing in a scenario of frames or telegrams: each is sent at its own time; leave it out",
+        );
+        return Ok(Exit::Usage);
     }
     match buses::shared_scenario(&capture.traces, title, setup) {
         Some(Ok(text)) => write_scenario(&text, arguments, output),

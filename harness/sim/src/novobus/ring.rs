@@ -585,6 +585,7 @@ impl<D: Device> Ring<D> {
             stations: drives,
             channels: channels.collect(),
             remarks,
+            seams: Vec::new(),
         }
     }
 }

@@ -63,7 +63,7 @@ pub(crate) fn scenario(
 }
 
 /// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history.
-pub(crate) fn judged(traces: &[Trace]) -> JudgedFrames {
+pub(crate) fn judged(traces: &[Trace], tolerance: Span) -> JudgedFrames {
     let mut all = JudgedFrames {
         verdict: Verdict::Passed,
         compared: 0,
@@ -72,7 +72,7 @@ pub(crate) fn judged(traces: &[Trace]) -> JudgedFrames {
     };
     let mut in_doubt = false;
     for trace in traces {
-        let judged = judge(trace);
+        let judged = judge(trace, tolerance);
         all.compared += judged.compared;
         in_doubt |= !judged.doubts.is_empty();
         all.remarks.extend(judged.doubts);

@@ -1,7 +1,7 @@
 //! Captures: judged, and made into a scenario, in which what hosts have sent is sent again at its time and what drives have sent is
 //! expected.
 
-use super::judge::{Breach, judge, judge_guessed};
+use super::judge::{Breach, FrameSymptom, HeardFrames, judge, judge_guessed};
 use super::language::{identifier, written};
 use super::serve::bench;
 use crate::buses::JudgedFrames;
@@ -9,7 +9,7 @@ use crate::report::pcapng_frames::rate_of;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, CanError, Frame};
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
@@ -85,17 +85,26 @@ pub(crate) fn scenario(
 ///
 /// # Errors
 /// A drive has other identifiers and there is no `setup`, in a sentence with the remedy; or the setup has mistakes.
-pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedFrames, String> {
+pub(crate) fn judged(
+    traces: &[Trace],
+    setup: Option<&Source>,
+    tolerance: Span,
+) -> Result<JudgedFrames, String> {
     let channels = traces.iter().flat_map(|trace| &trace.channels);
     let frames: Vec<LineFrame> = channels
         .flat_map(|own| own.frames().iter().copied())
         .collect();
+    let heard = HeardFrames {
+        frames: &frames,
+        seams: traces.first().map_or(&[], |trace| &trace.seams),
+        tolerance,
+    };
     let judged = match setup {
         Some(setup) => {
             let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
             let drives = plan.setup.drives.iter();
             let drives = drives.map(|own| (own.node, own.identifiers));
-            judge(&frames, &drives.collect::<Vec<_>>())
+            judge(heard, &drives.collect::<Vec<_>>())
         }
         None => {
             let all: Vec<&LineFrame> = frames.iter().collect();
@@ -105,7 +114,7 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
             };
             let nodes = nodes(&all)?;
             let drives = nodes.into_iter().map(own);
-            judge_guessed(&frames, &drives.collect::<Vec<_>>())
+            judge_guessed(heard, &drives.collect::<Vec<_>>())
         }
     };
     let difference = |own: &Breach| {
@@ -117,6 +126,16 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
     let mut remarks = judged.remarks;
     let in_doubt = !judged.doubts.is_empty();
     remarks.extend(judged.doubts);
+    let only_times = judged
+        .breaches
+        .iter()
+        .all(|own| own.what == FrameSymptom::Time);
+    if !judged.breaches.is_empty() && only_times && tolerance == Span::ZERO {
+        remarks.push(
+            "only times differ: where a computer stamps what an adapter gives it, --tolerance says how far they may be off, such as 16ms"
+                .to_owned(),
+        );
+    }
     if judged.compared == 0 {
         remarks.push("nothing was compared: no frame of a drive is in it".to_owned());
     }
@@ -160,6 +179,13 @@ fn expected(frame: &Frame) -> String {
     text
 }
 
+/// Whether a frame shows that its node is a drive, and no other device with an identifier of that range: a drive sends 4 or 6 bytes, and
+/// hosts send it 3 or 5 (UNITEK 4.5).
+fn is_telling(own: &LineFrame) -> bool {
+    let lengths = if own.from.is_some() { [4, 6] } else { [3, 5] };
+    !own.frame.is_remote() && lengths.contains(&own.frame.dlc())
+}
+
 /// The numbers of the drives, by the identifiers on which they send and receive.
 fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
     let mut nodes = BTreeSet::new();
@@ -174,7 +200,8 @@ fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
         let fits = |node: &u16| own.from.is_none_or(|drive| u16::from(drive) == *node);
         let node = node.filter(|node| (1..=MOST_NODES).contains(node) && fits(node));
         match (node, own.from) {
-            (Some(node), _) => drop(nodes.insert(node)),
+            (Some(node), _) if is_telling(own) => drop(nodes.insert(node)),
+            (Some(_), _) => {}
             // A host may speak to others.
             (None, None) => {}
             (None, Some(drive)) => {

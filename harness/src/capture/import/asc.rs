@@ -3,6 +3,7 @@
 //! | line | meaning |
 //! |---|---|
 //! | `date Mon Nov 23 10:00:00.000 am 2026` | passed over |
+//! | `Begin Triggerblock` | another recording: what was on the bus before it is not in the log |
 //! | `base hex  timestamps absolute` | the radix of identifiers and bytes; `relative` times count from the event before |
 //! | `0.001000 1  201x  Rx  d 3 3D 40 00 ...` | time, channel, identifier with `x` for 29 bits, direction, `d` data or `r` remote, length, bytes |
 //! | `0.002000 1  ErrorFrame` | passed over and counted |
@@ -11,6 +12,7 @@
 
 use super::super::CaptureError;
 use super::super::frames::{FrameRead, Sender};
+use super::super::order::Place;
 use super::numbers::{Time, seconds};
 use harness_proto::can::{Frame, Id};
 use harness_sim::record::FrameEnd;
@@ -42,6 +44,8 @@ struct Reader {
     /// The time of the event before.
     before: Time,
     errors: usize,
+    /// Lines so far, and blocks: a trigger begins and ends each of them.
+    place: Place,
 }
 
 /// The frames of a log, and what is to be told about it.
@@ -55,10 +59,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Logged>, Vec<String>), CaptureEr
         relative: false,
         before: 0,
         errors: 0,
+        place: Place::default(),
     };
     let mut frames = Vec::new();
     let mut notes = Vec::new();
     for (number, line) in text.lines().enumerate() {
+        reader.place.number = number + 1;
         frames.extend(reader.line(line).map_err(|what| {
             let shown: String = line.trim().chars().take(60).collect();
             CaptureError::Link {
@@ -88,6 +94,12 @@ impl Reader {
                     _ => return Err("`base hex` or `base dec` is expected".to_owned()),
                 };
                 self.relative = rest.contains(&"relative");
+                Ok(None)
+            }
+            // Also that of another log, joined to this one.
+            ["date", ..] | ["Begin", ..] => {
+                self.place.recording += 1;
+                self.before = 0;
                 Ok(None)
             }
             [time, rest @ ..] => match seconds(time).filter(|_| time.contains('.')) {
@@ -165,6 +177,7 @@ impl Reader {
             sender: Sender::ByIdentifier,
             frame: frame.map_err(|bad| bad.to_string())?,
             ended: FrameEnd::Good,
+            place: self.place,
         };
         Ok(Some(Logged {
             channel: (*channel).to_owned(),

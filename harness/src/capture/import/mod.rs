@@ -137,7 +137,7 @@ const FORMATS: [Format; 16] = [
         pcap::recognised,
         |bytes, settings| {
             let link = settings.links.first().map(|own| own.link.as_str());
-            Ok(pcap::read(bytes, settings.rate, link)?.into())
+            pcap::read(bytes, settings.rate, link)
         },
     ),
     whole(
@@ -149,7 +149,7 @@ const FORMATS: [Format; 16] = [
     whole(
         "frames in JSON",
         |bytes| first(bytes) == Some(b'{') && frames::is_json(bytes),
-        |bytes, _| Ok(frames::json(bytes)?.into()),
+        |bytes, _| frames::json(bytes),
     )
     .of(Parts::Objects),
     whole(
@@ -168,7 +168,7 @@ const FORMATS: [Format; 16] = [
     })
     .of(Parts::Lines),
     whole("frames in csv", own::is_frames, |bytes, _| {
-        Ok(own::frames(bytes)?.into())
+        own::frames(bytes)
     })
     .of(Parts::Lines),
     whole("telegrams in csv", own::is_telegrams, own::telegrams).of(Parts::Lines),
@@ -352,7 +352,10 @@ pub(super) fn read_files(
             if let Some(twice) = twice {
                 return Err(wrong(twice));
             }
-            let all: Vec<_> = files.iter().map(|own| &own.1[..]).collect();
+            let mut all: Vec<_> = files.iter().map(|own| &own.1[..]).collect();
+            if first.parts == Parts::Lines {
+                frames::in_order_of_time(&mut all);
+            }
             let imported = read(&all.concat(), settings)?;
             notes.extend(imported.notes);
             Ok(Imported { notes, ..imported })

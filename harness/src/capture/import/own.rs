@@ -1,6 +1,7 @@
 //! The tables that `trace --format csv` writes. Columns that say in words what the others say are passed over.
 
 use super::super::frames::{FrameRead, Sender, assemble};
+use super::super::order::{Counts, Place};
 use super::super::telegrams::{self, LATEST};
 use super::super::{Assembly, Capture, CaptureError, ends, line_byte};
 use super::table::{Table, columns, first_line};
@@ -122,7 +123,7 @@ fn station(table: &Table<'_>, column: usize) -> Result<Option<u8>, CaptureError>
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn frames(bytes: &[u8]) -> Result<Capture, CaptureError> {
+pub(super) fn frames(bytes: &[u8]) -> Result<Imported, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, id, remote, dlc, data, ended] = places(&table, FRAMES)?;
     let mut frames = Vec::new();
@@ -148,9 +149,10 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Capture, CaptureError> {
             sender,
             frame,
             ended,
+            place: Place::of(table.line()),
         });
     }
-    Ok(assemble(frames, None))
+    Ok(assemble(frames, Counts::Lines, None))
 }
 
 /// Reads a table of telegrams. Their octets follow each other without a gap, at the rate that is given or at the bus's usual one.

@@ -101,9 +101,15 @@ impl<'b> Table<'b> {
         String::from_utf8_lossy(self.raw(column))
     }
 
+    /// The line on which the row begins.
+    pub(super) fn line(&self) -> usize {
+        let line = self.record.position().map_or(1, csv::Position::line);
+        usize::try_from(line).unwrap_or(usize::MAX)
+    }
+
     /// An error in the row.
     pub(super) fn wrong(&self, what: impl Into<String>) -> CaptureError {
-        let line = self.record.position().map_or(1, csv::Position::line);
+        let line = self.line();
         CaptureError::Link {
             place: format!("line {line}"),
             what: what.into(),

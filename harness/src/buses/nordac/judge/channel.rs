@@ -5,7 +5,22 @@ use harness_proto::nordac::{Parameter, Pkw};
 
 /// The tasks of an exchange since its start.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tasks(Vec<Pkw>);
+pub(super) struct Tasks {
+    sent: Vec<Pkw>,
+    before: Before,
+}
+
+/// The answer to a task of the time before, which a slave shows until it has answered another one (3.4).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Before {
+    /// No answer was compared yet.
+    #[default]
+    Unknown,
+    /// It may be this one.
+    Shown(Pkw),
+    /// It is over.
+    Over,
+}
 
 /// Tasks that are kept at most; beyond them nothing is compared.
 const MOST: usize = 2_000;
@@ -22,14 +37,29 @@ const CONTROL_WORD: u16 = 967;
 impl Tasks {
     /// A task goes out.
     pub(super) fn push(&mut self, task: Pkw) {
-        if self.0.last() != Some(&task) && self.0.len() <= MOST {
-            self.0.push(task);
+        if self.sent.last() != Some(&task) && self.sent.len() <= MOST {
+            self.sent.push(task);
         }
     }
 
     /// What is wrong with an answer, and the section; `None` if a right inverter can send it.
-    pub(super) fn wrong(&self, answer: Pkw) -> Option<(&'static str, String)> {
-        if self.0.len() > MOST {
+    pub(super) fn wrong(&mut self, answer: Pkw) -> Option<(&'static str, String)> {
+        let answers = |own: &Pkw| own.number() == answer.number() && own.ak() != 0;
+        let earlier = answer.ak() != 0 && !self.sent.iter().any(answers);
+        let same = |own: Pkw| (own.pke, own.ind) == (answer.pke, answer.ind);
+        self.before = match self.before {
+            Before::Unknown if earlier => Before::Shown(answer),
+            Before::Shown(own) if earlier && same(own) => Before::Shown(answer),
+            _ => Before::Over,
+        };
+        match self.before {
+            Before::Over => self.unlike_all(answer),
+            _ => None,
+        }
+    }
+
+    fn unlike_all(&self, answer: Pkw) -> Option<(&'static str, String)> {
+        if self.sent.len() > MOST {
             return None;
         }
         if answer.ak() == 0 {
@@ -37,7 +67,7 @@ impl Tasks {
             return (!zero).then(|| ("3.4.1", format!("{answer} is no answer, and is not zero")));
         }
         let of_number = |own: &&Pkw| own.number() == answer.number() && own.ak() != 0;
-        let mut asked = self.0.iter().filter(of_number).peekable();
+        let mut asked = self.sent.iter().filter(of_number).peekable();
         if asked.peek().is_none() {
             return Some(("3.4.1", format!("{answer} answers no task that was sent")));
         }
@@ -130,9 +160,32 @@ impl Tasks {
     fn changes(&self, number: u16) -> usize {
         let loads = |own: &&Pkw| [970, 1602].contains(&own.number());
         let own = |task: &&Pkw| task.number() == number && task.task().is_change();
-        self.0
+        self.sent
             .iter()
             .filter(|task| own(task) || loads(task))
             .count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// NORDAC 3.4: a slave shows the answer to a task of the exchange before until it has answered one of this; no other task explains an
+    /// answer, and an earlier one does not come back.
+    #[test]
+    fn an_answer_to_an_earlier_task() {
+        let (earlier, own) = (Pkw::of(1, 1801, 0, 7), Pkw::of(1, 1800, 0, 9));
+        let mut tasks = Tasks::default();
+        tasks.push(Pkw::of(1, 1800, 0, 0));
+        for answer in [earlier, earlier, own, own] {
+            assert_eq!(tasks.wrong(answer), None, "{answer}");
+        }
+        let again = tasks.wrong(earlier).expect("a difference");
+        assert_eq!(again.0, "3.4.1");
+        let mut tasks = Tasks::default();
+        assert_eq!(tasks.wrong(earlier), None);
+        let other = tasks.wrong(Pkw::of(1, 1202, 0, 7)).expect("a difference");
+        assert!(other.1.contains("answers no task"), "{}", other.1);
     }
 }

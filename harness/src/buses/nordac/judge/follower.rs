@@ -346,7 +346,7 @@ impl Follower {
         self.inputs(&image, known.is_some() && ppo.has_pkw())
     }
 
-    fn inputs(&self, image: &Image, tasks: bool) -> Found {
+    fn inputs(&mut self, image: &Image, tasks: bool) -> Found {
         let [zsw, actual, third, _, rest @ ..] = image.words;
         if let Some((section, rule)) = wrong_status(zsw, actual) {
             return Some((

@@ -65,25 +65,28 @@ struct Asked {
 }
 
 /// Judges what the slaves of a line sent, in a capture that may begin in mid-conversation: its first octets may be the end of a telegram,
-/// or the reply to a request that was not heard.
+/// or the reply to a request that was not heard. Times may be off by `tolerance`.
 #[must_use]
-pub fn judge(trace: &Trace) -> JudgedSlaves {
+pub fn judge(trace: &Trace, tolerance: Span) -> JudgedSlaves {
     let runs = runs(trace);
     let senders = Sender::of_all(&runs);
-    judge_from(true, runs.into_iter().zip(senders))
+    judge_from(Some(tolerance), runs.into_iter().zip(senders))
 }
 
 /// The same of octets that stations sent without a pause, from the first telegram of the line on.
 pub(in crate::buses::nordac) fn judge_runs(
     runs: impl IntoIterator<Item = TelegramRun>,
 ) -> JudgedSlaves {
-    judge_from(false, runs.into_iter().map(|own| (own, Sender::Known)))
+    judge_from(None, runs.into_iter().map(|own| (own, Sender::Known)))
 }
 
-fn judge_from(midway: bool, runs: impl IntoIterator<Item = (TelegramRun, Sender)>) -> JudgedSlaves {
+fn judge_from(
+    recorded: Option<Span>,
+    runs: impl IntoIterator<Item = (TelegramRun, Sender)>,
+) -> JudgedSlaves {
     let mut judge = Judge {
-        midway,
-        recorded: midway,
+        midway: recorded.is_some(),
+        recorded,
         ..Judge::default()
     };
     for (number, (run, sender)) in (1..).zip(runs) {
@@ -102,8 +105,8 @@ fn judge_from(midway: bool, runs: impl IntoIterator<Item = (TelegramRun, Sender)
 struct Judge {
     /// Whether something was sent that was not heard, right before the next telegram.
     midway: bool,
-    /// Whether the telegrams are those of a capture, which does not show a supply, and says of a telegram no more than its octets.
-    recorded: bool,
+    /// Of telegrams of a capture, which does not show a supply and says of a telegram no more than its octets: how far times may be off.
+    recorded: Option<Span>,
     /// Whether the station that a telegram seems to be of has sent it.
     sender: Sender,
     followers: BTreeMap<u8, Follower>,
@@ -336,7 +339,9 @@ impl Judge {
         let recorded = self.recorded;
         let follower = self.follower(address);
         let last = follower.sent.replace(at);
-        let silent = last.filter(|last| recorded && at.since(*last) >= RESTART);
+        let silent = last.filter(|last| {
+            recorded.is_some_and(|tolerance| at.since(*last) + tolerance >= RESTART)
+        });
         if let Some(silent) = silent {
             let restarted = follower.restarted();
             self.restarted.insert(address, (silent, restarted));

@@ -120,7 +120,7 @@ fn right_slaves(share: usize) -> usize {
             }
             let trace = trace(&source, &header);
             for trace in [trace.clone(), behind_a_token(trace)] {
-                let judged = judge(&trace);
+                let judged = judge(&trace, Span::ZERO);
                 assert!(
                     judged.breaches.is_empty(),
                     "{} {line}\n{:#?}",
@@ -158,7 +158,7 @@ fn wrong_slaves_are_accused() {
         scenarios.iter().any(|source| {
             let lines = of_all(source, &format!("deviates {name}"));
             let trace = behind_a_token(trace(source, &lines));
-            !judge(&trace).breaches.is_empty()
+            !judge(&trace, Span::ZERO).breaches.is_empty()
         })
     };
     let missed: Vec<_> = deviations()
@@ -187,7 +187,10 @@ fn rules() {
     ] {
         let mut found = scenarios.iter().filter_map(|source| {
             let lines = of_all(source, &format!("deviates {name}"));
-            judge(&trace(source, &lines)).breaches.into_iter().next()
+            judge(&trace(source, &lines), Span::ZERO)
+                .breaches
+                .into_iter()
+                .next()
         });
         let found = found.next().map(|own| own.section);
         assert_eq!(found, Some(section), "{name}");

@@ -166,7 +166,13 @@ impl LineRig for Unitek {
                 follower.hear(index + 1, frame);
             }
             waits |= follower.waits();
-            found.extend(follower.end(&frames).breaches.into_iter().next());
+            found.extend(
+                follower
+                    .end(frames.len(), &frames)
+                    .breaches
+                    .into_iter()
+                    .next(),
+            );
         }
         let first = found.into_iter().min_by_key(|own| own.frame);
         (first.map(FrameDifference::from), waits)

@@ -66,8 +66,9 @@ impl Running {
         self.alive = at;
     }
 
-    /// A frame has begun at `at`, when the bus had been used for `used`.
-    pub(super) fn comes(&mut self, at: Instant, used: Span) -> Option<Untimely> {
+    /// A frame has begun at `at`, when the bus had been used for `used`. Times may be off by `tolerance`.
+    pub(super) fn comes(&mut self, at: Instant, used: Span, tolerance: Span) -> Option<Untimely> {
+        let permitted = GAP + tolerance;
         self.sure = true;
         self.alive = at;
         // Behind a busy bus a frame waits, and one that waits is replaced by its successor.
@@ -90,13 +91,13 @@ impl Running {
         self.used = used;
         self.series = Some((first, at, count + 1));
         let off = |own: Span, wanted: Span| own.units().abs_diff(wanted.units());
-        if off(gap, self.every) > GAP.units() {
+        if off(gap, self.every) > permitted.units() {
             self.series = Some((at, at, 0));
             return Some(Untimely::Gap(gap));
         }
         let count = count + 1;
         let (whole, wanted) = (at.since(first), self.every * count);
-        let most = wanted.units() / 50 + GAP.units();
+        let most = wanted.units() / 50 + permitted.units();
         if count >= ENOUGH && off(whole, wanted) > most {
             self.series = Some((at, at, 0));
             return Some(Untimely::Mean(
@@ -138,7 +139,8 @@ mod tests {
     fn the_mean_of_many_gaps_is_judged() {
         let seen = |gap: Span| {
             let mut cycle = Running::new(10, Instant::START, true);
-            (0..=ENOUGH).find_map(|count| cycle.comes(Instant::START + gap * count, Span::ZERO))
+            (0..=ENOUGH)
+                .find_map(|count| cycle.comes(Instant::START + gap * count, Span::ZERO, Span::ZERO))
         };
         assert_eq!(seen(Span::from_millis(10)), None);
         let late = Span::from_millis(11);

@@ -2,7 +2,11 @@
 
 use super::follower::Follower;
 use super::symptom::FrameSymptom;
-use harness_sim::record::LineFrame;
+use crate::buses::unitek::language::identifier;
+use crate::counted::counted;
+use harness_proto::time::Span;
+use harness_sim::record::{LineFrame, Seam, SeamKind};
+use std::collections::BTreeSet;
 
 /// Differences and doubts that are kept at most.
 pub(super) const MOST_BREACHES: usize = 50;
@@ -48,24 +52,68 @@ impl JudgedDrives {
     }
 }
 
+/// What was heard on a bus.
+#[derive(Clone, Copy, Debug)]
+pub struct HeardFrames<'f> {
+    /// The frames, in order.
+    pub frames: &'f [LineFrame],
+    /// Where their times do not go on.
+    pub seams: &'f [Seam],
+    /// How far the time of each may be off.
+    pub tolerance: Span,
+}
+
+impl<'f> HeardFrames<'f> {
+    /// Frames with the times of the bus.
+    #[must_use]
+    pub const fn exact(frames: &'f [LineFrame]) -> Self {
+        Self {
+            frames,
+            seams: &[],
+            tolerance: Span::ZERO,
+        }
+    }
+
+    /// The frames of each recording, with the number of frames in front of it.
+    fn recordings(&self) -> impl Iterator<Item = (usize, &'f [LineFrame])> {
+        let begins = self.seams.iter();
+        let begins = begins.filter(|own| own.kind == SeamKind::Recording);
+        let mut places = vec![0];
+        places.extend(begins.map(|own| own.piece));
+        places.push(self.frames.len());
+        let frames = self.frames;
+        (1..places.len()).filter_map(move |end| {
+            let part = frames.get(places[end - 1]..places[end])?;
+            Some((places[end - 1], part))
+        })
+    }
+
+    /// Whether the clock was set in front of a frame.
+    fn clock_set(&self, piece: usize) -> bool {
+        let here = self.seams.binary_search_by_key(&piece, |own| own.piece);
+        here.is_ok_and(|place| self.seams[place].kind == SeamKind::ClockSet)
+    }
+}
+
 /// Judges frames with these drives: number, and the identifiers on which each receives and sends.
 #[must_use]
-pub fn judge(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives {
-    judge_with(frames, drives, Follower::new)
+pub fn judge(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+    judge_with(heard, drives, Follower::new)
 }
 
 /// The same of drives whose identifiers are guessed from their frames.
 #[must_use]
-pub fn judge_guessed(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives {
-    judge_with(frames, drives, Follower::guessed)
+pub fn judge_guessed(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+    judge_with(heard, drives, Follower::guessed)
 }
 
 fn judge_with(
-    frames: &[LineFrame],
+    heard: HeardFrames<'_>,
     drives: &[(u8, (u16, u16))],
     of: fn(u8, (u16, u16)) -> Follower,
 ) -> JudgedDrives {
     let mut all = JudgedDrives::default();
+    let mut used = BTreeSet::new();
     for &(drive, identifiers) in drives {
         let shared = |other: &&(u8, (u16, u16))| {
             let (rx, tx) = other.1;
@@ -76,18 +124,54 @@ fn judge_with(
             all.remarks.push(remark);
             continue;
         }
-        let mut follower = of(drive, identifiers);
-        follower.others = drives.iter().map(|own| own.0).collect();
-        for (index, frame) in frames.iter().enumerate() {
-            follower.hear(index + 1, frame);
+        for (before, frames) in heard.recordings() {
+            let mut follower = of(drive, identifiers).with_tolerance(heard.tolerance);
+            follower.others = drives.iter().map(|own| own.0).collect();
+            for (index, frame) in (before..).zip(frames) {
+                if heard.clock_set(index) {
+                    follower.clock_set(frame.start);
+                }
+                follower.hear(index + 1, frame);
+            }
+            used.extend(follower.identifiers().map(u32::from));
+            let own = follower.end(before + frames.len(), frames);
+            all.breaches.extend(own.breaches);
+            all.compared += own.compared;
+            all.values += own.values;
+            all.doubts.extend(own.doubts);
+            let new = own.remarks.into_iter();
+            let known = |own: &String| all.remarks.contains(own);
+            let new: Vec<_> = new.filter(|own| !known(own)).collect();
+            all.remarks.extend(new);
         }
-        let own = follower.end(frames);
-        all.breaches.extend(own.breaches);
-        all.compared += own.compared;
-        all.values += own.values;
-        all.remarks.extend(own.remarks);
-        all.doubts.extend(own.doubts);
     }
+    let numbers: Vec<u8> = drives.iter().map(|own| own.0).collect();
+    all.remarks.extend(others(heard.frames, &numbers, &used));
     all.breaches.sort_by_key(|own| own.frame);
     all
+}
+
+/// Identifiers that are shown at most.
+const MOST_SHOWN: usize = 8;
+
+/// How many frames are neither to nor from one of the drives, and with which identifiers.
+fn others(frames: &[LineFrame], drives: &[u8], used: &BTreeSet<u32>) -> Option<String> {
+    let other = |own: &&LineFrame| {
+        let id = own.frame.id();
+        let of_drive = own.from.is_some_and(|drive| drives.contains(&drive));
+        !of_drive && (id.is_extended() || !used.contains(&id.number()))
+    };
+    let frames = frames.iter().filter(other).map(|own| own.frame.id());
+    let ids: Vec<_> = frames.collect();
+    let all: BTreeSet<String> = ids.iter().map(|own| identifier(*own)).collect();
+    let shown: Vec<_> = all.iter().take(MOST_SHOWN).map(String::as_str).collect();
+    let more = if all.len() > MOST_SHOWN { ", ..." } else { "" };
+    (!all.is_empty()).then(|| {
+        format!(
+            "{} with {} of other devices not judged: {}{more}",
+            counted(ids.len(), "frame"),
+            counted(all.len(), "identifier"),
+            shown.join(", ")
+        )
+    })
 }

@@ -4,15 +4,15 @@ use super::cycle::{Cycle, Running, Untimely};
 use super::drives::{Breach, JudgedDrives, MOST_BREACHES};
 use super::held::{Held, is_live, takes_writes};
 use super::supply::Supply;
-use super::symptom::FrameSymptom::{self, Length, Missing, Name, Time, Unasked, Value};
+use super::symptom::FrameSymptom::{self, Length, Missing, Name, Time, Unasked};
 use crate::buses::unitek::language::{identifier, written};
 use crate::buses::unitek::report::sender_of;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{CYCLES, Reply};
 use harness_proto::unitek::properties::Dlc4;
-use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
-use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request, Width};
+use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
+use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request};
 use harness_sim::record::{FrameEnd, LineFrame};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -31,8 +31,8 @@ const LONGEST_CYCLE: Span = Span::from_millis(300);
 /// A request that waits for its reply.
 #[derive(Clone, Debug)]
 pub(super) struct Asked {
-    register: u8,
-    at: Instant,
+    pub(super) register: u8,
+    pub(super) at: Instant,
     frame: usize,
     /// Whether the drive has certainly heard it and answers it.
     pub(super) sure: bool,
@@ -59,12 +59,12 @@ pub struct Follower {
     /// Whether replies with 8F are short, once it is known (`map-reply`).
     pub(super) short_map: Option<bool>,
     /// Whether all replies have 6 bytes, where it is known (bit 8 of DC), and when that may have changed.
-    wide: Option<bool>,
-    wide_at: Instant,
+    pub(super) wide: Option<bool>,
+    pub(super) wide_at: Instant,
     /// When MODE was last written, or may have been.
-    mode_at: Instant,
+    pub(super) mode_at: Instant,
     /// Homing may run, which sets the destination at its end.
-    homes: bool,
+    pub(super) homes: bool,
     /// When the first frame began.
     begin: Option<Instant>,
     /// Registers of which a frame came that nothing here asks for, and when last: their cycles run since before the first frame.
@@ -78,7 +78,9 @@ pub struct Follower {
     /// Whether the times of frames are those of the bus.
     timed: bool,
     /// How late a frame may be.
-    patience: Span,
+    pub(super) patience: Span,
+    /// How far the time of a frame may be off.
+    pub(super) tolerance: Span,
     /// The time that frames have used.
     pub(super) used: Span,
     /// Whether the supply may have been switched off and on, and what the frames show if so.
@@ -115,6 +117,7 @@ impl Follower {
             guessed: false,
             timed: true,
             patience: PATIENCE,
+            tolerance: Span::ZERO,
             used: Span::ZERO,
             supply: Supply::default(),
             judged: JudgedDrives::default(),
@@ -143,6 +146,34 @@ impl Follower {
         }
     }
 
+    /// The same where the time of each frame may be off.
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: Span) -> Self {
+        Self {
+            patience: self.patience + tolerance,
+            tolerance,
+            ..self
+        }
+    }
+
+    /// On which it may receive and send.
+    pub(super) fn identifiers(&self) -> impl Iterator<Item = u16> {
+        let second = self.second.iter().flatten();
+        self.rx.iter().chain(&self.tx).chain(second).copied()
+    }
+
+    /// The clock of the log was set in front of the frame that begins at `at`: how long ago what came before was is not known.
+    pub(super) fn clock_set(&mut self, at: Instant) {
+        for cycle in &mut self.cycles {
+            if let Cycle::On(running) = cycle {
+                running.blur(at);
+            }
+        }
+        if let Some(restarted) = &mut self.supply.restarted {
+            restarted.clock_set(at);
+        }
+    }
+
     /// Whether a request waits for its reply.
     #[must_use]
     pub fn waits(&self) -> bool {
@@ -152,9 +183,9 @@ impl Follower {
     /// A frame of the bus.
     pub fn hear(&mut self, number: usize, own: &LineFrame) {
         let sends = self.sent_it(own) && !matches!(own.ended, FrameEnd::Error(_));
-        if sends && self.supply.may_have_failed(own.start) {
+        if sends && self.supply.may_have_failed(own.start + self.tolerance) {
             self.supply.breaches = self.judged.breaches.len();
-            self.supply.restarted = Some(Box::new(self.restarted()));
+            self.supply.restarted = Some(Box::new(self.restarted(own.start)));
         }
         if let Some(restarted) = &mut self.supply.restarted {
             restarted.hear(number, own);
@@ -192,9 +223,9 @@ impl Follower {
 
     /// The judgement, after the last frame.
     #[must_use]
-    pub fn end(mut self, frames: &[LineFrame]) -> JudgedDrives {
+    pub fn end(mut self, number: usize, frames: &[LineFrame]) -> JudgedDrives {
         if let Some(last) = frames.last() {
-            self.missing(frames.len(), last.at);
+            self.missing(number, last.at);
         }
         if self.slowest.is_none() && !self.asked.is_empty() {
             self.judged.remarks.push(format!(
@@ -211,7 +242,7 @@ impl Follower {
         !self.asked.is_empty() || cycles.iter().any(|own| matches!(own, Cycle::On(_)))
     }
 
-    fn breach(
+    pub(super) fn breach(
         &mut self,
         (frame, register): (usize, u8),
         (what, section): (FrameSymptom, &'static str),
@@ -294,7 +325,7 @@ impl Follower {
         // Cycles from before the first frame may fill the table; each shows itself within 254 ms.
         let old = self
             .begin
-            .is_some_and(|begin| at.since(begin) > LONGEST_CYCLE);
+            .is_some_and(|begin| at.since(begin) > LONGEST_CYCLE + self.tolerance);
         let unknown =
             self.cycles.contains(&Cycle::Unknown) && !(old && self.unsolicited.is_empty());
         let certain = sure && !full && !silent && !unknown;
@@ -345,7 +376,7 @@ impl Follower {
     }
 
     /// A register of identifiers holds this: the drive may use it at once, or from its next start on (`id-change`, `second-identifiers`).
-    fn may_use(&mut self, register: u8, raw: u32) {
+    pub(super) fn may_use(&mut self, register: u8, raw: u32) {
         let all = match register {
             0x68 => &mut self.rx,
             0x69 => &mut self.tx,
@@ -466,15 +497,18 @@ impl Follower {
             return Some(asked);
         }
         if self.may_be_event(register, own.start) {
-            if let Cycle::On(running) = &mut self.cycles[usize::from(register)] {
-                running.blur(own.start);
+            match &mut self.cycles[usize::from(register)] {
+                Cycle::On(running) => running.blur(own.start),
+                // A cycle from before the first frame may send it, and goes on when events are switched off (5.2).
+                Cycle::Unknown => drop(self.unsolicited.insert(register, own.start)),
+                Cycle::Off(_) => {}
             }
             return None;
         }
         let cycle = &mut self.cycles[usize::from(register)];
         let untimely = match cycle {
             Cycle::On(running) => {
-                let why = running.comes(own.start, used);
+                let why = running.comes(own.start, used, self.tolerance);
                 why.filter(|_| self.timed).map(|why| (why, running.every()))
             }
             Cycle::Unknown => {
@@ -513,7 +547,8 @@ impl Follower {
     fn older_cycle(&mut self, number: usize, own: &LineFrame) {
         let register = own.frame.data().first().copied().unwrap_or(0);
         let before = self.unsolicited.get(&register).copied().or(self.begin);
-        if before.is_some_and(|before| own.start.since(before) > LONGEST_CYCLE) {
+        let longest = LONGEST_CYCLE + self.tolerance;
+        if before.is_some_and(|before| own.start.since(before) > longest) {
             let name = Register::of(register).name;
             let about = format!(
                 "{} comes, and nothing asks for register {register:02X} ({name}): no cycle is as long",
@@ -535,108 +570,6 @@ impl Follower {
         let off = self.held[0x51].sure();
         let off = off.is_some_and(|mode| mode & u32::from(MODE_EVENT) == 0);
         register == 0x40 && (!off || at.since(self.mode_at) <= self.patience)
-    }
-
-    /// How long a reply must be.
-    fn length(&mut self, number: usize, at: Instant, reply: &Reply) {
-        let register = Register::of(reply.register);
-        let long = matches!(reply.data, Data::Long(_));
-        let map = matches!(reply.register, 0x40 | 0x8F);
-        // What was read before DC was written may come behind it.
-        let settled = at.since(self.wide_at) > self.slowest.unwrap_or_default() + self.patience;
-        let wide = self
-            .wide
-            .filter(|_| settled || self.wide_at == Instant::START);
-        if settled && self.wide.is_none() && register.width == Width::Bits16 {
-            self.wide = Some(long);
-        }
-        let wrong = match (register.width, wide) {
-            (Width::Bits16, Some(wide)) => long != wide,
-            (Width::Bits16, None) => false,
-            (Width::Bits32, Some(true)) => !long,
-            (Width::Bits32, _) => !long && !map,
-        };
-        if wrong {
-            let (bytes, wanted) = if long { (6, 4) } else { (4, 6) };
-            let about = format!(
-                "register {:02X} ({}) comes with {bytes} bytes, and {wanted} are expected",
-                reply.register, register.name
-            );
-            self.breach((number, reply.register), (Length, "App 2"), about);
-        } else if map && wide == Some(false) && reply.register == 0x8F {
-            // 8F is never sent by event, so that its length is that of `map-reply` for good.
-            if self.short_map.is_some_and(|short| short == long) {
-                let about = "register 8F comes with another length than before".to_owned();
-                self.breach((number, reply.register), (Length, "App 7"), about);
-            }
-            self.short_map = Some(!long);
-        }
-    }
-
-    /// Whether a register can read this.
-    fn value(&mut self, number: usize, reply: &Reply, asked: Option<&Asked>) {
-        let register = Register::of(reply.register);
-        let raw = reply.data.bits();
-        let locks = |held: &Held| {
-            let mode = held.sure();
-            mode.is_some_and(|mode| mode & u32::from(MODE_LOCK) != 0)
-        };
-        if reply.register == 0x40
-            && asked.is_some_and(|own| locks(&own.held) && locks(&self.held[0x51]))
-            && raw & status::ENABLED != 0
-        {
-            let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();
-            self.breach((number, reply.register), (Value, "ex 2"), about);
-        }
-        if is_live(reply.register) {
-            return;
-        }
-        let mask = match (register.width, reply.data) {
-            (Width::Bits32, Data::Long(_)) => u32::MAX,
-            _ => 0xFFFF,
-        };
-        let place = usize::from(reply.register);
-        let Some(asked) = asked else {
-            return;
-        };
-        let whole = mask == u32::MAX || register.width == Width::Bits16;
-        if self.refused.get(&reply.register) == Some(&(raw & mask)) && whole {
-            let about = format!(
-                "register {:02X} ({}) cannot be written, and reads what was written to it",
-                reply.register, register.name
-            );
-            self.refused.remove(&reply.register);
-            self.breach((number, reply.register), (Value, "dump"), about);
-        }
-        let homes = self.homes && reply.register == 0x6E;
-        if register.access == Access::FN || homes {
-            return;
-        }
-        let held = self.held[place].clone();
-        if takes_writes(register) {
-            self.judged.values += usize::from(held != Held::any());
-            if held.sure() == Some(raw & mask) {
-                self.supply.kept(reply.register, raw & mask);
-            }
-            if !held.can_be(raw, mask) && !asked.held.can_be(raw, mask) {
-                let digits = register.width.bits() as usize / 4;
-                let about = format!(
-                    "register {:02X} ({}) reads {:0digits$X}, and {} is expected by what was written or read before",
-                    reply.register,
-                    register.name,
-                    raw & mask,
-                    held.words(register.width)
-                );
-                self.breach((number, reply.register), (Value, register.origin), about);
-            }
-        }
-        if reply.register == 0xDC && asked.held == held {
-            self.wide = Some(raw & 0x0100 != 0);
-        }
-        if whole && asked.held == held {
-            self.held[place] = Held::one(raw & mask);
-            self.may_use(reply.register, raw);
-        }
     }
 }
 

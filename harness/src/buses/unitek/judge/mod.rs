@@ -4,6 +4,9 @@
 //! (UNITEK 7) may have any value, and what a plant decides is not compared. It compares which registers are sent and when, how long
 //! replies are, and what a register reads that was written.
 
+#[cfg(test)]
+mod begun_tests;
+mod contents;
 mod cycle;
 mod drives;
 mod follower;
@@ -13,6 +16,6 @@ mod symptom;
 #[cfg(test)]
 mod tests;
 
-pub use drives::{Breach, JudgedDrives, judge, judge_guessed};
+pub use drives::{Breach, HeardFrames, JudgedDrives, judge, judge_guessed};
 pub use follower::Follower;
 pub use symptom::FrameSymptom;

@@ -38,7 +38,7 @@ impl Supply {
         }
     }
 
-    /// Whether a frame of the drive that begins at `at` ends a silence in which a restart fits.
+    /// Whether a frame of the drive that begins at `at` at the latest ends a silence in which a restart fits.
     pub(super) fn may_have_failed(&mut self, at: Instant) -> bool {
         // A drive that has sent nothing yet is silent since the last write to it.
         let wrote = || self.written.values().map(|own| own.1).max();
@@ -72,13 +72,22 @@ impl Supply {
 }
 
 impl Follower {
-    /// The same drive, switched off and on: nothing is known of its registers, and what was asked for before may be lost.
-    pub(super) fn restarted(&self) -> Self {
+    /// The same drive that sends at `at`, switched off and on: nothing is known of its registers but what was written too late to be lost, and
+    /// what was asked for before may be lost.
+    pub(super) fn restarted(&self, at: Instant) -> Self {
         let (Some(rx), Some(tx)) = (self.rx.first(), self.tx.first()) else {
             return Self::new(self.drive, (0, 0));
         };
         let mut own = Self::new(self.drive, (*rx, *tx));
         own.held.fill(Held::any());
+        let late = |written: &Instant| at.since(*written) + self.tolerance < RESTART;
+        let written = self.supply.written.iter().map(|(own, (_, at))| (*own, *at));
+        let kept: BTreeMap<u8, Instant> = written.filter(|own| late(&own.1)).collect();
+        for register in kept.keys() {
+            let place = usize::from(*register);
+            own.held[place] = self.held[place].clone();
+        }
+        own.mode_at = self.mode_at;
         // No cycle survives; one that was asked for in the silence may run, or not.
         own.cycles = self.cycles.map(|cycle| match cycle {
             Cycle::On(_) => Cycle::Unknown,
@@ -88,13 +97,18 @@ impl Follower {
         (own.second, own.other_rate) = (self.second.clone(), self.other_rate);
         own.asked = self.asked.clone();
         for asked in &mut own.asked {
-            (asked.sure, asked.held) = (false, Held::any());
+            asked.sure = false;
+            let written = kept.get(&asked.register);
+            if written.is_none_or(|written| *written > asked.at) {
+                asked.held = Held::any();
+            }
         }
         (own.slowest, own.short_map) = (self.slowest, self.short_map);
         (own.others, own.used) = (self.others.clone(), self.used);
         // A restart makes no register writable.
         own.refused = self.refused.clone();
         own.guessed = self.guessed;
+        (own.patience, own.tolerance) = (self.patience, self.tolerance);
         own.supply = Supply::always_on();
         own
     }

@@ -1,6 +1,6 @@
 //! Right drives are never accused, whatever the value of an open point; wrong ones are.
 
-use super::judge;
+use super::{HeardFrames, judge};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
@@ -127,7 +127,7 @@ fn right_drives(share: usize) {
                 of_all(&source, line)
             };
             let (frames, drives) = frames(&source, &header, idle);
-            let judged = judge(&frames, &drives);
+            let judged = judge(HeardFrames::exact(&frames), &drives);
             let table: Vec<_> = frames
                 .iter()
                 .map(|own| format!("{} {}", own.start, own.frame))
@@ -156,7 +156,9 @@ fn wrong_drives_are_accused() {
         scenarios.iter().any(|source| {
             let (frames, drives) =
                 frames(source, &of_all(source, &format!("deviates {name}")), true);
-            !judge(&frames, &drives).breaches.is_empty()
+            !judge(HeardFrames::exact(&frames), &drives)
+                .breaches
+                .is_empty()
         })
     };
     let missed: Vec<_> = deviations()

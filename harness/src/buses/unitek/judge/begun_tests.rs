@@ -1,0 +1,269 @@
+//! What may have been set before the first frame of a log: each of it explains frames of a right drive, and excuses no wrong one. Times that go
+//! back, and times that are off.
+
+use super::{FrameSymptom, HeardFrames, JudgedDrives, judge, judge_guessed};
+use crate::buses::unitek::report::sender_of;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::{FrameEnd, LineFrame, Seam, SeamKind};
+
+/// Frames with their times in tenths of a millisecond.
+fn log(frames: &[(u64, &str)]) -> Vec<LineFrame> {
+    let frame = |&(at, text): &(u64, &str)| {
+        let frame: Frame = text.parse().expect("a frame");
+        let start = Instant::START + Span::from_micros(at * 100);
+        LineFrame {
+            from: sender_of(&frame),
+            start,
+            at: start + Span::from_micros(90),
+            frame,
+            ended: FrameEnd::Good,
+        }
+    };
+    let mut all: Vec<_> = frames.iter().map(frame).collect();
+    all.sort_by_key(|own| own.start);
+    all
+}
+
+const DRIVE: [(u8, (u16, u16)); 1] = [(1, (0x201, 0x181))];
+
+fn judged(frames: &[(u64, &str)]) -> JudgedDrives {
+    let frames = log(frames);
+    let heard = HeardFrames::exact(&frames);
+    let [sure, guessed] = [judge(heard, &DRIVE), judge_guessed(heard, &DRIVE)];
+    assert_eq!(sure.breaches, guessed.breaches);
+    sure
+}
+
+#[track_caller]
+fn right(frames: &[(u64, &str)]) {
+    let judged = judged(frames);
+    assert_eq!((judged.breaches, judged.doubts), (Vec::new(), Vec::new()));
+}
+
+#[track_caller]
+fn wrong(frames: &[(u64, &str)], what: FrameSymptom, section: &str) {
+    let judged = judged(frames);
+    let first = judged.breaches.first().expect("a difference");
+    assert_eq!((first.what, first.section), (what, section), "{judged:#?}");
+}
+
+/// A read with its reply: the bus and the drive are known to be at work.
+const READ: [(u64, &str); 2] = [(100, "201#3DE200"), (104, "181#E2010000")];
+
+/// So many frames, each `every` tenths of a millisecond.
+fn cycle(text: &'static str, every: u64, count: u64) -> Vec<(u64, &'static str)> {
+    (0..count).map(|own| (own * every, text)).collect()
+}
+
+/// UNITEK 5.2: a cycle of any register, also where MODE is written meanwhile, which ends events and no cycle.
+#[test]
+fn a_cycle() {
+    for text in [
+        "181#30010200",
+        "181#40010100",
+        "181#8F0000000000",
+        "181#FA4D4400",
+        "181#81CEFA00",
+        "181#D10000000000",
+    ] {
+        for write in ["201#510400", "201#511400", "201#3D5100"] {
+            let mut frames = cycle(text, 1_000, 12);
+            frames.extend(READ);
+            frames.push((3_500, write));
+            if write == "201#3D5100" {
+                frames.push((3_504, "181#51000000"));
+            }
+            right(&frames);
+        }
+    }
+}
+
+/// UNITEK 5.2, ex 10: sending by event, with any mask, until MODE switches it off.
+#[test]
+fn events() {
+    let events = [(0, "181#400101000000"), (9_000, "181#400001000000")];
+    right(&[&READ[..], &events].concat());
+    let read = [(200, "201#3D5100"), (204, "181#51100000")];
+    right(&[&READ[..], &events, &read].concat());
+    // A cycle would have shown itself behind the write.
+    let off = (10_000, "201#510400");
+    let late = (15_500, "181#400101000000");
+    let asks = [
+        cycle("201#3DE200", 1_000, 20),
+        cycle("181#E2010000", 1_000, 20),
+    ]
+    .concat();
+    let asks = asks
+        .into_iter()
+        .zip(0..)
+        .map(|((at, own), place)| (at + 200 + place / 20 * 4, own));
+    let asks: Vec<_> = asks.collect();
+    right(&[&asks[..], &events, &[off]].concat());
+    wrong(
+        &[&asks[..], &events, &[off, late]].concat(),
+        FrameSymptom::Unasked,
+        "5.2",
+    );
+}
+
+/// A request in front of the first frame.
+#[test]
+fn a_request() {
+    right(&[&[(50, "181#30010200")], &READ[..]].concat());
+    let other = (9_000, "181#30010200");
+    let asks = [(8_000, "201#3DE200"), (8_004, "181#E2010000")];
+    wrong(
+        &[&READ[..], &asks, &[other]].concat(),
+        FrameSymptom::Unasked,
+        "5.2",
+    );
+}
+
+/// UNITEK App 8: a table of eight cycles that is full, so that a ninth is refused.
+#[test]
+fn a_full_table() {
+    const OLD: [&str; 8] = [
+        "181#30010200",
+        "181#31010200",
+        "181#35000000000",
+        "181#40010100",
+        "181#49010200",
+        "181#4A010200",
+        "181#4B010200",
+        "181#EB010200",
+    ];
+    let mut frames: Vec<_> = READ.to_vec();
+    for (place, text) in OLD.into_iter().enumerate() {
+        let text = if place == 2 { "181#350000000000" } else { text };
+        let frame = |(at, own): (u64, &'static str)| (at + place as u64 * 3, own);
+        frames.extend(cycle(text, 1_000, 20).into_iter().map(frame));
+    }
+    let ninth = (8_000, "201#3DA00A");
+    frames.push(ninth);
+    right(&frames);
+    let asks = |at: u64| [(at, "201#3DE200"), (at + 4, "181#E2010000")];
+    let alone = [
+        &READ[..],
+        &asks(2_000),
+        &asks(5_000),
+        &[ninth],
+        &asks(9_000),
+        &asks(10_000),
+    ];
+    wrong(&alone.concat(), FrameSymptom::Missing, "ex 9");
+}
+
+/// UNITEK App 3: all replies with 6 bytes, by bit 8 of DC.
+#[test]
+fn long_replies() {
+    let long = |at: u64| [(at, "201#3DE200"), (at + 4, "181#E20100000000")];
+    right(&[long(1_000), long(2_000)].concat());
+    wrong(
+        &[long(800), READ.map(|own| (own.0 + 900, own.1))].concat(),
+        FrameSymptom::Length,
+        "App 2",
+    );
+}
+
+/// A lock, errors that are latched and a bus time-out that expires: no frame asks for what STATUS and the errors show (UNITEK ex 2, App 7).
+#[test]
+fn a_lock_and_errors() {
+    let asks = |at: u64, status, errors| {
+        [
+            (at, "201#3D4000"),
+            (at + 4, status),
+            (at + 8, "201#3D8F00"),
+            (at + 12, errors),
+        ]
+    };
+    let locked = asks(100, "181#40000000", "181#8F080000");
+    let enabled = asks(900, "181#40010100", "181#8F000000");
+    right(&[locked, enabled].concat());
+    let lock = [(700, "201#510400")];
+    wrong(
+        &[&locked[..], &lock, &enabled].concat(),
+        FrameSymptom::Value,
+        "ex 2",
+    );
+}
+
+/// UNITEK 4.3, ex 1: identifiers that are not those of 3.1 accuse no drive where they are guessed.
+#[test]
+fn identifiers() {
+    let asks = |at: u64| [(at, "201#3DE200"), (at + 4, "185#E2010000")];
+    let frames = log(&[asks(100), asks(9_000)].concat());
+    let drives = [(1, (0x201, 0x181)), (5, (0x205, 0x185))];
+    let judged = judge_guessed(HeardFrames::exact(&frames), &drives);
+    assert_eq!(judged.breaches, []);
+    assert!(!judged.doubts.is_empty(), "{judged:#?}");
+    let set_up = judge(HeardFrames::exact(&frames), &[(1, (0x201, 0x185))]);
+    assert_eq!((set_up.breaches, set_up.doubts), (Vec::new(), Vec::new()));
+}
+
+/// A clock that was set back hides no difference, and makes none of times.
+#[test]
+fn a_clock_that_was_set() {
+    let judged = |frames: &[(u64, &str)], piece, kind| {
+        let frames = log(frames);
+        let seams = [Seam { piece, kind }];
+        judge(
+            HeardFrames {
+                seams: &seams,
+                ..HeardFrames::exact(&frames)
+            },
+            &DRIVE,
+        )
+    };
+    // The drive sends nothing for half a second in front of the write, which is too late to be lost without supply.
+    let reads = |at: u64| [(at, "201#3DD100"), (at + 4, "181#D10000000000")];
+    let write = [(6_000, "201#D101000000")];
+    let frames = [&reads(100)[..], &write, &reads(6_005)].concat();
+    let found = judged(&frames, 3, SeamKind::ClockSet).breaches;
+    assert_eq!((found.len(), found[0].what), (1, FrameSymptom::Value));
+    // Behind another recording's begin it is not known what was written between.
+    assert_eq!(judged(&frames, 3, SeamKind::Recording).breaches, []);
+    // A cycle of 100 ms goes on 20 ms behind its last frame.
+    let asks = [(0, "201#3D3064")];
+    let mut frames = [&asks[..], &cycle("181#30010200", 1_000, 5)[1..]].concat();
+    frames.extend([(4_200, "181#30010200"), (5_200, "181#30010200")]);
+    assert_eq!(judged(&frames, 5, SeamKind::ClockSet).breaches, []);
+    assert_eq!(
+        judge(HeardFrames::exact(&log(&frames)), &DRIVE)
+            .breaches
+            .len(),
+        1
+    );
+}
+
+/// UNITEK 5.2, ex 9: times that may be off by a tolerance differ beyond it only.
+#[test]
+fn a_tolerance() {
+    let ends = [1_120, 2_080, 3_040, 4_160, 5_120, 6_080];
+    let mut frames = vec![(0, "201#3D3064")];
+    frames.extend(ends.map(|at| (at, "181#30010200")));
+    let frames = log(&frames);
+    let count = |tolerance| {
+        let heard = HeardFrames {
+            tolerance: Span::from_millis(tolerance),
+            ..HeardFrames::exact(&frames)
+        };
+        judge(heard, &DRIVE).breaches.len()
+    };
+    assert_eq!([count(0), count(9), count(16)], [5, 1, 0]);
+}
+
+/// Identifiers of other devices are counted in one line.
+#[test]
+fn other_devices() {
+    let others = [
+        (120, "700#05"),
+        (130, "00000201#3DE200"),
+        (140, "080#"),
+        (150, "700#05"),
+    ];
+    let judged = judged(&[&READ[..], &others].concat());
+    assert_eq!(judged.breaches, []);
+    let line = "4 frames with 3 identifiers of other devices not judged: 080, 700, x00000201";
+    assert_eq!(judged.remarks, [line]);
+}
