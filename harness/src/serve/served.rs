@@ -40,6 +40,10 @@ pub trait ServedBus {
     fn deadline(&self) -> Instant;
     /// Does a line of control at once; `None` for an empty line or a comment.
     fn control(&mut self, line: &str) -> Option<ControlAnswer>;
+    /// What its stations have done since the last call that a master cannot see, a sentence each.
+    fn remarks(&mut self) -> Vec<String> {
+        Vec::new()
+    }
     /// What it shows on a live page.
     fn live(&mut self) -> &mut dyn LiveView;
 }

@@ -303,6 +303,9 @@ impl Shell<'_> {
                 self.attend(seat);
             }
             self.server.advance(self.clock.now());
+            for line in self.server.remarks() {
+                self.host.say(&line);
+            }
             for seat in seats {
                 if let Err(error) = self.speak(seat) {
                     self.fail(seat, &error);

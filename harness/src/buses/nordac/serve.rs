@@ -26,6 +26,7 @@ use harness_proto::profibus::{BusRate, rate::SYN_BITS};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
 use harness_sim::nordac::Drive;
+use harness_sim::nordac::slave::Refusal;
 use harness_sim::octet_segment::{Octet, Wish};
 use std::collections::VecDeque;
 
@@ -66,6 +67,8 @@ pub(crate) struct SegmentServer {
     /// What a live page shows, while one is open.
     pub(super) recorder: Option<Recorder>,
     seats: Vec<Seat>,
+    /// Why each slave refuses what its master sets it up with, as far as it was said.
+    refusals: Vec<Option<Refusal>>,
     /// The segment's time `base.1` is the clock's time `base.0`.
     base: (Instant, Instant),
     clock: Instant,
@@ -113,6 +116,7 @@ impl SegmentServer {
             plan,
             marks,
             recorder: None,
+            refusals: Vec::new(),
             seats: vec![Seat::default(); clients],
             clock: Instant::START,
         }
@@ -383,6 +387,23 @@ impl ServedBus for SegmentServer {
         })
     }
 
+    fn remarks(&mut self) -> Vec<String> {
+        let slaves = self.plan.setup.slaves.iter();
+        let now = slaves.map(|own| (own.address, self.bench.drive(own.address)));
+        let now: Vec<_> = now
+            .map(|(slave, drive)| (slave, drive.and_then(|own| own.slave().refusal())))
+            .collect();
+        self.refusals.resize(now.len(), None);
+        let mut news = Vec::new();
+        for ((slave, why), said) in now.into_iter().zip(&mut self.refusals) {
+            if let Some(why) = why.filter(|why| *said != Some(*why)) {
+                news.push(format!("slave {slave}: {why}"));
+            }
+            *said = why;
+        }
+        news
+    }
+
     fn live(&mut self) -> &mut dyn LiveView {
         self
     }
@@ -392,12 +413,14 @@ impl ServedBus for SegmentServer {
 fn state(drive: &Drive) -> String {
     let (slave, inverter) = (drive.slave(), drive.inverter());
     let frequency = Parameter::of(1813).and_then(|own| inverter.parameter(own, Index::default()));
+    let refused = slave.refusal().map(|why| format!(" refused=\"{why}\""));
     format!(
-        "power={} address={} dp={} state={} frequency={}",
+        "power={} address={} dp={} state={} frequency={}{}",
         if drive.is_powered() { "on" } else { "off" },
         slave.address(),
         slave.state().name(),
         inverter.state().short(),
         frequency.unwrap_or_default(),
+        refused.unwrap_or_default(),
     )
 }

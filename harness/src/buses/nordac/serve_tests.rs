@@ -208,3 +208,59 @@ fn slaves_of_header_and_command_line() {
     }
     assert_eq!(server.control("  # nothing"), None);
 }
+
+/// EN 2: the diagnosis shows that a slave refuses Set_Prm or Chk_Cfg. Why it does is said once, and `state` repeats it until it is over.
+#[test]
+fn why_a_slave_refuses_its_master_is_said() {
+    let set_prm = |status: u8, ident: u8, user: &[u8]| {
+        let data = [&[0x3D, 0x3E, status, 0, 0, 0x0B, 0x75, ident, 0], user].concat();
+        request(0x6C, &data)
+    };
+    let chk_cfg = |cfg: &[u8]| request(0x5C, &[&[0x3E, 0x3E], cfg].concat());
+    let mut clients = Clients::new(1, ErrorMarks::None);
+    for (telegram, why) in [
+        (
+            request(0x6C, &[0x3D, 0x3E, 0x80, 0, 0, 0x0B, 0x75, 0x31]),
+            "it has 6 octets",
+        ),
+        (
+            set_prm(0x80, 0x32, &[]),
+            "ident number 7532, and a NORDAC vector has 7531",
+        ),
+        (
+            set_prm(0x88, 0x31, &[]),
+            "the watchdog on with the factors 0 and 0",
+        ),
+        (set_prm(0x80, 0x31, &[1, 2]), "2 octets of user parameters"),
+        (set_prm(0x80, 0x31, &[]), ""),
+        (
+            chk_cfg(&[0xF3, 0xF5]),
+            "its configuration is F3 F5, and that of PPO1",
+        ),
+        (set_prm(0x80, 0x31, &[]), ""),
+    ] {
+        for time in [0, 1] {
+            clients.send(0, &telegram);
+            assert_eq!(clients.heard(0), [0xE5], "{why}");
+            let news = clients.server.remarks().concat();
+            match why.is_empty() || time == 1 {
+                true => assert_eq!(news, ""),
+                false => assert!(
+                    news.starts_with("slave 8: ") && news.contains(why),
+                    "{news}"
+                ),
+            }
+            let state = format!("{:?}", clients.server.control("state 8"));
+            assert_eq!(state.contains("refused="), !why.is_empty(), "{state}");
+            assert!(state.contains(why), "{state}");
+        }
+    }
+}
+
+/// A telegram of master 2 to slave 8 with SAPs.
+fn request(control: u8, data: &[u8]) -> Vec<u8> {
+    let body = [&[0x88, 0x82, control], data].concat();
+    let length = u8::try_from(body.len()).expect("short");
+    let sum = harness_proto::profibus::fdl::check_sum(&body);
+    [&[0x68, length, length, 0x68], &body[..], &[sum, 0x16]].concat()
+}

@@ -6,9 +6,11 @@
 mod channel;
 mod image;
 mod receiver;
+mod refusal;
 mod services;
 
 pub(in crate::nordac) use receiver::{Receiver, expected};
+pub use refusal::Refusal;
 
 use super::inverter::{Inverter, Settings};
 use harness_proto::nordac::properties::{
@@ -67,6 +69,8 @@ pub struct Slave {
     min_tsdr: u8,
     prm_fault: bool,
     cfg_fault: bool,
+    /// Why the last Set_Prm or Chk_Cfg was refused; `None` where it was not.
+    refusal: Option<Refusal>,
     data: ProcessData,
     /// The device block of the diagnosis has come or gone, and no diagnosis was fetched since.
     diagnosis_waits: bool,
@@ -88,6 +92,7 @@ impl Slave {
             min_tsdr: default_tsdr(),
             prm_fault: false,
             cfg_fault: false,
+            refusal: None,
             data: ProcessData::default(),
             diagnosis_waits: false,
             apart: None,
@@ -102,6 +107,12 @@ impl Slave {
     #[must_use]
     pub const fn state(&self) -> DpState {
         self.state
+    }
+
+    /// Why the last Set_Prm or Chk_Cfg was refused; `None` where it was not.
+    #[must_use]
+    pub const fn refusal(&self) -> Option<Refusal> {
+        self.refusal
     }
 
     /// The address to which it answers.

@@ -1,10 +1,11 @@
 //! The services that set a slave up: Set_Prm, Chk_Cfg, Slave_Diag (EN 2).
 
-use super::{Agreed, Outcome, Slave, Watchdog, default_tsdr};
+use super::{Agreed, Outcome, Refusal, Slave, Watchdog, default_tsdr};
 use harness_proto::nordac::properties::{
     CfgFollowsPpoType, ChkCfgEarly, ExtDiag, ForeignPrm, UserPrm,
 };
 use harness_proto::nordac::{IDENT, PpoType};
+use harness_proto::profibus::Buffer;
 use harness_proto::profibus::dp::{Diagnosis, DpState, SetPrm};
 use harness_proto::time::{Instant, Span};
 
@@ -20,32 +21,28 @@ impl Slave {
             };
         }
         let Some(prm) = SetPrm::decode(data) else {
-            self.refuse_parameters();
+            self.refuse_parameters(Refusal::Short(data.len()));
             return Outcome::Confirmed;
         };
         self.prm_fault = false;
+        self.refusal = None;
         if prm.has(SetPrm::UNLOCK) {
             self.wait_for_parameters();
         } else if !prm.has(SetPrm::LOCK) {
             self.take_tsdr(prm.min_tsdr);
-        } else if self.accepts(&prm) {
+        } else if let Some(why) = Refusal::of(&prm, self.properties.user_prm == UserPrm::Ignore) {
+            self.refuse_parameters(why);
+        } else {
             self.take_tsdr(prm.min_tsdr);
             self.agree(at, sa, &prm);
-        } else {
-            self.refuse_parameters();
         }
         Outcome::Confirmed
     }
 
-    fn accepts(&self, prm: &SetPrm<'_>) -> bool {
-        prm.ident == IDENT
-            && prm.watchdog_tens_of_ms() != Some(0)
-            && (prm.user.is_empty() || self.properties.user_prm == UserPrm::Ignore)
-    }
-
-    fn refuse_parameters(&mut self) {
+    fn refuse_parameters(&mut self, why: Refusal) {
         self.wait_for_parameters();
         self.prm_fault = true;
+        self.refusal = Some(why);
     }
 
     fn take_tsdr(&mut self, bits: u8) {
@@ -81,6 +78,7 @@ impl Slave {
         if !self.is_own_master(sa) {
             return Outcome::Refused;
         }
+        self.refusal = None;
         match self.configuration(data) {
             Some(ppo) if self.state == DpState::DataExch && ppo == self.ppo => {
                 self.cfg_fault = false;
@@ -94,6 +92,8 @@ impl Slave {
             None => {
                 self.wait_for_parameters();
                 self.cfg_fault = true;
+                let octets = Buffer::of(data).unwrap_or_default();
+                self.refusal = Some(Refusal::Configuration(octets, self.settings.ppo));
             }
         }
         Outcome::Confirmed

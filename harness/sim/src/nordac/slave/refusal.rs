@@ -1,0 +1,72 @@
+//! Why a slave refuses what a master sets it up with (EN 2).
+
+use harness_proto::nordac::{IDENT, PpoType};
+use harness_proto::profibus::Buffer;
+use harness_proto::profibus::dp::SetPrm;
+use std::fmt;
+
+/// Why Set_Prm or Chk_Cfg was refused. The diagnosis shows no more than Prm_Fault or Cfg_Fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Set_Prm has fewer than 7 octets.
+    Short(usize),
+    /// Set_Prm is for a slave with this ident number.
+    Ident(u16),
+    /// Set_Prm switches the watchdog on with a time of 0.
+    Watchdog([u8; 2]),
+    /// Set_Prm has this number of octets of user parameters (GSD: User_Prm_Data_Len 0).
+    UserData(usize),
+    /// Chk_Cfg has this configuration, and the slave is set to this PPO type.
+    Configuration(Buffer, PpoType),
+}
+
+impl Refusal {
+    /// Why parameters are refused; `None` for those that a slave accepts that may `ignore` user parameters.
+    pub(super) fn of(prm: &SetPrm<'_>, ignore: bool) -> Option<Self> {
+        if prm.ident != IDENT {
+            Some(Self::Ident(prm.ident))
+        } else if prm.watchdog_tens_of_ms() == Some(0) {
+            Some(Self::Watchdog(prm.watchdog))
+        } else if !prm.user.is_empty() && !ignore {
+            Some(Self::UserData(prm.user.len()))
+        } else {
+            None
+        }
+    }
+}
+
+fn hex(octets: &[u8]) -> String {
+    let all: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
+    all.join(" ")
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Short(octets) => {
+                write!(
+                    f,
+                    "Set_Prm is refused: it has {octets} octets, and 7 are the fewest"
+                )
+            }
+            Self::Ident(ident) => write!(
+                f,
+                "Set_Prm is refused: it is for ident number {ident:04X}, and a NORDAC vector has {IDENT:04X}"
+            ),
+            Self::Watchdog([first, second]) => write!(
+                f,
+                "Set_Prm is refused: it switches the watchdog on with the factors {first} and {second}, and none may be 0"
+            ),
+            Self::UserData(octets) => write!(
+                f,
+                "Set_Prm is refused: it has {octets} octets of user parameters, and a NORDAC vector takes none"
+            ),
+            Self::Configuration(octets, ppo) => write!(
+                f,
+                "Chk_Cfg is refused: its configuration is {}, and that of {ppo}, to which the slave is set (1622), is {}",
+                hex(octets),
+                hex(ppo.cfg())
+            ),
+        }
+    }
+}
