@@ -430,7 +430,12 @@ fn a_drive_that_does_not_obey_has_failed() {
         };
         let (code, _, stderr) = run(&format!("{command} 1{leave}"));
         assert_eq!(code, 1, "{command}: {stderr}");
-        let words = format!("drive 1: `{command}` was sent, and it is in {is} (ND21 11.8)");
+        let remedy = match is {
+            "go" => "; use the emergency stop",
+            _ => "",
+        };
+        let words =
+            format!("drive 1: `{command}` was sent, and it is in {is} (ND21 11.8){remedy}\n");
         assert!(stderr.contains(&words), "{stderr}");
     }
 }

@@ -224,9 +224,9 @@ fn each(
                 output.result(&format!("drive {axis} is in {mode}{error}\n"))?;
                 if !(order.reached)(&after) {
                     let what = order.what;
-                    // Only a stop and a block can fail so.
-                    let remedy = match mode {
-                        "go" => "; use the emergency stop",
+                    // A motor in "stop" or "go" has torque: one that was to be blocked is dangerous too.
+                    let remedy = match (what, mode) {
+                        (_, "go") | ("block", "stop") => "; use the emergency stop",
                         _ => "",
                     };
                     output.complain(&format!(
