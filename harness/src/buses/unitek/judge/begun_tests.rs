@@ -267,3 +267,11 @@ fn other_devices() {
     let line = "4 frames with 3 identifiers of other devices not judged: 080, 700, x00000201";
     assert_eq!(judged.remarks, [line]);
 }
+
+/// A log that ends behind a request says nothing of its reply.
+#[test]
+fn a_log_ends_before_the_reply() {
+    let remarks = |frames: &[(u64, &str)]| judged(frames).remarks.len();
+    assert_eq!(remarks(&[(0, "201#3DE200")]), 0);
+    assert_eq!(remarks(&[(0, "201#3DE200"), (1_000, "201#3DE200")]), 1);
+}

@@ -227,7 +227,9 @@ impl Follower {
         if let Some(last) = frames.last() {
             self.missing(number, last.at);
         }
-        if self.slowest.is_none() && !self.asked.is_empty() {
+        // The reply to the last request may be what a log does not have any more.
+        let waits = self.asked.front().zip(frames.last());
+        if self.slowest.is_none() && waits.is_some_and(|(asked, last)| asked.at < last.start) {
             self.judged.remarks.push(format!(
                 "drive {} answers no request: it is off, or has other identifiers than {:03X} and {:03X}",
                 self.drive, self.rx[0], self.tx[0]
