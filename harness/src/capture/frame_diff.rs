@@ -47,7 +47,7 @@ impl FrameSummary {
         }
         if self.untimed {
             text.push_str(
-                "times not compared: a clock was set in one of them, or recordings are joined\n",
+                "times not compared: one of them has none, its clock was set, or recordings are joined\n",
             );
         }
         let same = if self.same() { "same: " } else { "differ: " };
@@ -72,7 +72,7 @@ pub fn frame_diff(left: &Capture, right: &Capture, tolerance: Span) -> FrameSumm
     let sides = [frames(left), frames(right)];
     let seams = |own: &Capture| own.traces.iter().any(|trace| !trace.seams.is_empty());
     let mut summary = FrameSummary {
-        untimed: seams(left) || seams(right),
+        untimed: seams(left) || seams(right) || !left.timed || !right.timed,
         ..FrameSummary::default()
     };
     let mut at = [0, 0];

@@ -1,8 +1,7 @@
-//! Captures of frames: link type 227 of pcapng, the log of candump, the JSON of `drivebench trace`.
+//! Captures of frames: link type 227 of pcapng, logs of frames as text, the JSON of `drivebench trace`.
 
-use super::import::Logged;
+use super::import::candump_time;
 use super::order::{Counts, Place, ordered};
-use super::telegrams::LATEST;
 use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
 use crate::buses::sender_of;
 use crate::counted::counted;
@@ -71,6 +70,7 @@ pub(super) fn assemble(frames: Vec<FrameRead>, counts: Counts, rate: Option<BitR
             ..Trace::empty(u8::try_from(drives.len()).unwrap_or(u8::MAX))
         }],
         listened: None,
+        timed: true,
     };
     Imported {
         notes: ordered.notes,
@@ -129,85 +129,113 @@ fn id_is_remote(header: &[u8]) -> bool {
     u32::from_be_bytes([header[0], header[1], header[2], header[3]]) & REMOTE != 0
 }
 
-/// Reads the log that candump writes with `-l` or `-L`: `(1436509052.249713) can0 201#3D4000`, and the direction behind it in newer
-/// versions. Lines of error frames are passed over and counted. `links` chooses an interface where there are several.
+/// What a line of a log has.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum What {
+    Frame(Frame),
+    /// An error frame, of which the log does not say which frame it ended.
+    Error,
+    /// A frame of CAN FD.
+    Fd,
+}
+
+/// A line of a log: its channel, and its time in thirds of a nanosecond where the log has one.
+#[derive(Clone, Debug)]
+pub(super) struct Logged {
+    pub(super) channel: String,
+    pub(super) at: Option<i64>,
+    pub(super) what: What,
+    /// Its number, counted from 1, and its block.
+    pub(super) place: Place,
+}
+
+/// A log of frames as text.
+#[derive(Debug, Default)]
+pub(super) struct Log {
+    pub(super) frames: Vec<Logged>,
+    pub(super) notes: Vec<String>,
+    /// Whether the program that wrote it has noted that something is missing.
+    pub(super) lost: bool,
+}
+
+/// The capture of a log. `links` chooses an interface where there are several. Times may be before 0; where a line has none, frames are placed one behind
+/// another.
 ///
 /// # Errors
-/// A line that is none of such a log; frames of several interfaces.
-pub(super) fn candump(bytes: &[u8], links: &[NamedLink]) -> Result<Imported, CaptureError> {
-    let text = String::from_utf8_lossy(bytes);
-    let (mut frames, mut errors) = (Vec::new(), 0);
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let read = logged(line).map_err(|what| CaptureError::Link {
-            place: format!("line {}", number + 1),
-            what,
-        })?;
-        errors += usize::from(read.is_none());
-        let interface = line.split_whitespace().nth(1).unwrap_or_default();
-        let place = Place::of(number + 1);
-        frames.extend(read.map(|own| (interface, FrameRead { place, ..own })));
+/// Frames of several channels; a frame of CAN FD on the chosen one.
+pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureError> {
+    let Log {
+        frames,
+        mut notes,
+        lost,
+    } = log;
+    let first = frames.iter().filter_map(|own| own.at).min();
+    let first = first.unwrap_or(0).min(0);
+    let lines = one_bus(frames, links, &mut notes)?;
+    let timed = lines.iter().all(|own| own.at.is_some());
+    let (mut frames, mut errors, mut end) = (Vec::new(), 0, Span::ZERO);
+    for own in &lines {
+        let frame = match own.what {
+            What::Frame(frame) => frame,
+            What::Error => {
+                errors += 1;
+                continue;
+            }
+            What::Fd => {
+                return Err(CaptureError::Link {
+                    place: format!("line {}", own.place.number),
+                    what: "a frame of CAN FD, and classic frames are expected; choose another channel with `--link bus=...` where there is one"
+                        .to_owned(),
+                });
+            }
+        };
+        end = end + BitRate::K500.time_of(frame.wire_bits());
+        let at = own.at.filter(|_| timed);
+        let at = at.map(|at| at.abs_diff(first));
+        frames.push(FrameRead {
+            nanos: at.map_or(end, Span::from_units).as_nanos(),
+            sender: Sender::ByIdentifier,
+            frame,
+            ended: FrameEnd::Good,
+            place: own.place,
+        });
     }
-    let mut notes = Vec::new();
     if errors > 0 {
         notes.push(format!(
             "{} not read: the log does not say which frame it ended",
             counted(errors, "error frame")
         ));
     }
-    let frames = one_bus(frames, links, &mut notes)?;
-    let imported = assemble(frames, Counts::Lines, None);
-    notes.extend(imported.notes);
-    Ok(Imported { notes, ..imported })
-}
-
-/// The capture of a log in ASC, of which the times may be before 0.
-///
-/// # Errors
-/// Times too far apart; frames of several channels.
-pub(super) fn asc(
-    (logged, mut notes): (Vec<Logged>, Vec<String>),
-    links: &[NamedLink],
-) -> Result<Imported, CaptureError> {
-    let first = logged.iter().map(|own| own.at).min().unwrap_or(0).min(0);
-    let mut frames = Vec::new();
-    for own in &logged {
-        let since = own.at.checked_sub(first).map(i64::cast_unsigned);
-        let nanos = since.map(|own| Span::from_units(own).as_nanos());
-        let nanos = nanos
-            .filter(|own| *own <= LATEST)
-            .ok_or_else(|| CaptureError::Link {
-                place: "the log".to_owned(),
-                what: "times are more than a year apart".to_owned(),
-            })?;
-        frames.push((own.channel.as_str(), FrameRead { nanos, ..own.frame }));
+    if !timed {
+        notes.push("the log has no times that can be used: frames are placed one behind another, and their order alone is judged".to_owned());
     }
-    let frames = one_bus(frames, links, &mut notes)?;
-    let imported = assemble(frames, Counts::Lines, None);
+    let mut imported = assemble(frames, Counts::Lines, None);
+    imported.capture.timed = timed;
     notes.extend(imported.notes);
-    Ok(Imported { notes, ..imported })
+    Ok(Imported {
+        notes,
+        lost,
+        ..imported
+    })
 }
 
 /// The frames of one interface: that which `links` names, or the only one.
 fn one_bus(
-    frames: Vec<(&str, FrameRead)>,
+    frames: Vec<Logged>,
     links: &[NamedLink],
     notes: &mut Vec<String>,
-) -> Result<Vec<FrameRead>, CaptureError> {
+) -> Result<Vec<Logged>, CaptureError> {
     let wrong = |what: String| CaptureError::Link {
         place: "the log".to_owned(),
         what,
     };
-    let mut names: Vec<&str> = frames.iter().map(|own| own.0).collect();
+    let mut names: Vec<&str> = frames.iter().map(|own| own.channel.as_str()).collect();
     names.sort_unstable();
     names.dedup();
     let chosen = links.iter().find(|own| own.target == ChannelTarget::Bus);
     let chosen = chosen.and_then(|own| own.channel.as_deref());
     let name = match (chosen, names.as_slice()) {
-        (None, [] | [_]) => return Ok(frames.into_iter().map(|own| own.1).collect()),
+        (None, [] | [_]) => return Ok(frames),
         (None, [first, ..]) => {
             return Err(wrong(format!(
                 "it has frames of {}; choose one of {}, as in `--link bus={first}`",
@@ -224,8 +252,8 @@ fn one_bus(
         }
     };
     let all = frames.len();
-    let own = frames.into_iter().filter(|own| own.0 == name);
-    let own: Vec<FrameRead> = own.map(|own| own.1).collect();
+    let own = frames.iter().filter(|own| own.channel == name);
+    let own: Vec<Logged> = own.cloned().collect();
     if own.len() < all {
         let left = counted(all - own.len(), "frame");
         notes.push(format!("{left} of other interfaces not read"));
@@ -233,73 +261,25 @@ fn one_bus(
     Ok(own)
 }
 
-/// A line of the log; `None` for an error frame.
-fn logged(line: &str) -> Result<Option<FrameRead>, String> {
-    const FORM: &str = "(1436509052.249713) can0 201#3D4000 is expected, as candump -L writes it";
-    let shown: String = line.chars().take(60).collect();
-    let wrong = |what: &str| format!("{shown:?}: {what}");
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let (time, frame) = match words.as_slice() {
-        [time, _, frame] | [time, _, frame, "R" | "T"] => (time, frame),
-        _ => return Err(wrong(FORM)),
-    };
-    let time = time.strip_prefix('(').and_then(|own| own.strip_suffix(')'));
-    let nanos = time.and_then(nanoseconds).ok_or_else(|| wrong(FORM))?;
-    if frame.contains("##") {
-        return Err(wrong("a frame of CAN FD, and classic frames are expected"));
-    }
-    let (id, _) = frame.split_once('#').ok_or_else(|| wrong(FORM))?;
-    if id.len() == 8 && u32::from_str_radix(id, 16).is_ok_and(|id| id & ERROR != 0) {
-        return Ok(None);
-    }
-    // Behind `_` stands the raw length code of a frame with 8 bytes.
-    let frame = frame.split('_').next().unwrap_or(frame);
-    let frame: Frame = frame.parse().map_err(|bad| wrong(&format!("{bad}")))?;
-    Ok(Some(FrameRead {
-        nanos,
-        sender: Sender::ByIdentifier,
-        frame,
-        ended: FrameEnd::Good,
-        place: Place::default(),
-    }))
-}
-
 /// Puts logs in order of time where each ends before another one begins.
 pub(super) fn in_order_of_time<L: AsRef<[u8]>>(logs: &mut [L]) {
     let span = |log: &L| {
         let text = String::from_utf8_lossy(log.as_ref());
-        let times = text.lines().filter_map(|line| logged(line.trim()).ok()?);
-        times.map(|own| own.nanos).fold(None, |span, at| {
+        let times = text.lines().filter_map(candump_time);
+        times.fold(None, |span, at| {
             let (first, last) = span.unwrap_or((at, at));
             Some((at.min(first), at.max(last)))
         })
     };
     let mut spans: Vec<_> = logs.iter().map(span).collect();
     spans.sort_unstable();
-    let follow = |two: &[Option<(u64, u64)>]| match (two[0], two[1]) {
+    let follow = |two: &[Option<(i64, i64)>]| match (two[0], two[1]) {
         (Some((_, last)), Some((first, _))) => last <= first,
         _ => true,
     };
     if spans.windows(2).all(follow) {
         logs.sort_by_cached_key(span);
     }
-}
-
-/// Seconds with up to nine places, in nanoseconds.
-fn nanoseconds(text: &str) -> Option<u64> {
-    let (seconds, places) = text.split_once('.')?;
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|own| own.is_ascii_digit());
-    if !digits(seconds) || !digits(places) || places.len() > 9 {
-        return None;
-    }
-    let nanos: u64 = format!("{places:0<9}").parse().ok()?;
-    let seconds: u64 = seconds.parse().ok()?;
-    // More than any clock shows.
-    let most = u64::MAX / 8;
-    seconds
-        .checked_mul(1_000_000_000)?
-        .checked_add(nanos)
-        .filter(|own| *own < most)
 }
 
 #[derive(Deserialize)]

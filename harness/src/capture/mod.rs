@@ -51,6 +51,8 @@ pub struct Capture {
     pub traces: Vec<Trace>,
     /// How long the line was listened to, where the file says so.
     pub listened: Option<Listened>,
+    /// Whether the times are those of the line: a log may have none, and then the order alone is known.
+    pub timed: bool,
 }
 
 /// When a capture began and ended, beside what was heard.
@@ -147,13 +149,14 @@ pub fn read_with(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, Capt
     import::read(bytes, settings)
 }
 
-/// Whether a file looks like a capture, and not like a scenario.
+/// Whether a file is to be read as a capture, and not as a scenario: every file is that does not look like one.
 #[must_use]
 pub fn is_capture(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = regular::open(path, Links::Follow)
         .and_then(|file| file.take(4_096).read_to_end(&mut start));
-    read.is_ok() && import::is_known(&start)
+    let named = path.extension().is_some_and(|own| own == "scn");
+    read.is_ok() && !named && import::is_capture(&start)
 }
 
 /// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.
@@ -251,6 +254,7 @@ impl Assembly {
             rate: rate.unwrap_or_default(),
             traces,
             listened: None,
+            timed: true,
         };
         capture.check()?;
         if rate.is_none() {

@@ -41,6 +41,7 @@ pub(super) fn assemble(
             ..Trace::empty(slaves)
         }],
         listened: None,
+        timed: true,
     }
 }
 

@@ -75,9 +75,10 @@ pub enum ProgramCommand {
     Check(CheckArguments),
     /// Play a scenario and show every byte on every link.
     Trace(TraceArguments),
-    /// Compare a capture with the model, show it, or turn it into a scenario.
+    /// Judge the drives of a capture, show it, or turn it into a scenario.
     ///
-    /// The capture is pcapng, or the JSON of `trace`.
+    /// Captures and logs of many programs are read: Wireshark, candump, logic analysers, CAN tools, and what `trace` writes. The guide has the table
+    /// (Reports, "Files of other programs"); a file of another kind is named with what to do about it.
     Import(ImportArguments),
     /// Listen to a ring at taps without sending anything, keep what is heard, and judge it.
     ///

@@ -25,6 +25,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+/// How far times may be off where a log has none.
+const NO_TIMES: Span = Span::from_millis(86_400_000);
+
 /// Prints the dissector.
 pub(crate) fn dissector(bus: Bus, output: &mut Output) -> std::io::Result<Exit> {
     output.result(&buses::dissector(bus))?;
@@ -184,10 +187,12 @@ fn of_shared_line(
 ) -> std::io::Result<Exit> {
     let path = title;
     if !arguments.scenario {
-        // Times of a log are those of the bus unless the user says how far they are off.
-        let tolerance = arguments
-            .tolerance
-            .map_or(Span::ZERO, |_| span(arguments.tolerance));
+        // Times of a log are those of the bus unless the user says how far they are off; a log without times has an order alone.
+        let tolerance = match (capture.timed, arguments.tolerance) {
+            (false, _) => NO_TIMES,
+            (true, None) => Span::ZERO,
+            (true, given) => span(given),
+        };
         return match buses::judge_shared(&capture.traces, setup, tolerance) {
             Ok(judged) => {
                 let verdict = settled(judged.verdict, lost, output);
@@ -204,6 +209,12 @@ fn of_shared_line(
         output.complain(
             "--tolerance changes nothing in a scenario of frames or telegrams: each is sent at its own time; leave it out",
         );
+        return Ok(Exit::Usage);
+    }
+    if !capture.timed {
+        output.complain(&format!(
+            "{path}: a scenario sends at the times of the log, and it has none; log with times, as `candump -L` does"
+        ));
         return Ok(Exit::Usage);
     }
     match buses::shared_scenario(&capture.traces, title, setup) {
@@ -407,6 +418,7 @@ fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<C
         rate: rate.unwrap_or_default(),
         traces: play_entry(&entry, AtMismatch::GoOn).traces,
         listened: None,
+        timed: true,
     })
 }
 

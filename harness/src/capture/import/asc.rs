@@ -6,16 +6,17 @@
 //! | `Begin Triggerblock` | another recording: what was on the bus before it is not in the log |
 //! | `base hex  timestamps absolute` | the radix of identifiers and bytes; `relative` times count from the event before |
 //! | `0.001000 1  201x  Rx  d 3 3D 40 00 ...` | time, channel, identifier with `x` for 29 bits, direction, `d` data or `r` remote, length, bytes |
+//! | `0.001000 1  DriveRx  Rx  d 3 3D 40 00 ... ID = 513` | the same of a log with names: the identifier is decimal, at the end |
+//! | `0.001000 CANFD 1 Rx 201 0 0 3 3 3D 40 00 130000 130 0 ...` | a frame whose flags (behind duration and length) say whether it is of CAN FD (bit 12) |
 //! | `0.002000 1  ErrorFrame` | passed over and counted |
 //!
 //! All other lines that begin with a time are events of the program, in the user's language.
 
 use super::super::CaptureError;
-use super::super::frames::{FrameRead, Sender};
+use super::super::frames::{Log, Logged, What};
 use super::super::order::Place;
+use super::logs::{frame, identifier, logged};
 use super::numbers::{Time, seconds};
-use harness_proto::can::{Frame, Id};
-use harness_sim::record::FrameEnd;
 
 /// The lines in which a heading is looked for.
 const HEADING: usize = 20;
@@ -31,61 +32,49 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
     })
 }
 
-/// A frame, the channel that it was on, and its time.
-pub(in crate::capture) struct Logged {
-    pub(in crate::capture) channel: String,
-    pub(in crate::capture) at: Time,
-    pub(in crate::capture) frame: FrameRead,
-}
-
 struct Reader {
     radix: u32,
     relative: bool,
     /// The time of the event before.
     before: Time,
-    errors: usize,
     /// Lines so far, and blocks: a trigger begins and ends each of them.
     place: Place,
 }
 
-/// The frames of a log, and what is to be told about it.
+/// The frames of a log.
 ///
 /// # Errors
 /// A line that cannot be.
-pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Logged>, Vec<String>), CaptureError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
     let text = String::from_utf8_lossy(bytes);
     let mut reader = Reader {
         radix: 16,
         relative: false,
         before: 0,
-        errors: 0,
         place: Place::default(),
     };
-    let mut frames = Vec::new();
-    let mut notes = Vec::new();
+    let mut log = Log::default();
     for (number, line) in text.lines().enumerate() {
         reader.place.number = number + 1;
-        frames.extend(reader.line(line).map_err(|what| {
+        let read = reader.line(line).map_err(|what| {
             let shown: String = line.trim().chars().take(60).collect();
             CaptureError::Link {
                 place: format!("line {}", number + 1),
                 what: format!("{shown:?}: {what}"),
             }
-        })?);
+        })?;
+        log.frames.extend(read.map(|own| Logged {
+            place: reader.place,
+            ..own
+        }));
     }
-    if reader.errors > 0 {
-        let errors = reader.errors;
-        notes.push(format!(
-            "{errors} error frames not read: the log does not say which frames they ended"
-        ));
-    }
-    Ok((frames, notes))
+    Ok(log)
 }
 
 impl Reader {
     /// A line; `None` where it has no frame.
     fn line(&mut self, line: &str) -> Result<Option<Logged>, String> {
-        let words: Vec<&str> = line.split_whitespace().take(16).collect();
+        let words: Vec<&str> = line.split_whitespace().take(40).collect();
         match words.as_slice() {
             ["base", radix, rest @ ..] => {
                 self.radix = match *radix {
@@ -122,67 +111,80 @@ impl Reader {
     }
 
     /// What stands behind a time.
-    fn event(&mut self, at: Time, words: &[&str]) -> Result<Option<Logged>, String> {
-        let (channel, id, rest) = match words {
-            ["CANFD", ..] => {
-                return Err("a frame of CAN FD, and classic frames are expected".to_owned());
-            }
-            [_, "ErrorFrame", ..] => {
-                self.errors += 1;
-                return Ok(None);
-            }
+    fn event(&self, at: Time, words: &[&str]) -> Result<Option<Logged>, String> {
+        let (channel, what) = match words {
+            ["CANFD", channel, "Rx" | "Tx", rest @ ..] => (channel, with_flags(rest)?),
+            [channel, "ErrorFrame", ..] => (channel, What::Error),
             [channel, id, "Rx" | "Tx", kind @ ("d" | "r"), rest @ ..] => {
-                (channel, id, (*kind == "r", rest))
+                (channel, self.classic(id, *kind == "r", rest)?)
             }
             _ => return Ok(None),
         };
-        let (number, extended) = match id.strip_suffix('x') {
-            Some(number) => (number, true),
-            None => (*id, false),
+        Ok(Some(logged(channel, Some(at), what)))
+    }
+
+    /// A frame by its identifier or name, and what stands behind `d` or `r`.
+    fn classic(&self, name: &str, remote: bool, rest: &[&str]) -> Result<What, String> {
+        // A name may look like a number.
+        let stated = rest.windows(3).find_map(|own| match own {
+            ["ID", "=", id] => Some(*id),
+            _ => None,
+        });
+        let (text, radix) = stated.map_or((name, self.radix), |own| (own, 10));
+        let (digits, extended) = match text.strip_suffix('x') {
+            Some(digits) => (digits, true),
+            None => (text, false),
         };
-        let Ok(number) = u32::from_str_radix(number, self.radix) else {
-            let base = if self.radix == 16 {
-                "hexadecimal"
-            } else {
-                "decimal"
-            };
-            return Err(format!("`{id}` is no {base} identifier, which `base` says"));
-        };
-        let known = match extended {
-            true => Id::extended(number),
-            false => u16::try_from(number).ok().and_then(Id::base),
-        };
-        let id = known.ok_or_else(|| format!("identifier `{id}` is too large"))?;
-        let (remote, rest) = rest;
+        let number = identifier(digits, radix).map_err(|_| {
+            let base = if radix == 16 { "hexadecimal" } else { "decimal" };
+            format!(
+                "`{text}` is no {base} identifier, which `base` says; a log with names needs `ID =` at the end of its lines, or is \
+                 saved with numeric identifiers"
+            )
+        })?;
         // The length of a remote frame may be missing in old logs.
-        let length = rest
-            .first()
-            .and_then(|own| usize::from_str_radix(own, 16).ok());
-        let frame = match (remote, length) {
-            (true, length) => Frame::remote(id, length.unwrap_or(0)),
+        let length = rest.first();
+        let length = length.and_then(|own| usize::from_str_radix(own, 16).ok());
+        let length = match (remote, length) {
+            (_, Some(length)) => length,
+            (true, None) => 0,
             (false, None) => return Err("the length of the data is missing".to_owned()),
-            (false, Some(length)) => {
-                // A raw length code above 8 has 8 bytes.
-                let length = length.min(8);
-                let bytes = rest.iter().skip(1).take(length);
-                let bytes = bytes.map(|own| u8::from_str_radix(own, self.radix).ok());
-                match bytes.collect::<Option<Vec<u8>>>() {
-                    Some(bytes) if bytes.len() == length => Frame::new(id, &bytes),
-                    _ => return Err(format!("{length} data bytes are expected")),
-                }
-            }
         };
-        let frame = FrameRead {
-            nanos: 0,
-            sender: Sender::ByIdentifier,
-            frame: frame.map_err(|bad| bad.to_string())?,
-            ended: FrameEnd::Good,
-            place: self.place,
-        };
-        Ok(Some(Logged {
-            channel: (*channel).to_owned(),
-            at,
-            frame,
-        }))
+        let data = rest.get(1..).unwrap_or_default();
+        let id = (number, Some(extended));
+        Ok(What::Frame(frame(id, remote, length, data, self.radix)?))
+    }
+}
+
+/// A line CANFD behind its direction: identifier, perhaps a name, BRS, ESI, length code, length, data, duration, bits, flags. All numbers but
+/// the length are hexadecimal.
+fn with_flags(words: &[&str]) -> Result<What, String> {
+    /// Bits of the flags.
+    const REMOTE: u32 = 1 << 4;
+    const FD: u32 = 1 << 12;
+    let (id, rest) = match words {
+        [id, rest @ ..] if matches!(rest, ["0" | "1", "0" | "1", ..]) => (*id, rest),
+        [id, _, rest @ ..] => (*id, rest),
+        _ => return Err("an identifier is expected".to_owned()),
+    };
+    let [switch, _, _, length, rest @ ..] = rest else {
+        return Err("BRS, ESI, length code and length are expected".to_owned());
+    };
+    let length: usize = length
+        .parse()
+        .map_err(|_| format!("`{length}` is no length of the data"))?;
+    let (digits, extended) = match id.strip_suffix('x') {
+        Some(digits) => (digits, true),
+        None => (id, false),
+    };
+    let flags = rest.get(length.saturating_add(2));
+    let flags = flags.and_then(|own| u32::from_str_radix(own, 16).ok());
+    match flags {
+        Some(flags) if flags & FD == 0 && *switch == "0" && length <= 8 => {
+            let id = (identifier(digits, 16)?, Some(extended));
+            let own = frame(id, flags & REMOTE != 0, length, rest, 16)?;
+            Ok(What::Frame(own))
+        }
+        _ => Ok(What::Fd),
     }
 }

@@ -6,8 +6,10 @@
 
 mod asc;
 mod cut;
+mod forms;
 mod levels;
 mod links;
+mod logs;
 mod numbers;
 mod own;
 mod saleae;
@@ -16,8 +18,8 @@ mod table;
 mod uart;
 mod vcd;
 
-pub(super) use asc::Logged;
 pub use links::{ChannelTarget, NamedLink};
+pub(super) use logs::candump_time;
 pub use uart::UartFormat;
 
 use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
@@ -125,8 +127,21 @@ fn first(bytes: &[u8]) -> Option<u8> {
         .find(|byte| !byte.is_ascii_whitespace())
 }
 
+/// The log of candump, with `-L` or on the screen.
+const CANDUMP: &str = "log of candump";
+
+/// A log of frames as text: its name, by what it is recognised, and its form.
+macro_rules! log {
+    ($name:expr, $recognised:expr, $form:expr) => {
+        whole($name, $recognised, |bytes, settings| {
+            frames::of_log(logs::read(bytes, &$form)?, &settings.links)
+        })
+        .of(Parts::Lines)
+    };
+}
+
 /// The formats; a file is of the first one that recognises it.
-const FORMATS: [Format; 16] = [
+const FORMATS: [Format; 23] = [
     whole(
         "pcapng (Wireshark)",
         |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
@@ -140,12 +155,6 @@ const FORMATS: [Format; 16] = [
             pcap::read(bytes, settings.rate, link)
         },
     ),
-    whole(
-        "log of candump",
-        |bytes| first(bytes) == Some(b'('),
-        |bytes, settings| frames::candump(bytes, &settings.links),
-    )
-    .of(Parts::Lines),
     whole(
         "frames in JSON",
         |bytes| first(bytes) == Some(b'{') && frames::is_json(bytes),
@@ -173,9 +182,23 @@ const FORMATS: [Format; 16] = [
     .of(Parts::Lines),
     whole("telegrams in csv", own::is_telegrams, own::telegrams).of(Parts::Lines),
     whole("ASC (Vector)", asc::recognised, |bytes, settings| {
-        frames::asc(asc::read(bytes)?, &settings.links)
+        frames::of_log(asc::read(bytes)?, &settings.links)
     })
     .of(Parts::Lines),
+    log!("TRC (PEAK)", forms::is_trc, forms::TRC),
+    log!(
+        "csv of frames (GVRET, SavvyCAN)",
+        forms::is_gvret,
+        forms::GVRET
+    ),
+    log!("log of BUSMASTER", forms::is_busmaster, forms::BUSMASTER),
+    log!(
+        "text of frames (python-can)",
+        forms::is_printed,
+        forms::PRINTED
+    ),
+    log!("text of frames (Kvaser)", forms::is_kvaser, forms::KVASER),
+    log!("trace of CANHacker", forms::is_canhacker, forms::CANHACKER),
     channels("VCD", vcd::recognised, |bytes, _| vcd::read(bytes)).of(Parts::Words),
     channels(
         "binary levels (Saleae Logic)",
@@ -204,41 +227,48 @@ const FORMATS: [Format; 16] = [
         |bytes, _| saleae::levels(bytes),
     )
     .of(Parts::Lines),
+    log!("CRTD (OVMS)", forms::is_crtd, forms::CRTD),
+    log!(CANDUMP, logs::is_candump, logs::CANDUMP),
 ];
 
 /// The formats of which parts follow each other in one text: sections of pcapng, lines of a log.
-const JOINED: [&str; 2] = ["pcapng (Wireshark)", "log of candump"];
+const JOINED: [&str; 2] = ["pcapng (Wireshark)", CANDUMP];
 
-/// Formats that are not read, by their first bytes, with what to do instead.
-const FOREIGN: [(&[u8], &str); 12] = [
+/// Formats that are not read, by their first bytes, with what to do instead. Each command has been tried.
+const FOREIGN: [(&[u8], &str); 13] = [
     (
         b"PK\x03\x04",
         "a zip archive, as .sal and .sr files are; export the levels from Logic as csv or binary, or write a VCD with `sigrok-cli -i \
-         FILE.sr -O vcd -o FILE.vcd`",
+         FILE.sr -O vcd | grep -v ' V DC$' > FILE.vcd` (grep takes out what sigrok 0.7 writes for analogue channels)",
     ),
     (
         b"\x1F\x8B",
-        "compressed with gzip; decompress it with `gunzip`",
+        "compressed with gzip; decompress it with `gunzip FILE.gz`",
     ),
     (
         b"\x28\xB5\x2F\xFD",
-        "compressed with zstd; decompress it with `unzstd`",
+        "compressed with zstd; decompress it with `unzstd FILE.zst`",
     ),
     (
         b"BZh",
-        "compressed with bzip2; decompress it with `bunzip2`",
+        "compressed with bzip2; decompress it with `bunzip2 FILE.bz2`",
     ),
     (
         b"LOGG",
-        "a BLF log by Vector; save it as ASC, or convert it with python-can's `can_logconvert FILE.blf FILE.asc`",
+        "a BLF log by Vector; convert it with python-can: `can_logconvert FILE.blf FILE.log`",
     ),
     (
         b"MDF     ",
-        "an MDF log; convert it with python-can's `can_logconvert FILE.mf4 FILE.asc`",
+        "an MDF log; convert it with python-can and asammdf (`pip install 'python-can[mf4]'`): `can_logconvert FILE.mf4 FILE.log`",
     ),
     (
-        b";$FILEVERSION",
-        "a trace by PEAK; convert it with python-can's `can_logconvert FILE.trc FILE.asc`",
+        b"timestamp,arbitration_id,",
+        "a csv by python-can; convert it with python-can: `can_logconvert FILE.csv FILE.log`",
+    ),
+    (
+        b"# Logger type:",
+        "a log by a CLX000; its lines become those of candump without times with `awk -F';' '$2 ~ /^[0-9]+$/ { i = \"00000000\" $3; \
+         print \"can0 \" substr(i, length(i) - ($2 % 2 ? 7 : 2)) \"#\" $NF }' FILE.txt > FILE.log`",
     ),
     (b"\xFF\xFE", "text in UTF-16; save it as UTF-8"),
     (b"\xFE\xFF", "text in UTF-16; save it as UTF-8"),
@@ -249,7 +279,7 @@ const FOREIGN: [(&[u8], &str); 12] = [
     (b"\x89PNG", "a picture; a capture is expected"),
     (
         b"SQLite format 3",
-        "a database; export a capture from its program",
+        "a database; one by python-can (.db) is converted by `can_logconvert FILE.db FILE.log`, another one is exported from its program",
     ),
 ];
 
@@ -262,9 +292,19 @@ fn format(bytes: &[u8]) -> Option<&'static Format> {
     FORMATS.iter().find(|own| (own.recognised)(bytes))
 }
 
-/// Whether bytes are the beginning of a capture in any format.
-pub(super) fn is_known(start: &[u8]) -> bool {
-    format(without_mark(start)).is_some()
+/// Whether a file that begins so is to be read as a capture: it is of a format, or it is no text of a scenario either.
+pub(super) fn is_capture(start: &[u8]) -> bool {
+    /// Words that begin a line of a scenario's header or a step.
+    const SCENARIO: [&str; 12] = [
+        "title", "source", "bus", "needs", "strict", "deadline", "ring", "drive", "slave", ">",
+        "<", "!",
+    ];
+    let word = |line: &str| {
+        let word = line.split_whitespace().next();
+        word.is_some_and(|own| SCENARIO.contains(&own) || own.starts_with('@'))
+    };
+    let start = without_mark(start);
+    format(start).is_some() || !String::from_utf8_lossy(start).lines().any(word)
 }
 
 /// Reads the bytes of a file.
@@ -394,5 +434,7 @@ fn foreign(bytes: &[u8]) -> CaptureError {
 
 #[cfg(test)]
 mod hostile_tests;
+#[cfg(test)]
+mod log_tests;
 #[cfg(test)]
 mod tests;

@@ -6,6 +6,7 @@ use super::links::{ChannelRead, Signal};
 use super::numbers::{Time, byte, date, from_float, seconds};
 use super::table::{Table, columns, first_line};
 use super::uart::OctetRead;
+use crate::counted::counted;
 use harness_proto::line::LineError;
 
 /// What to do about bytes in another radix.
@@ -196,7 +197,8 @@ pub(super) fn data_table(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>)
     let mut notes = Vec::new();
     if others > 0 {
         notes.push(format!(
-            "{others} rows not read: they are not of the type `data`"
+            "{} not read, of another type than `data`",
+            counted(others, "row")
         ));
     }
     let channels = channels.into_iter().map(|(name, octets)| ChannelRead {

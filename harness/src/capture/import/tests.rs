@@ -265,6 +265,7 @@ fn our_own_files_survive() {
         rate: Rate::Baud38400,
         traces: traces.to_vec(),
         listened: None,
+        timed: true,
     };
     let mut file = Vec::new();
     crate::report::csv::write(&traces, &mut file).expect("a Vec");
@@ -342,7 +343,7 @@ fn a_table_of_octets() {
                 \"97->96\",\"data\",0.0012,0.000260417,0xFE,\"parity\"\n";
     let found = imported(file, &settings(&[]));
     assert_eq!(shown(&found.capture), "98->97: 88\n97->96: FEp\n");
-    assert!(found.notes[0].contains("1 rows not read"));
+    assert!(found.notes[0].contains("1 row not read"));
     let dated = "data,start_time,type,duration\n0x12,2022-01-05T12:00:00.000+01:00,data,0\n0x13,2022-01-05T12:00:00.002+01:00,data,0\n";
     let found = imported(dated, &settings(&["1->0"]));
     assert_eq!(shown(&found.capture), "1->0: 12 13\n");
@@ -475,7 +476,7 @@ fn what_a_file_looks_like() {
         (b"PK\x03\x04abc".as_slice(), "a zip archive"),
         (b"\x1F\x8B\x08", "gunzip"),
         (b"LOGG\x90", "BLF"),
-        (b";$FILEVERSION=1.1\n", "PEAK"),
+        (b"timestamp,arbitration_id,ext", "can_logconvert FILE.csv"),
         (b"\xFF\xFET\0i\0", "UTF-16"),
         (
             b"hello world\nsecond",
@@ -535,7 +536,7 @@ fn asc() {
     for (line, expected) in [
         ("0.1 CANFD 1 Rx 201 0 0 8 8", "CAN FD"),
         ("0.1 1 FFF Rx d 0", "too large"),
-        ("0.1 1 201 Rx d 3 3D 40", "3 data bytes are expected"),
+        ("0.1 1 201 Rx d 3 3D 40", "3 data bytes expected"),
         ("0.1 1 20Z Rx d 0", "no hexadecimal identifier"),
     ] {
         let words = refused(

@@ -280,7 +280,7 @@ fn what_cannot_be_is_refused_with_its_range() {
     refused(
         &steps("@2000000s > 80"),
         "2000000s",
-        "longer than ten minutes",
+        "longer than eleven minutes",
         None,
     );
     refused(&steps("> 80 drive"), "drive", "hexadecimal", None);

@@ -40,7 +40,7 @@ fn until_waits_for_what_must_hold() {
     refused(
         &nd21("until drive 0 nist = 0rpm within 700s"),
         "700s",
-        "ten minutes",
+        "eleven minutes",
         None,
     );
     refused(

@@ -300,6 +300,7 @@ fn model(
         rate: plan.rate,
         traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
         listened: None,
+        timed: true,
     };
     Ok((capture, outcome.remarks))
 }

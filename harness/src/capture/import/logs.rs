@@ -1,0 +1,342 @@
+//! Logs of frames as text, a frame a line: how every form is read, and those of candump.
+//!
+//! | form | a line |
+//! |---|---|
+//! | candump with `-l` or `-L` | `(1436509052.249713) can0 201#3D4000`, and the direction behind it in newer versions |
+//! | candump on the screen | ` (2023-11-14 22:13:20.001000)  can0  201   [3]  3D 40 00`; the time of `-ta`, `-tA`, `-td`, `-tz`, or none |
+//!
+//! The other forms are in `forms`.
+
+use super::super::CaptureError;
+use super::super::frames::{Log, Logged, What};
+use super::super::order::Place;
+use super::numbers::{Time, date, seconds};
+use crate::counted::counted;
+use crate::report::pcapng_frames::ERROR;
+use harness_proto::can::{Frame, Id};
+
+/// Where a line of a frame is looked for behind headings.
+const HEADING: usize = 4_096;
+
+/// A form of logs.
+pub(super) struct Form {
+    /// Reads a line; `None` for one that has no frame.
+    pub(super) line: fn(&mut State, &str) -> Result<Option<Logged>, String>,
+    /// After how long its clock begins again.
+    pub(super) wraps: Option<Time>,
+}
+
+pub(super) const CANDUMP: Form = Form {
+    line: candump,
+    wraps: None,
+};
+/// What the lines so far have said.
+pub(super) struct State {
+    /// A frame has been read.
+    begun: bool,
+    /// Lines in front of the first frame that say nothing here.
+    headings: usize,
+    /// The columns, where a heading says them.
+    pub(super) columns: String,
+    pub(super) radix: u32,
+    /// Each time counts from the frame before.
+    pub(super) relative: bool,
+    /// A line was in the form of the screen.
+    screen: bool,
+    /// The log says that frames are missing.
+    lost: Option<String>,
+}
+
+/// The frames of a log of this form.
+///
+/// # Errors
+/// A line that cannot be.
+pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut state = State {
+        begun: false,
+        headings: 0,
+        columns: String::new(),
+        radix: 16,
+        relative: false,
+        screen: false,
+        lost: None,
+    };
+    let mut log = Log::default();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() {
+            continue;
+        }
+        let read = (form.line)(&mut state, line).map_err(|what| {
+            let shown: String = line.chars().take(60).collect();
+            CaptureError::Link {
+                place: format!("line {}", number + 1),
+                what: format!("{shown:?}: {what}"),
+            }
+        })?;
+        if let Some(own) = read {
+            state.begun = true;
+            log.frames.push(Logged {
+                place: Place::of(number + 1),
+                ..own
+            });
+        }
+    }
+    if state.headings > 0 {
+        let headings = counted(state.headings, "line");
+        log.notes
+            .push(format!("{headings} in front of the first frame not read"));
+    }
+    if let Some(lost) = state.lost.take() {
+        log.notes.push(lost);
+        log.lost = true;
+    }
+    if state.screen {
+        settle_times(&mut log, &mut state);
+    }
+    if state.relative {
+        let mut at = 0_i64;
+        for own in &mut log.frames {
+            at = own.at.map_or(at, |own| at.saturating_add(own));
+            own.at = own.at.map(|_| at);
+        }
+    }
+    if let Some(period) = form.wraps {
+        unwrap_times(&mut log.frames, period);
+    }
+    Ok(log)
+}
+
+/// Whether the times on a screen count from the first frame (`-tz`) or each from the one before (`-td`): both begin at 0 and look alike.
+fn settle_times(log: &mut Log, state: &mut State) {
+    // A log of as many frames in which each cycle is shorter than the one before has not been seen.
+    const ENOUGH: usize = 20;
+    let times: Vec<Time> = log.frames.iter().filter_map(|own| own.at).collect();
+    if times.len() < 3 || times[0] != 0 {
+        return;
+    }
+    let back = times.windows(2).filter(|two| two[1] < two[0]).count();
+    if back >= 2 && back * 8 >= times.len() {
+        state.relative = true;
+        let note = "times go back, so each is taken to count from the frame before (candump -td)";
+        log.notes.push(note.to_owned());
+    } else if times.len() < ENOUGH {
+        for own in &mut log.frames {
+            own.at = None;
+        }
+        let note = "whether times count from the first frame or from the one before, so short a log does not show (candump -tz, -td)";
+        log.notes.push(note.to_owned());
+    }
+}
+
+/// Times of a clock that begins again after `period`, as times since the first frame.
+fn unwrap_times(frames: &mut [Logged], period: Time) {
+    let first = frames.iter().find_map(|own| own.at).unwrap_or_default();
+    let (mut before, mut added) = (None, first.saturating_neg());
+    for own in frames {
+        let Some(at) = own.at else {
+            continue;
+        };
+        if before.is_some_and(|before: Time| before - at > period / 2) {
+            added = added.saturating_add(period);
+        }
+        before = Some(at);
+        own.at = Some(at.saturating_add(added));
+    }
+}
+
+/// Whether a line in the first part of a file is one of a frame.
+pub(super) fn shows(bytes: &[u8], line: fn(&str) -> bool) -> bool {
+    let start = String::from_utf8_lossy(&bytes[..bytes.len().min(HEADING)]);
+    start.lines().map(str::trim).any(line)
+}
+
+pub(super) fn is_candump(bytes: &[u8]) -> bool {
+    let is_frame = |line: &str| {
+        let line = plain(line);
+        matches!(split_time(&line), Ok((_, words)) if is_screen(&words) || is_log(&words))
+    };
+    bytes.trim_ascii_start().starts_with(b"(") || shows(bytes, is_frame)
+}
+
+/// The frame of these parts; `extended` as far as the log says it, and by the identifier where it does not.
+pub(super) fn frame(
+    (number, extended): (u32, Option<bool>),
+    remote: bool,
+    length: usize,
+    bytes: &[&str],
+    radix: u32,
+) -> Result<Frame, String> {
+    let known = match extended.unwrap_or(number > 0x7FF) {
+        true => Id::extended(number),
+        false => u16::try_from(number).ok().and_then(Id::base),
+    };
+    let id = known.ok_or_else(|| format!("identifier {number:X} is too large"))?;
+    // A raw length code above 8 has 8 bytes.
+    let length = length.min(8);
+    if remote {
+        return Frame::remote(id, length).map_err(|bad| bad.to_string());
+    }
+    let own = bytes.iter().take(length).map(|own| {
+        let digits = own.bytes().all(|digit| digit.is_ascii_alphanumeric());
+        u8::from_str_radix(own, radix).ok().filter(|_| digits)
+    });
+    match own.collect::<Option<Vec<u8>>>() {
+        Some(own) if own.len() == length => Frame::new(id, &own).map_err(|bad| bad.to_string()),
+        _ => Err(format!("{} expected", counted(length, "data byte"))),
+    }
+}
+
+pub(super) fn identifier(text: &str, radix: u32) -> Result<u32, String> {
+    let digits = text.bytes().all(|digit| digit.is_ascii_alphanumeric());
+    let number = u32::from_str_radix(text, radix).ok().filter(|_| digits);
+    number.ok_or_else(|| format!("`{text}` is no identifier"))
+}
+
+pub(super) fn logged(channel: &str, at: Option<Time>, what: What) -> Logged {
+    Logged {
+        channel: channel.to_owned(),
+        at,
+        what,
+        place: Place::default(),
+    }
+}
+
+/// A line without the colours of a terminal.
+fn plain(line: &str) -> String {
+    let mut parts = line.split('\x1b');
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        plain.push_str(part.split_once('m').map_or(part, |own| own.1));
+    }
+    plain
+}
+
+/// The time at the beginning of a line of candump, and the words behind it.
+fn split_time(line: &str) -> Result<(Option<Time>, Vec<&str>), String> {
+    let Some(rest) = line.trim_start().strip_prefix('(') else {
+        return Ok((None, line.split_whitespace().collect()));
+    };
+    let split = rest.split_once(')').and_then(|(time, rest)| {
+        let time = match time.contains('-') {
+            true => date(time),
+            false => seconds(time).filter(|own| *own >= 0 && time.contains('.')),
+        };
+        Some((time?, rest))
+    });
+    let (time, rest) = split.ok_or("a time in seconds is expected in the brackets")?;
+    Ok((Some(time), rest.split_whitespace().collect()))
+}
+
+/// The time of a line of candump that has a frame.
+pub(in crate::capture) fn candump_time(line: &str) -> Option<Time> {
+    let (time, words) = split_time(line).ok()?;
+    time.filter(|_| is_log(&words) || is_screen(&words))
+}
+
+/// Whether words are an interface and a frame in one word.
+fn is_log(words: &[&str]) -> bool {
+    let is_frame = |text: &str| {
+        let id = text.split_once('#').map_or("", |own| own.0);
+        matches!(id.len(), 3 | 8) && id.bytes().all(|own| own.is_ascii_hexdigit())
+    };
+    let named = |own: &str| own.starts_with(|first: char| first.is_ascii_alphanumeric());
+    matches!(words, [name, frame] | [name, frame, "R" | "T"] if named(name) && is_frame(frame))
+}
+
+/// Whether words have a length in brackets: a frame on the screen.
+fn is_screen(words: &[&str]) -> bool {
+    words
+        .iter()
+        .skip(2)
+        .take(4)
+        .any(|own| length(own).is_some())
+}
+
+/// The length in `[3]`, or the raw length code in `{F}`.
+fn length(word: &str) -> Option<&str> {
+    let square = word.strip_prefix('[').and_then(|own| own.strip_suffix(']'));
+    let curly = || word.strip_prefix('{').and_then(|own| own.strip_suffix('}'));
+    let own = square.or_else(curly)?;
+    let digits = own.bytes().all(|digit| digit.is_ascii_hexdigit());
+    (digits && (1..=3).contains(&own.len())).then_some(own)
+}
+
+fn candump(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
+    const FORM: &str = "(1436509052.249713) can0 201#3D4000 is expected, as candump -L writes it";
+    if line.starts_with('#') || line.starts_with("^C") {
+        return Ok(None);
+    }
+    if line.starts_with("DROPCOUNT") {
+        state.lost = Some(format!("candump noted that frames are missing: {line}"));
+        return Ok(None);
+    }
+    let line = plain(line);
+    let (at, words) = split_time(&line).map_err(|_| FORM.to_owned())?;
+    if let [channel, frame] | [channel, frame, "R" | "T"] = words.as_slice()
+        && (is_log(&words) || at.is_some() && frame.contains('#'))
+    {
+        return one_word(channel, at, frame).map(Some);
+    }
+    if is_screen(&words) {
+        state.screen = true;
+        return screen(at, &words).map(Some);
+    }
+    // What an error frame says stands below it in words.
+    let explains = state.screen && at.is_none() && line.ends_with('}');
+    match (at, state.begun) {
+        (None, false) => state.headings += 1,
+        _ if explains => {}
+        _ => return Err(FORM.to_owned()),
+    }
+    Ok(None)
+}
+
+/// The frame of a line of candump -L.
+fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<Logged, String> {
+    let (id, data) = frame.split_once('#').unwrap_or((frame, ""));
+    let what = if data.starts_with('#') {
+        What::Fd
+    } else if id.len() == 8 && u32::from_str_radix(id, 16).is_ok_and(|id| id & ERROR != 0) {
+        What::Error
+    } else {
+        // Behind `_` stands the raw length code of a frame with 8 bytes.
+        let frame = frame.split('_').next().unwrap_or(frame);
+        What::Frame(frame.parse().map_err(|bad| format!("{bad}"))?)
+    };
+    Ok(logged(channel, at, what))
+}
+
+/// The frame of a line on the screen: `can0  201   [3]  3D 40 00`, with `RX - -` behind the interface (`-x`), bytes in binary (`-i`), or
+/// their characters behind them (`-a`).
+fn screen(at: Option<Time>, words: &[&str]) -> Result<Logged, String> {
+    let (channel, rest) = match words {
+        [channel, "RX" | "TX", _, _, rest @ ..] | [channel, rest @ ..] => (*channel, rest),
+        [] => ("", words),
+    };
+    let [id, stated, rest @ ..] = rest else {
+        return Err("an identifier and a length are expected".to_owned());
+    };
+    let stated = length(stated).ok_or("a length in brackets is expected")?;
+    let number = identifier(id, 16)?;
+    let what = if id.len() == 8 && number & ERROR != 0 {
+        What::Error
+    } else if stated.len() > 1 {
+        // candump states the length of a frame of CAN FD with two digits.
+        What::Fd
+    } else {
+        let binary = rest.first().is_some_and(|own| own.len() == 8);
+        let remote = rest.first() == Some(&"remote");
+        let id = (number, Some(id.len() == 8));
+        let length = usize::from_str_radix(stated, 16).unwrap_or(usize::MAX);
+        What::Frame(frame(
+            id,
+            remote,
+            length,
+            rest,
+            if binary { 2 } else { 16 },
+        )?)
+    };
+    Ok(logged(channel, at, what))
+}
