@@ -113,7 +113,7 @@ mod tests {
         "9000000,master,201,0,3,3DE200,\n",
     ];
     const JSON: [&str; 4] = [
-        "{\"schema\":2,\"bus\":\"unitek\",\"frames\":[",
+        "{\"schema\":2,\"frames\":[",
         "{\"t_ns\":1000000,\"id\":513,\"data\":[61,226,0],\"from\":\"master\",\"fault\":null},",
         "{\"t_ns\":1400000,\"id\":385,\"data\":[226,1,0,0],\"from\":1,\"fault\":null},",
         "{\"t_ns\":9000000,\"id\":513,\"data\":[61,226,0],\"from\":\"master\",\"fault\":null}]}\n",
