@@ -1,9 +1,11 @@
 //! Why a slave refuses what a master sets it up with (EN 2).
 
 use harness_proto::nordac::{IDENT, PpoType};
-use harness_proto::profibus::Buffer;
 use harness_proto::profibus::dp::SetPrm;
 use std::fmt;
+
+/// How many octets of a configuration are kept.
+const SHOWN: usize = 8;
 
 /// Why Set_Prm or Chk_Cfg was refused. The diagnosis shows no more than Prm_Fault or Cfg_Fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,11 +18,21 @@ pub enum Refusal {
     Watchdog([u8; 2]),
     /// Set_Prm has this number of octets of user parameters (GSD: User_Prm_Data_Len 0).
     UserData(usize),
-    /// Chk_Cfg has this configuration, and the slave is set to this PPO type.
-    Configuration(Buffer, PpoType),
+    /// Chk_Cfg has a configuration of this many octets, of which these are the first, and the slave is set to this PPO type.
+    Configuration([u8; SHOWN], usize, PpoType),
 }
 
 impl Refusal {
+    /// A configuration is refused by a slave of this PPO type.
+    pub(super) fn configuration(octets: &[u8], ppo: PpoType) -> Self {
+        let mut first = [0; SHOWN];
+        first
+            .iter_mut()
+            .zip(octets)
+            .for_each(|(to, from)| *to = *from);
+        Self::Configuration(first, octets.len(), ppo)
+    }
+
     /// Why parameters are refused; `None` for those that a slave accepts that may `ignore` user parameters.
     pub(super) fn of(prm: &SetPrm<'_>, ignore: bool) -> Option<Self> {
         if prm.ident != IDENT {
@@ -61,10 +73,10 @@ impl fmt::Display for Refusal {
                 f,
                 "Set_Prm is refused: it has {octets} octets of user parameters, and a NORDAC vector takes none"
             ),
-            Self::Configuration(octets, ppo) => write!(
+            Self::Configuration(octets, length, ppo) => write!(
                 f,
                 "Chk_Cfg is refused: its configuration is {}, and that of {ppo}, to which the slave is set (1622), is {}",
-                hex(octets),
+                hex(&octets[..(*length).min(SHOWN)]),
                 hex(ppo.cfg())
             ),
         }

@@ -5,7 +5,6 @@ use harness_proto::nordac::properties::{
     CfgFollowsPpoType, ChkCfgEarly, ExtDiag, ForeignPrm, UserPrm,
 };
 use harness_proto::nordac::{IDENT, PpoType};
-use harness_proto::profibus::Buffer;
 use harness_proto::profibus::dp::{Diagnosis, DpState, SetPrm};
 use harness_proto::time::{Instant, Span};
 
@@ -92,8 +91,7 @@ impl Slave {
             None => {
                 self.wait_for_parameters();
                 self.cfg_fault = true;
-                let octets = Buffer::of(data).unwrap_or_default();
-                self.refusal = Some(Refusal::Configuration(octets, self.settings.ppo));
+                self.refusal = Some(Refusal::configuration(data, self.settings.ppo));
             }
         }
         Outcome::Confirmed
