@@ -215,7 +215,7 @@ fn verdict(capture: &Capture) -> Option<Verdict> {
         tolerance: Span::from_millis(10),
     };
     match share_a_line(&capture.traces) {
-        true => judge_shared(&capture.traces, None, Span::ZERO)
+        true => judge_shared(&capture.traces, None, (&[], Span::ZERO))
             .ok()
             .map(|own| own.verdict),
         false => judge(capture, &options).ok().map(|own| own.verdict),

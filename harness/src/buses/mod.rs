@@ -40,7 +40,7 @@ pub use novobus::language::Novobus as DefaultBus;
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
 pub(crate) use nordac::cli::CyclicCommand;
-pub(crate) use nordac::senders::TelegramCutter;
+pub(crate) use nordac::senders::{LineRead, TelegramCutter};
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
@@ -62,7 +62,6 @@ use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::medium::ErrorMarks;
 use crate::port::Wire;
-use crate::report::pcapng_telegrams::PacketOctet;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Rig, SessionError, UseOptions};
 use crate::scenario::plan::Plan;
@@ -248,11 +247,6 @@ pub(crate) fn line_formats(shared: bool) -> Vec<Format> {
     }
 }
 
-/// Who sent the octets of a line that stations share, recorded at one place; `None` for a master. `octet` is the time of an octet.
-pub(crate) fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
-    nordac::senders::senders(octets, octet)
-}
-
 /// Text of what a place of a capture carries, while it arrives. Of a link of a ring, its rate, and the number of drives where it is known.
 pub(crate) fn live_text(place: &RecordedPlace, drives: Option<u8>) -> Box<dyn LiveText> {
     match (place.carries, ends(&place.name)) {
@@ -309,20 +303,23 @@ pub(crate) struct JudgedFrames {
     pub(crate) verdict: Verdict,
     /// How many frames or telegrams of drives were compared.
     pub(crate) compared: usize,
+    /// How many replies could be compared, on a bus on which drives only reply.
+    pub(crate) replies: Option<usize>,
     /// What differs, a sentence each.
     pub(crate) differences: Vec<String>,
     /// What was not compared, a sentence each.
     pub(crate) remarks: Vec<String>,
 }
 
-/// Judges a capture of a shared line; `setup` describes the drives, and times may be off by `tolerance`.
+/// Judges a capture of a shared line; `setup` describes the drives, `named` are those that are judged, where the user names some, and
+/// times may be off by `tolerance`.
 ///
 /// # Errors
 /// It does not say enough of the drives, in a sentence.
 pub(crate) fn judge_shared(
     traces: &[Trace],
     setup: Option<&Source>,
-    tolerance: Span,
+    (named, tolerance): (&[u8], Span),
 ) -> Result<JudgedFrames, String> {
     match shared(traces) {
         Some(Bus::Nordac) if setup.is_some() => Err(
@@ -330,8 +327,8 @@ pub(crate) fn judge_shared(
              leave it out"
                 .to_owned(),
         ),
-        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces, tolerance)),
-        _ => unitek::capture::judged(traces, setup, tolerance),
+        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces, (named, tolerance))),
+        _ => unitek::capture::judged(traces, setup, (named, tolerance)),
     }
 }
 

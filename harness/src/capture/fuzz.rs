@@ -1,6 +1,6 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use super::{ComparedRun, JudgeOptions, diff, read, scenario};
+use super::{ComparedRun, JudgeOptions, ReadSettings, diff, read, read_with, scenario};
 use crate::report::{csv, json, pcapng, svg, vcd};
 use harness_proto::time::Span;
 
@@ -14,6 +14,14 @@ const LONGEST: usize = 65_536;
 /// Something that was written is not read back.
 pub fn import(data: &[u8]) {
     let data = &data[..data.len().min(LONGEST)];
+    // The user may say what a channel or an interface is.
+    for link in ["bus", "1->0=0"] {
+        let settings = ReadSettings {
+            links: link.parse().into_iter().collect(),
+            ..ReadSettings::default()
+        };
+        let _any = read_with(data, &settings);
+    }
     let capture = match read(data, None) {
         Ok(capture) => capture,
         Err(error) => {

@@ -9,6 +9,10 @@
 
 pub(crate) mod diff;
 pub(crate) mod faults;
+#[cfg(test)]
+mod field_levels_tests;
+#[cfg(test)]
+mod field_tests;
 pub(crate) mod files;
 pub mod frame_diff;
 mod frames;
@@ -31,6 +35,7 @@ pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
 pub(crate) use tape::Tape;
 
 use crate::buses::MOST_IN_A_RING;
+use crate::counted::counted;
 use crate::regular::{self, Links};
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
@@ -310,6 +315,33 @@ impl Capture {
     pub fn bytes(&self) -> usize {
         let links = self.traces.iter().flat_map(|trace| &trace.channels);
         links.map(|link| link.octets().len()).sum()
+    }
+
+    /// Where more than a quarter of the octets of a line was received with an error, in a sentence: that is no cable, but a wrong rate, format
+    /// or channel, and what is not damaged there may be wrong as well.
+    #[must_use]
+    pub fn mostly_damaged(&self) -> Option<String> {
+        // What a simulation has damaged is known to the bit.
+        let is_damaged = |own: &&LineByte| own.error.is_some() && own.sent == own.received;
+        let line = |octets: &[&Channel]| {
+            let octets = octets.iter().flat_map(|own| own.octets());
+            let damaged = octets.clone().filter(is_damaged).count();
+            (damaged, octets.count())
+        };
+        let lines = self.traces.iter().flat_map(|trace| {
+            let all: Vec<&Channel> = trace.channels.iter().collect();
+            match crate::buses::share_a_line(std::slice::from_ref(trace)) {
+                true => vec![line(&all)],
+                false => all.into_iter().map(|own| line(&[own])).collect(),
+            }
+        });
+        let mut bad = lines.filter(|(damaged, all)| damaged * 4 > *all);
+        bad.next().map(|(damaged, all)| {
+            format!(
+                "{damaged} of {} of a line are damaged, more than a quarter: it is no evidence; check rate, format and channel",
+                counted(all, "octet")
+            )
+        })
     }
 
     /// When the last byte had passed.

@@ -1,9 +1,8 @@
 //! Captures in pcap, the format before pcapng: one interface without a name, times in microseconds or nanoseconds.
 
-use super::pcapng::{Reader, finish, nanoseconds};
-use super::{CaptureError, Imported};
-use crate::report::pcapng::{LINK_TYPE, NANOSECONDS};
-use crate::report::pcapng_frames;
+use super::pcapng::{LINK_TYPES, Packet, Reader, finish, nanoseconds};
+use super::{CaptureError, Imported, NamedLink};
+use crate::report::pcapng::NANOSECONDS;
 use harness_proto::line::Rate;
 
 /// The first bytes with the low byte first, and the resolution of times as in pcapng; the other order of bytes is possible too.
@@ -27,16 +26,16 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
     kind(bytes).is_some()
 }
 
-/// Reads a file. `link` names what the interface stands for, where it is of octets.
+/// Reads a file. `links` say what the interface stands for, where it is of octets.
 ///
 /// # Errors
 /// What cannot be, and where.
 pub(super) fn read(
     bytes: &[u8],
     rate: Option<Rate>,
-    link: Option<&str>,
+    links: &[NamedLink],
 ) -> Result<Imported, CaptureError> {
-    let mut reader = Reader::new(bytes);
+    let mut reader = Reader::new(bytes, links);
     let Some((big, resolution)) = kind(bytes) else {
         return reader.wrong(0, "no magic number of pcap is here");
     };
@@ -45,22 +44,13 @@ pub(super) fn read(
     // The upper bits say how long the check sequence of a network is.
     let link_type = reader.u32(20, all)? & 0xFFFF;
     let link_type = u16::try_from(link_type).unwrap_or(u16::MAX);
-    if ![LINK_TYPE, pcapng_frames::LINK_TYPE].contains(&link_type) {
-        return reader.wrong(
-            20,
-            format!(
-                "link type {link_type} is not read: 250 (RTAC serial) or 227 (CAN) is expected"
-            ),
+    reader.describe((20, link_type), None, (resolution, 0, None))?;
+    if !reader.reads_any() {
+        let what = format!(
+            "link type {link_type} is not read with these settings; {LINK_TYPES} are expected"
         );
+        return reader.wrong(20, what);
     }
-    if link_type == LINK_TYPE && link.is_none() {
-        return reader.wrong(
-            20,
-            "a pcap does not say which link it is of; say it, as in `--link \"98->97\"`, or save it as pcapng with a name for the interface",
-        );
-    }
-    let name = link.map(|own| (20, own.into()));
-    reader.describe((20, link_type), name, (resolution, 0, None))?;
     let mut at = FILE;
     while at < all {
         let seconds = u64::from(reader.u32(at, all)?);
@@ -70,7 +60,8 @@ pub(super) fn read(
         let Some(nanos) = nanoseconds(ticks, resolution, 0) else {
             return reader.wrong(at, "this time is too late for any clock");
         };
-        let captured = usize::try_from(reader.u32(at + 8, all)?).unwrap_or(usize::MAX);
+        let length = |at: usize| usize::try_from(reader.u32(at, all)?).map_or(Ok(usize::MAX), Ok);
+        let (captured, original) = (length(at + 8)?, length(at + 12)?);
         let data = at + PACKET;
         let end = data.saturating_add(captured);
         if end > all {
@@ -82,8 +73,15 @@ pub(super) fn read(
                 ),
             );
         }
-        reader.content((0, nanos), (data, captured, end))?;
+        reader.content(&Packet {
+            interface: 0,
+            nanos,
+            data,
+            captured,
+            original,
+            end,
+        })?;
         at = end;
     }
-    finish(reader, rate, &[])
+    finish(reader, rate)
 }

@@ -368,6 +368,9 @@ pub struct ImportArguments {
     /// adapter gives it; by default 2 ns.
     #[arg(long, value_name = "TIME", value_parser = duration, conflicts_with = "format")]
     pub tolerance: Option<Duration>,
+    /// Judge these slaves or drives of a shared line and no others, such as 8,9; by default those that are no other device's.
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    pub judge: Vec<u8>,
     /// How the file is read.
     #[command(flatten)]
     pub reading: ReadingArguments,

@@ -48,10 +48,10 @@ pub(crate) fn gsd(output: &mut Output) -> std::io::Result<Exit> {
 
 /// Reads a capture and judges it, shows it or makes a scenario of it.
 pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let Some(Imported { capture, lost, .. }) = read(&arguments.files, &arguments.reading, output)
-    else {
+    let Some(imported) = read(&arguments.files, &arguments.reading, output) else {
         return Ok(Exit::Usage);
     };
+    let capture = &imported.capture;
     let Some(path) = arguments.files.first() else {
         return Ok(Exit::Usage);
     };
@@ -82,8 +82,15 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             return Ok(Exit::Usage);
         }
     };
+    if is_silent(capture) && !arguments.scenario {
+        return nothing(&title, output);
+    }
     if share_a_line(&capture.traces) {
-        return of_shared_line((&capture, lost), &title, setup.as_ref(), arguments, output);
+        return of_shared_line(&imported, &title, setup.as_ref(), arguments, output);
+    }
+    if !arguments.judge.is_empty() {
+        output.complain("`--judge` names slaves or drives of a line that they share; of a ring all drives are judged");
+        return Ok(Exit::Usage);
     }
     let options = JudgeOptions {
         title: &title,
@@ -91,11 +98,11 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         tolerance: span(arguments.tolerance),
     };
     if arguments.scenario {
-        return as_scenario(&capture, &options, arguments, output);
+        return as_scenario(capture, &options, arguments, output);
     }
-    let judged = match judge(&capture, &options) {
+    let judged = match judge(capture, &options) {
         Ok(judged) => Judged {
-            verdict: settled(judged.verdict, lost, output),
+            verdict: settled(judged.verdict, &imported, output),
             ..judged
         },
         Err(error) => {
@@ -118,7 +125,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         capture.end(),
     );
     output.result(&line)?;
-    output.say(&damaged(&capture));
+    output.say(&damaged(capture));
     output.say(&details(&judged));
     Ok(Exit::of(&[judged.verdict], false))
 }
@@ -144,13 +151,24 @@ fn damaged(capture: &Capture) -> String {
     text
 }
 
-/// A verdict on a capture of which bytes or frames may be missing: what differs does not accuse a drive.
-fn settled(verdict: Verdict, lost: bool, output: &mut Output) -> Verdict {
-    if verdict != Verdict::Failed || !lost {
-        return verdict;
+/// A capture in which nothing was carried.
+fn nothing(title: &str, output: &mut Output) -> std::io::Result<Exit> {
+    let verdict = Verdict::Inconclusive;
+    let shown = output.verdict(verdict);
+    output.result(&format!(
+        "{} {title}: no byte and no frame is in it, and nothing was compared\n",
+        shown.trim_end_matches(' ')
+    ))?;
+    Ok(Exit::of(&[verdict], false))
+}
+
+/// A verdict on a capture of which a part may be missing; says why it is another one.
+fn settled(verdict: Verdict, imported: &Imported, output: &mut Output) -> Verdict {
+    let (verdict, why) = imported.settle(verdict);
+    if let Some(why) = why {
+        output.say(&format!("  note: {why}\n"));
     }
-    output.say("  note: parts of it are lost, so what differs is no failure of a drive\n");
-    Verdict::Inconclusive
+    verdict
 }
 
 /// Reports what came of judging a shared line.
@@ -161,12 +179,15 @@ fn told(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let (count, what) = buses::counted_pieces(&capture.traces);
+    let compared = match judged.replies {
+        Some(all) => format!("{} of {} compared", judged.compared, counted(all, "reply")),
+        None => format!("{} of drives compared", judged.compared),
+    };
     output.result(&format!(
-        "{} {title}: {} in {}, {} of drives compared\n",
+        "{} {title}: {} in {}, {compared}\n",
         output.verdict(judged.verdict).trim_end_matches(' '),
         counted(count, what),
         capture.end(),
-        judged.compared,
     ))?;
     for line in &judged.differences {
         output.result(&format!("  {line}\n"))?;
@@ -179,13 +200,13 @@ fn told(
 
 /// Judges what a shared line carried, or makes a scenario of it.
 fn of_shared_line(
-    (capture, lost): (&Capture, bool),
+    imported: &Imported,
     title: &str,
     setup: Option<&Source>,
     arguments: &ImportArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let path = title;
+    let (path, capture) = (title, &imported.capture);
     if !arguments.scenario {
         // Times of a log are those of the bus unless the user says how far they are off; a log without times has an order alone.
         let tolerance = match (capture.timed, arguments.tolerance) {
@@ -193,9 +214,9 @@ fn of_shared_line(
             (true, None) => Span::ZERO,
             (true, given) => span(given),
         };
-        return match buses::judge_shared(&capture.traces, setup, tolerance) {
+        return match buses::judge_shared(&capture.traces, setup, (&arguments.judge, tolerance)) {
             Ok(judged) => {
-                let verdict = settled(judged.verdict, lost, output);
+                let verdict = settled(judged.verdict, imported, output);
                 let judged = JudgedFrames { verdict, ..judged };
                 told(&judged, capture, title, output)
             }

@@ -23,8 +23,6 @@ use std::io::Write;
 /// The events of the last octet of a telegram that the master sent, and that it received.
 const SENT: u8 = 0x03;
 pub(crate) const RECEIVED: u8 = 0x04;
-/// Events with the time of the first octet, in captures of others.
-const BEGUN: [u8; 2] = [0x01, 0x02];
 /// The name of the interface of the master, and what stands in front of a slave's address.
 const MASTER: &str = "master";
 const SLAVE: &str = "slave ";
@@ -197,24 +195,23 @@ pub(crate) struct PacketOctet {
     pub(crate) error: Option<LineError>,
 }
 
-/// The octets of a packet: of its event, its time, the octets that arrived, and its comment. `octet` is the time of one.
-///
-/// # Errors
-/// The event is not one of the line, in a sentence.
+/// Whether the time of a packet with this event is that of its first octet; `None` where the event says nothing of it. Programs of others
+/// write any event in front of good octets.
+pub(crate) fn time_of(event: u8) -> Option<bool> {
+    let damaged = ERRORS.iter().any(|(_, own)| *own == event);
+    (!damaged && event != LOST).then_some(![SENT, RECEIVED].contains(&event))
+}
+
+/// The octets of a packet: of its event, its time and whether that is the time of its first octet, the octets that arrived, and its comment.
+/// `octet` is the time of one.
 pub(crate) fn octets(
     (event, nanos): (u8, u64),
+    begins: bool,
     arrived: &[u8],
     comment: &str,
     octet: Span,
-) -> Result<Vec<PacketOctet>, String> {
+) -> Vec<PacketOctet> {
     let of_event = ERRORS.iter().find(|(_, own)| *own == event);
-    let known = [SENT, RECEIVED, LOST].contains(&event) || BEGUN.contains(&event);
-    if !known && of_event.is_none() {
-        return Err(format!(
-            "event {event:02X} with {} bytes is not one of the line",
-            arrived.len()
-        ));
-    }
     let remarks = remarks(comment);
     let mut found = pieces(arrived, &remarks);
     // A capture of others names the error in its event alone.
@@ -228,7 +225,7 @@ pub(crate) fn octets(
         own.unwrap_or(octet)
     };
     let mut end = Span::from_nanos(nanos);
-    if BEGUN.contains(&event) {
+    if begins {
         end = (2..=found.len()).fold(end, |end, place| end + distance(place));
     }
     // Backwards from the end, so that only the time of the packet is cut off.
@@ -236,7 +233,7 @@ pub(crate) fn octets(
         own.nanos = end.as_nanos();
         end = end.saturating_sub(distance(index + 1));
     }
-    Ok(found)
+    found
 }
 
 /// The octets of a packet without their times: those that arrived, and between them those that were lost.
@@ -293,7 +290,7 @@ mod tests {
             "byte 2 parity, byte 2 sent 08, byte 3 lost, byte 3 sent 02, byte 4 after 34000 ns, byte 4 sent nothing, byte 5 framing"
         );
         let arrived = [0x10, 0x09, 0x49, 0x53, 0x16];
-        let read = octets((0x08, 144_000), &arrived, &text, BYTE).expect("octets");
+        let read = octets((0x08, 144_000), false, &arrived, &text, BYTE);
         let expected: Vec<_> = line
             .iter()
             .map(|own| PacketOctet {
@@ -314,20 +311,34 @@ mod tests {
 
     #[test]
     fn packets_of_others() {
-        let first = octets((0x02, 22_000), &[0x10, 0x16], "my favourite, byte", BYTE);
-        let nanos: Vec<_> = first.expect("octets").iter().map(|own| own.nanos).collect();
+        let first = octets(
+            (0x02, 22_000),
+            true,
+            &[0x10, 0x16],
+            "my favourite, byte",
+            BYTE,
+        );
+        let nanos: Vec<_> = first.iter().map(|own| own.nanos).collect();
         assert_eq!(nanos, [22_000, 44_000]);
-        let damaged = octets((0x08, 44_000), &[0x10, 0x16], "", BYTE).expect("octets");
+        let damaged = octets((0x08, 44_000), false, &[0x10, 0x16], "", BYTE);
         assert_eq!(damaged[0].error, Some(LineError::Parity));
-        assert!(octets((0x77, 0), &[0x10], "", BYTE).is_err());
+        // Some programs write one event, and not one that says anything, in front of all octets.
+        for event in [0x00, 0x06, 0x77] {
+            assert_eq!(time_of(event), Some(true));
+            assert_eq!(
+                octets((event, 22_000), true, &[0x10, 0x16], "", BYTE),
+                first
+            );
+        }
         // Numbers that no octet has.
         let odd = octets(
             (0x04, 10),
+            false,
             &[0x10],
             "byte 0 lost, byte 9 lost, byte 999999 lost",
             BYTE,
         );
-        assert_eq!(odd.expect("one").len(), 1);
+        assert_eq!(odd.len(), 1);
     }
 
     #[test]

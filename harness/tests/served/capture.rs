@@ -492,7 +492,7 @@ fn every_bus_is_captured_by_extcap() {
         (
             "nordac",
             "nordac-3.1-ppo-1",
-            "8 telegrams in 2.860 ms, 4 of drives compared",
+            "8 telegrams in 2.860 ms, 4 of 4 replies compared",
         ),
     ] {
         let desk = Desk::new("drives = 1\ntransport = \"sim\"\n");

@@ -302,7 +302,7 @@ fn a_capture_is_read_by_import() {
             "4 of drives compared",
             0,
         ),
-        ("sim:nordac", "8", "HIW", "of drives compared", 0),
+        ("sim:nordac", "8", "HIW", "replies compared", 0),
     ] {
         let mut session = Session::open(&desk, &["--rig", rig]);
         let file = format!("{}.pcapng", rig.replace(':', "-"));

@@ -62,19 +62,22 @@ pub(crate) fn scenario(
     Ok(text)
 }
 
-/// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history.
-pub(crate) fn judged(traces: &[Trace], tolerance: Span) -> JudgedFrames {
+/// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history. `named` are the slaves that are
+/// judged, where the user names some, and times may be off by `tolerance`.
+pub(crate) fn judged(traces: &[Trace], (named, tolerance): (&[u8], Span)) -> JudgedFrames {
     let mut all = JudgedFrames {
         verdict: Verdict::Passed,
         compared: 0,
+        replies: Some(0),
         differences: Vec::new(),
         remarks: Vec::new(),
     };
     let mut in_doubt = false;
     for trace in traces {
-        let judged = judge(trace, tolerance);
+        let judged = judge(trace, named, tolerance);
         all.compared += judged.compared;
-        in_doubt |= !judged.doubts.is_empty();
+        all.replies = all.replies.map(|own| own + judged.replies);
+        in_doubt |= !judged.doubts.is_empty() || judged.compared < judged.replies;
         all.remarks.extend(judged.doubts);
         all.remarks.extend(judged.remarks);
         let breaches = judged.breaches.into_iter();

@@ -1,32 +1,172 @@
 //! Who sent the octets of a line that is recorded at one place, where all stations are heard alike.
 
+use crate::counted::counted;
 use crate::report::pcapng_telegrams::PacketOctet;
 use harness_proto::decode::Decoded;
-use harness_proto::line::Received;
+use harness_proto::line::{LineError, Received};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::fdl::{BROADCAST, MAX_TELEGRAM, Reason};
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 
-/// The sender of each octet: `None` for a master. A telegram names its sender; a short confirmation is that of the station that was asked.
-/// Damaged octets are those of the station that owes a reply, or of a master where none does. `octet` is the time of an octet.
-pub(crate) fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
-    let mut senders: Vec<Option<u8>> = Vec::with_capacity(octets.len());
-    let mut line = Asked::default();
-    while let Some(left) = octets.get(senders.len()..).filter(|own| !own.is_empty()) {
-        // 33 idle bits end a telegram in any case, and 11 a damaged one.
-        let run = run(left, octet, SYN_OCTETS);
-        let good = run.iter().take_while(|own| own.error.is_none());
-        let bytes: Vec<u8> = good.filter_map(|own| own.received).collect();
-        let (sender, used) = match Telegram::decode(&bytes) {
-            Decoded::Value { value, used } => (line.sender(&value), used),
-            _ => (line.0.take(), self::run(left, octet, 1).len()),
-        };
-        let next = senders.len() + used.max(1);
-        senders.resize(next.min(octets.len()), sender);
+/// The octets of a line that is recorded at one place, with their senders.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LineRead {
+    /// Each octet with its sender: `None` for a master.
+    pub(crate) octets: Vec<(Option<u8>, PacketOctet)>,
+    /// Octets that are of no telegram and that no slave owes: a reply may be among them.
+    pub(crate) unread: usize,
+    /// What there is to say about it, in sentences.
+    pub(crate) notes: Vec<String>,
+}
+
+impl LineRead {
+    /// Finds the senders of octets. A telegram names its sender; a short confirmation is that of the station that was asked. Damaged octets
+    /// are those of the station that owes a reply, or of a master where none does. `octet` is the time of an octet.
+    ///
+    /// In `pieces` of an adapter the times between octets may not be those on the line: where more telegrams are whole without them, their
+    /// own octets say where they end.
+    pub(crate) fn of(octets: &[PacketOctet], octet: Span, pieces: bool) -> Self {
+        let mut notes = Vec::new();
+        let mut runs = by_time(octets, octet);
+        if pieces && of_no_telegram(&runs, |_| true) > 0 {
+            let joined = joined(octets, octet);
+            if of_no_telegram(&joined, |_| true) < of_no_telegram(&runs, |_| true) {
+                let about = "the octets came in pieces of an adapter: their own values say where telegrams end, and the pauses on the line are \
+                             not known";
+                notes.push(about.to_owned());
+                runs = joined;
+            }
+        }
+        let low = runs.extract_if(.., |own| own.kind == RunKind::Low).count();
+        if low > 0 {
+            notes.push(format!(
+                "{} left out: the line is low there for longer than an octet, as one without bias resistors is between telegrams",
+                counted(low, "octet")
+            ));
+        }
+        // Behind each telegram the line may be low once.
+        let whole = runs
+            .iter()
+            .filter(|own| own.kind == RunKind::Telegram)
+            .count();
+        let unread =
+            of_no_telegram(&runs, |own| own.from.is_none()) + low.saturating_sub(whole + 1);
+        if unread > 0 {
+            let count = counted(unread, "octet");
+            notes.push(format!("{count} could not be read as telegrams"));
+        }
+        let octets = runs.into_iter();
+        let octets = octets.flat_map(|run| run.octets.into_iter().map(move |own| (run.from, own)));
+        Self {
+            octets: octets.collect(),
+            unread,
+            notes,
+        }
     }
-    senders
+}
+
+/// Octets of one station.
+struct Run {
+    from: Option<u8>,
+    kind: RunKind,
+    octets: Vec<PacketOctet>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum RunKind {
+    Telegram,
+    /// The beginning of a telegram.
+    Begun,
+    /// A low line between telegrams.
+    Low,
+    Other,
+}
+
+/// Octets of no telegram in runs that `counts` chooses, but for the telegrams that the beginning and the end of a capture cut.
+fn of_no_telegram(runs: &[Run], counts: impl Fn(&Run) -> bool) -> usize {
+    let is_whole = |own: &Run| own.kind == RunKind::Telegram;
+    let first = runs.iter().position(is_whole).unwrap_or(0);
+    let count = |runs: &[Run]| -> usize {
+        let other = |own: &&Run| matches!(own.kind, RunKind::Begun | RunKind::Other) && counts(own);
+        runs.iter().filter(other).map(|own| own.octets.len()).sum()
+    };
+    let before = count(&runs[..first]);
+    let begun = runs
+        .last()
+        .filter(|own| own.kind == RunKind::Begun && counts(own));
+    let cut = begun.map_or(0, |own| own.octets.len());
+    let before = if before <= MAX_TELEGRAM { 0 } else { before };
+    before + count(&runs[first..]).saturating_sub(cut)
+}
+
+/// Whether an octet is what a receiver reads of a line that is low.
+fn is_low(byte: u8, error: Option<LineError>) -> bool {
+    byte == 0 && matches!(error, Some(LineError::Break | LineError::Framing))
+}
+
+/// Telegrams as the times between their octets show them.
+fn by_time(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut line = Asked::default();
+    let mut left = octets;
+    while let Some(first) = left.first() {
+        // 33 idle bits end a telegram in any case, and 11 a damaged one.
+        let all = run(left, octet, SYN_OCTETS);
+        let good = all.iter().take_while(|own| own.error.is_none());
+        let bytes: Vec<u8> = good.filter_map(|own| own.received).collect();
+        let (from, kind, used) = match Telegram::decode(&bytes) {
+            Decoded::Value { value, used } => (line.sender(&value), RunKind::Telegram, used),
+            _ if is_low(first.received.unwrap_or(1), first.error) => (None, RunKind::Low, 1),
+            Decoded::NeedMore if bytes.len() == left.len() => {
+                (line.0.take(), RunKind::Begun, bytes.len())
+            }
+            _ => (line.0.take(), RunKind::Other, run(left, octet, 1).len()),
+        };
+        let (own, rest) = left.split_at(used.clamp(1, left.len()));
+        runs.push(Run {
+            from,
+            kind,
+            octets: own.to_vec(),
+        });
+        left = rest;
+    }
+    runs
+}
+
+/// Telegrams as their own octets show them, whatever the times between them.
+fn joined(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
+    let mut cutter = TelegramCutter::new(octet);
+    let mut cut = Vec::new();
+    for own in octets {
+        cut.extend(cutter.cut(own.nanos));
+        if let Some(byte) = own.received {
+            let error = own.error;
+            cutter.push(own.nanos, Received { byte, error });
+        }
+    }
+    let last = octets.last().map_or(0, |own| own.nanos);
+    cut.extend(cutter.cut(last.saturating_add(TelegramCutter::PATIENCE)));
+    let packet = |own: &LineByte| PacketOctet {
+        nanos: own.at.since_start().as_nanos(),
+        sent: own.sent,
+        received: own.received,
+        error: own.error,
+    };
+    let run = |(from, own): (Option<u8>, Vec<LineByte>)| {
+        let good = own.iter().take_while(|own| own.error.is_none());
+        let good: Vec<u8> = good.filter_map(|own| own.received).collect();
+        let kind = match (Telegram::decode(&good), own.as_slice()) {
+            (Decoded::Value { used, .. }, _) if used == own.len() => RunKind::Telegram,
+            (_, [first]) if is_low(first.received.unwrap_or(1), first.error) => RunKind::Low,
+            (Decoded::NeedMore, _) if good.len() == own.len() => RunKind::Begun,
+            _ => RunKind::Other,
+        };
+        let octets = own.iter().map(packet).collect();
+        Run { from, kind, octets }
+    };
+    cut.into_iter().map(run).collect()
 }
 
 /// Idle octet times in front of a request (T_SYN).
@@ -102,6 +242,10 @@ impl TelegramCutter {
     /// The sender of the first telegram, whether it begins an exchange, and its octets; `None` where it may go on.
     fn next(&mut self, now: u64) -> Option<(Option<u8>, bool, usize)> {
         let (last, _) = self.waiting.last()?;
+        let (_, first) = self.waiting.first()?;
+        if is_low(first.byte, first.error) {
+            return Some((None, false, 1));
+        }
         let over = now.saturating_sub(*last) >= Self::PATIENCE;
         match self.decoded(0) {
             Decoded::Value { value, used } => {
@@ -168,7 +312,11 @@ fn run(octets: &[PacketOctet], octet: Span, pause: u64) -> &[PacketOctet] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use harness_proto::line::LineError;
+
+    fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
+        let read = LineRead::of(octets, octet, false);
+        read.octets.into_iter().map(|own| own.0).collect()
+    }
 
     const OCTET: Span = Span::from_micros(22);
 

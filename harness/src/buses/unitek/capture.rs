@@ -81,14 +81,15 @@ pub(crate) fn scenario(
     Ok(text + &steps)
 }
 
-/// Judges a capture: what drives have sent is compared with the manual, with any value of what that leaves open.
+/// Judges a capture: what drives have sent is compared with the manual, with any value of what that leaves open. `named` are the drives that
+/// are judged, where the user names some.
 ///
 /// # Errors
 /// A drive has other identifiers and there is no `setup`, in a sentence with the remedy; or the setup has mistakes.
 pub(crate) fn judged(
     traces: &[Trace],
     setup: Option<&Source>,
-    tolerance: Span,
+    (named, tolerance): (&[u8], Span),
 ) -> Result<JudgedFrames, String> {
     let channels = traces.iter().flat_map(|trace| &trace.channels);
     let frames: Vec<LineFrame> = channels
@@ -99,11 +100,23 @@ pub(crate) fn judged(
         seams: traces.first().map_or(&[], |trace| &trace.seams),
         tolerance,
     };
+    let wanted = |own: &u8| named.is_empty() || named.contains(own);
+    let (mut known, mut remarks) = (BTreeSet::new(), Vec::new());
+    let mut note = |own: u8| {
+        known.insert(own);
+        if !wanted(&own) {
+            remarks.push(format!(
+                "drive {own} is not judged: `--judge` does not name it"
+            ));
+        }
+        wanted(&own)
+    };
     let judged = match setup {
         Some(setup) => {
             let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
             let drives = plan.setup.drives.iter();
             let drives = drives.map(|own| (own.node, own.identifiers));
+            let drives = drives.filter(|own| note(own.0));
             judge(heard, &drives.collect::<Vec<_>>())
         }
         None => {
@@ -113,7 +126,7 @@ pub(crate) fn judged(
                 (number, (DEFAULT_RX - 1 + node, DEFAULT_TX - 1 + node))
             };
             let nodes = nodes(&all)?;
-            let drives = nodes.into_iter().map(own);
+            let drives = nodes.into_iter().map(own).filter(|own| note(own.0));
             judge_guessed(heard, &drives.collect::<Vec<_>>())
         }
     };
@@ -123,8 +136,13 @@ pub(crate) fn judged(
             own.frame, own.drive, own.section, own.about
         )
     };
-    let mut remarks = judged.remarks;
-    let in_doubt = !judged.doubts.is_empty();
+    remarks.extend(judged.remarks);
+    let missing = named.iter().filter(|own| !known.contains(own));
+    let missing: Vec<_> = missing
+        .map(|own| format!("drive {own}: no frame to or from it is in the capture"))
+        .collect();
+    let in_doubt = !judged.doubts.is_empty() || !missing.is_empty();
+    remarks.extend(missing);
     remarks.extend(judged.doubts);
     let only_times = judged
         .breaches
@@ -147,6 +165,7 @@ pub(crate) fn judged(
             (true, _) => Verdict::Passed,
         },
         compared: judged.compared,
+        replies: None,
         differences: judged.breaches.iter().map(difference).collect(),
         remarks,
     })

@@ -35,9 +35,16 @@ pub(super) struct Change {
 /// What a line did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Levels {
-    changes: Vec<Change>,
+    pub(super) changes: Vec<Change>,
+    /// The time between two samples, where the file says it.
+    pub(super) sample: Option<Time>,
     /// Until when the last level is known to have lasted, where the file says so.
     pub(super) end: Option<Time>,
+}
+
+/// The time between samples at a rate.
+pub(super) fn sample_time(samples_per_second: u64) -> Option<Time> {
+    Time::try_from(3_000_000_000_u64.checked_div(samples_per_second)?).ok()
 }
 
 impl Levels {

@@ -6,7 +6,7 @@ use super::levels::Levels;
 use super::numbers::Time;
 use super::uart::{OctetRead, UartFormat, decode, find};
 use super::{Imported, ReadSettings};
-use crate::buses;
+use crate::buses::{self, LineRead};
 use crate::counted::counted;
 use crate::report::pcapng_telegrams::{PacketOctet, station};
 use harness_proto::line::{Format, Rate};
@@ -89,6 +89,8 @@ pub(super) enum Signal {
     Levels(Levels),
     /// Octets that the other program has decoded.
     Octets(Vec<OctetRead>),
+    /// Neither, such as the voltage of an analogue channel: why.
+    Other(CaptureError),
 }
 
 /// A channel of a file.
@@ -122,6 +124,22 @@ fn listed(channels: &[ChannelRead]) -> String {
     shown.join(", ")
 }
 
+/// The place of the channel of a name.
+fn only_one(name: &String, channels: &[ChannelRead]) -> Result<Option<usize>, CaptureError> {
+    let named = channels.iter().enumerate();
+    let mut named = named.filter(|(_, own)| own.names.contains(name));
+    let first = named.next().map(|own| own.0);
+    let Some((_, second)) = named.next() else {
+        return Ok(first);
+    };
+    let remedy = match second.names.last() {
+        Some(longer) if longer != name => format!("say which, with its scope, as in `{longer}`"),
+        _ => "name them differently in the program that wrote the file, or export one alone"
+            .to_owned(),
+    };
+    Err(wrong(format!("two channels are named `{name}`: {remedy}")))
+}
+
 /// The channels that are links, by what the user says and by their names; and what is to be told about the others.
 fn choose(
     mut channels: Vec<ChannelRead>,
@@ -136,9 +154,7 @@ fn choose(
             ));
         }
         let place = match &own.channel {
-            Some(name) => channels
-                .iter()
-                .position(|channel| channel.names.contains(name)),
+            Some(name) => only_one(name, &channels)?,
             None if channels.len() == 1 => Some(0),
             None => {
                 let names = listed(&channels);
@@ -184,7 +200,10 @@ fn choose(
                     "`{names}` is the second channel of the same link; one expected"
                 )));
             }
-            Some(target) => chosen.push(Chosen { target, channel }),
+            Some(target) => match channel.signal {
+                Signal::Other(why) => return Err(why),
+                _ => chosen.push(Chosen { target, channel }),
+            },
             None => left.push(channel),
         }
     }
@@ -196,6 +215,12 @@ fn choose(
         ));
     }
     Ok(chosen)
+}
+
+/// Why nothing passes where octets of a shared line were not read.
+pub(in crate::capture) fn unread_octets(read: &LineRead) -> Option<String> {
+    let about = "not passed: a reply may be among the octets that could not be read as telegrams";
+    (read.unread > 0).then(|| about.to_owned())
 }
 
 /// The format of the lines: as it was given, or as it is found.
@@ -216,7 +241,7 @@ fn format(
         .iter()
         .filter_map(|own| match &own.channel.signal {
             Signal::Levels(levels) => Some(levels),
-            Signal::Octets(_) => None,
+            Signal::Octets(_) | Signal::Other(_) => None,
         })
         .collect();
     if !lines.is_empty() {
@@ -227,7 +252,7 @@ fn format(
     // The slowest rate at which no octet begins before the one in front of it has ended; a tenth for clocks that differ.
     let starts = chosen.iter().filter_map(|own| match &own.channel.signal {
         Signal::Octets(octets) => Some(octets.windows(2)),
-        Signal::Levels(_) => None,
+        Signal::Levels(_) | Signal::Other(_) => None,
     });
     let gaps = starts.flatten().map(|two| two[1].start - two[0].start);
     let closest = gaps.filter(|gap| *gap > 0).min().unwrap_or(Time::MAX);
@@ -243,6 +268,26 @@ fn format(
         format,
         inverted: false,
     })
+}
+
+/// Says where a line was sampled too seldom for its rate.
+fn too_few_samples(chosen: &[Chosen], uart: UartFormat) -> Option<String> {
+    const LEAST: i64 = 4;
+    let bit = 3_000_000_000 / i64::from(uart.format.bits_per_second).max(1);
+    let samples = chosen.iter().filter_map(|own| match &own.channel.signal {
+        Signal::Levels(levels) => levels.sample,
+        Signal::Octets(_) | Signal::Other(_) => None,
+    });
+    let sample = samples
+        .max()
+        .filter(|own| own.saturating_mul(LEAST) > bit)?;
+    let tenths = bit * 10 / sample.max(1);
+    Some(format!(
+        "the line was sampled {}.{} times a bit, and octets may be read wrong: sample at least {LEAST} times a bit, {} samples a second",
+        tenths / 10,
+        tenths % 10,
+        i64::from(uart.format.bits_per_second) * LEAST
+    ))
 }
 
 /// The capture of the channels of a file.
@@ -270,12 +315,14 @@ pub(super) fn settle(
     let shared = links == 0;
     let uart = format(&chosen, settings, shared, &mut notes)?;
     let octet = uart.format.octet_time();
+    notes.extend(too_few_samples(&chosen, uart));
     let lines: Vec<(ChannelTarget, Vec<OctetRead>)> = chosen
         .into_iter()
         .map(|own| {
             let octets = match own.channel.signal {
                 Signal::Levels(levels) => decode(&levels, uart, usize::MAX),
                 Signal::Octets(octets) => octets,
+                Signal::Other(_) => Vec::new(),
             };
             (own.target, octets)
         })
@@ -295,6 +342,7 @@ pub(super) fn settle(
     if shared {
         let mut all = Vec::new();
         let mut stations = Vec::new();
+        let mut unread = None;
         for (target, octets) in lines {
             let read = |own: OctetRead| {
                 Ok(PacketOctet {
@@ -308,20 +356,23 @@ pub(super) fn settle(
                 .into_iter()
                 .map(read)
                 .collect::<Result<_, CaptureError>>()?;
-            let senders = match target {
+            match target {
                 ChannelTarget::Station(own) => {
                     stations.push(own);
-                    vec![own; octets.len()]
+                    all.extend(octets.into_iter().map(|octet| (own, octet)));
                 }
                 ChannelTarget::Bus | ChannelTarget::Ring | ChannelTarget::Link(..) => {
-                    buses::senders(&octets, octet)
+                    let read = LineRead::of(&octets, octet, false);
+                    unread = unread_octets(&read);
+                    notes.extend(read.notes);
+                    all.extend(read.octets);
                 }
-            };
-            all.extend(senders.into_iter().zip(octets));
+            }
         }
         let capture = assemble(stations.into_iter(), all, octet);
         return Ok(Imported {
             notes,
+            unread,
             ..capture.into()
         });
     }

@@ -6,6 +6,7 @@
 
 mod asc;
 mod cut;
+mod dsview;
 mod forms;
 mod levels;
 mod links;
@@ -18,12 +19,14 @@ mod table;
 mod uart;
 mod vcd;
 
+pub(super) use links::unread_octets;
 pub use links::{ChannelTarget, NamedLink};
 pub(super) use logs::candump_time;
 pub use uart::UartFormat;
 
 use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
 use crate::buses;
+use crate::scenario::verdict::Verdict;
 use cut::{Parts, whole_part};
 use harness_proto::line::Rate;
 use links::ChannelRead;
@@ -50,6 +53,28 @@ pub struct Imported {
     pub notes: Vec<String>,
     /// Whether the program that wrote it has noted that something is missing.
     pub lost: bool,
+    /// What was heard and not read, where a drive may have sent it: nothing passes then.
+    pub unread: Option<String>,
+}
+
+impl Imported {
+    /// A verdict on a capture of which a part may be missing, and why it is another one than `verdict`: what differs does not accuse a drive,
+    /// and where a drive may have sent what was not read, nothing passes. Damage that is more than a cable does is no evidence at all.
+    pub(crate) fn settle(&self, verdict: Verdict) -> (Verdict, Option<String>) {
+        let damaged = self.capture.mostly_damaged();
+        let why = match verdict {
+            Verdict::Failed | Verdict::Passed if damaged.is_some() => damaged,
+            Verdict::Failed if self.lost => {
+                Some("parts of it are lost, so what differs is no failure of a drive".to_owned())
+            }
+            Verdict::Passed => self.unread.clone(),
+            _ => None,
+        };
+        match why {
+            Some(why) => (Verdict::Inconclusive, Some(why)),
+            None => (verdict, None),
+        }
+    }
 }
 
 impl From<Capture> for Imported {
@@ -58,6 +83,7 @@ impl From<Capture> for Imported {
             capture,
             notes: Vec::new(),
             lost: false,
+            unread: None,
         }
     }
 }
@@ -141,7 +167,7 @@ macro_rules! log {
 }
 
 /// The formats; a file is of the first one that recognises it.
-const FORMATS: [Format; 23] = [
+const FORMATS: [Format; 25] = [
     whole(
         "pcapng (Wireshark)",
         |bytes| bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]),
@@ -150,10 +176,7 @@ const FORMATS: [Format; 23] = [
     whole(
         "pcap (tcpdump, Wireshark)",
         pcap::recognised,
-        |bytes, settings| {
-            let link = settings.links.first().map(|own| own.link.as_str());
-            pcap::read(bytes, settings.rate, link)
-        },
+        |bytes, settings| pcap::read(bytes, settings.rate, &settings.links),
     ),
     whole(
         "frames in JSON",
@@ -205,6 +228,18 @@ const FORMATS: [Format; 23] = [
         |bytes| bytes.starts_with(saleae::BINARY),
         |bytes, _| saleae::binary(bytes),
     ),
+    channels(
+        "csv (DSView)",
+        |bytes| bytes.starts_with(dsview::LEVELS),
+        |bytes, _| dsview::levels(bytes),
+    )
+    .of(Parts::Lines),
+    channels(
+        "table of octets (DSView)",
+        dsview::is_decoded,
+        |bytes, _| dsview::decoded(bytes),
+    )
+    .of(Parts::Lines),
     channels("csv (sigrok)", sigrok::recognised, |bytes, settings| {
         sigrok::read(bytes, settings.samples)
     })
@@ -437,4 +472,4 @@ mod hostile_tests;
 #[cfg(test)]
 mod log_tests;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

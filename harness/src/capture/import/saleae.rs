@@ -1,7 +1,8 @@
 //! Files of Saleae's Logic: levels as text and as binary, and octets as its serial analyser exports them.
 
 use super::super::CaptureError;
-use super::levels::{Level, Levels};
+use super::Channels;
+use super::levels::{Level, Levels, sample_time};
 use super::links::{ChannelRead, Signal};
 use super::numbers::{Time, byte, date, from_float, seconds};
 use super::table::{Table, columns, first_line};
@@ -47,27 +48,41 @@ pub(super) fn is_levels(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn levels(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
-    let mut table = Table::new(bytes);
-    let mut lines = vec![Levels::default(); table.columns.len().saturating_sub(1)];
+pub(super) fn levels(bytes: &[u8]) -> Result<Channels, CaptureError> {
+    levels_of(Table::new(bytes), None)
+}
+
+/// The levels of the columns of a table behind the first one, which has the times; `sample` is the time between samples, where it is known.
+///
+/// # Errors
+/// The row and the field that cannot be.
+pub(super) fn levels_of(
+    mut table: Table<'_>,
+    sample: Option<Time>,
+) -> Result<Channels, CaptureError> {
+    let line = Levels {
+        sample,
+        ..Levels::default()
+    };
+    let mut lines = vec![(line, None); table.columns.len().saturating_sub(1)];
     // Rows of the same levels as the one before are written by other programs at times of their own.
     while table.next()? {
         if table.fields() != lines.len() + 1 {
             let expected = lines.len() + 1;
             return Err(table.wrong(format!("{expected} fields are expected in each row")));
         }
-        let time = std::str::from_utf8(table.raw(0)).ok().and_then(seconds);
-        let Some(time) = time else {
-            return Err(table.wrong_field(0, "a time in seconds is expected"));
-        };
-        for (place, line) in lines.iter_mut().enumerate() {
+        let time = time(&table, 0)?;
+        for (place, (line, other)) in lines.iter_mut().enumerate() {
             let level = match table.raw(place + 1).trim_ascii() {
                 [level] => Level::of(*level),
                 [] => Some(Level::Unknown),
                 _ => None,
             };
+            // An analogue channel has voltages.
             let Some(level) = level else {
-                return Err(table.wrong_field(place + 1, "0, 1 or X is expected"));
+                let expected = "0, 1 or X is expected; choose a digital channel";
+                other.get_or_insert_with(|| table.wrong_field(place + 1, expected));
+                continue;
             };
             if !line.push(time, level) {
                 return Err(table.wrong_field(0, "this time is before that of the row above"));
@@ -75,11 +90,18 @@ pub(super) fn levels(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Ca
         }
     }
     let names = table.columns.into_iter().skip(1);
-    let channels = names.zip(lines).map(|(name, levels)| ChannelRead {
+    let channels = names.zip(lines).map(|(name, (levels, other))| ChannelRead {
         names: vec![name],
-        signal: Signal::Levels(levels),
+        signal: other.map_or(Signal::Levels(levels), Signal::Other),
     });
     Ok((channels.collect(), Vec::new()))
+}
+
+/// The time of a row: seconds, or a date.
+fn time(table: &Table<'_>, column: usize) -> Result<Time, CaptureError> {
+    let text = table.text(column);
+    let time = seconds(&text).or_else(|| date(&text));
+    time.ok_or_else(|| table.wrong_field(column, "a time in seconds or a date is expected"))
 }
 
 /// What an analyser calls an error of the line.
@@ -97,7 +119,7 @@ fn error(text: &str) -> Result<Option<LineError>, String> {
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn analyser(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
+pub(super) fn analyser(bytes: &[u8]) -> Result<Channels, CaptureError> {
     let mut table = Table::new(bytes);
     let Ok(value) = table.column("value") else {
         return Err(table.wrong(
@@ -112,9 +134,7 @@ pub(super) fn analyser(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), 
     let errors = errors.map(|(name, error)| (table.find(name), error));
     let mut octets: Vec<OctetRead> = Vec::new();
     while table.next()? {
-        let Some(start) = seconds(&table.text(0)) else {
-            return Err(table.wrong_field(0, "a time in seconds is expected"));
-        };
+        let start = time(&table, 0)?;
         let Some(byte) = byte(&table.text(value)) else {
             return Err(table.wrong_field(value, RADIX));
         };
@@ -137,7 +157,11 @@ pub(super) fn analyser(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), 
     Ok((vec![channel], Vec::new()))
 }
 
-fn in_order(table: &Table<'_>, last: Option<&OctetRead>, start: Time) -> Result<(), CaptureError> {
+pub(super) fn in_order(
+    table: &Table<'_>,
+    last: Option<&OctetRead>,
+    start: Time,
+) -> Result<(), CaptureError> {
     match last {
         Some(last) if start < last.start => {
             Err(table.wrong("this octet is before the one above it; sort the table by time"))
@@ -150,7 +174,7 @@ fn in_order(table: &Table<'_>, last: Option<&OctetRead>, start: Time) -> Result<
 ///
 /// # Errors
 /// The row and the field that cannot be.
-pub(super) fn data_table(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
+pub(super) fn data_table(bytes: &[u8]) -> Result<Channels, CaptureError> {
     let mut table = Table::new(bytes);
     let kind = table.column("type")?;
     let start = table
@@ -168,10 +192,7 @@ pub(super) fn data_table(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>)
         if address.is_some_and(|own| !table.raw(own).trim_ascii().is_empty()) {
             return Err(table.wrong("the analyser was in a multiprocessor mode; set its mode to Normal and export again"));
         }
-        let time = table.text(start);
-        let Some(start) = seconds(&time).or_else(|| date(&time)) else {
-            return Err(table.wrong_field(start, "a time in seconds or a date is expected"));
-        };
+        let start = time(&table, start)?;
         let Some(byte) = byte(&table.text(data)) else {
             return Err(table.wrong_field(data, RADIX));
         };
@@ -275,7 +296,10 @@ impl Binary<'_> {
             return self.wrong(format!("{state} is no level: 0 or 1"));
         }
         if with_rate {
-            self.take::<8>()?;
+            let rate = f64::from_le_bytes(self.take()?);
+            // A cast of a number in this range loses nothing that matters.
+            let rate = (1.0..1e12).contains(&rate).then_some(rate as u64);
+            levels.sample = rate.and_then(sample_time);
         }
         let (begin, end) = (self.time()?, self.time()?);
         let count = self.u64()?;
@@ -304,7 +328,7 @@ impl Binary<'_> {
 ///
 /// # Errors
 /// What cannot be, and where.
-pub(super) fn binary(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), CaptureError> {
+pub(super) fn binary(bytes: &[u8]) -> Result<Channels, CaptureError> {
     let mut file = Binary {
         bytes,
         at: BINARY.len(),

@@ -4,7 +4,7 @@
 //! nowhere. sigrok's own reader takes the rows of other programs for samples at equal times, so such tables are not to go through it.
 
 use super::super::CaptureError;
-use super::levels::{Level, Levels};
+use super::levels::{Level, Levels, sample_time};
 use super::links::{ChannelRead, Signal};
 use super::numbers::{Time, units};
 
@@ -22,6 +22,8 @@ struct Samples<'b> {
     /// Samples a second.
     rate: Option<u64>,
     lines: Vec<Levels>,
+    /// Why a column has no levels.
+    others: Vec<Option<CaptureError>>,
     count: u64,
     /// The row above, and whether any row was like the one above it.
     above: &'b [u8],
@@ -40,6 +42,7 @@ pub(super) fn read(
         names: Vec::new(),
         rate,
         lines: Vec::new(),
+        others: Vec::new(),
         count: 0,
         above: b"",
         repeated: false,
@@ -49,11 +52,11 @@ pub(super) fn read(
         .split(|own| *own == b'\n')
         .enumerate()
     {
-        let read = samples.line(line.trim_ascii());
-        read.map_err(|what| CaptureError::Link {
+        let wrong = |what| CaptureError::Link {
             place: format!("line {}", number + 1),
             what,
-        })?;
+        };
+        samples.line(line.trim_ascii(), wrong).map_err(wrong)?;
     }
     if samples.count > ALL_DIFFER && !samples.repeated {
         return Err(CaptureError::Link {
@@ -64,14 +67,31 @@ pub(super) fn read(
         });
     }
     let end = samples.time();
+    let (named, columns) = (samples.names.len(), samples.lines.len());
+    if named > 0 && columns > 0 && named != columns {
+        return Err(CaptureError::Link {
+            place: "the table".to_owned(),
+            what: format!(
+                "it names {named} channels and has {columns} columns; export the logic channels alone, without times"
+            ),
+        });
+    }
     samples.names.resize(samples.lines.len(), String::new());
-    let channels = samples.names.into_iter().zip(samples.lines);
-    let channels = channels.map(|(name, mut levels)| {
-        levels.end = end;
-        ChannelRead {
-            names: vec![name],
-            signal: Signal::Levels(levels),
-        }
+    let sample = samples.rate.and_then(sample_time);
+    let signals = samples.lines.into_iter().zip(samples.others);
+    let channels = samples.names.into_iter().zip(signals);
+    let channels = channels.map(|(name, (levels, other))| ChannelRead {
+        names: vec![name],
+        signal: other.map_or_else(
+            || {
+                Signal::Levels(Levels {
+                    sample,
+                    end,
+                    ..levels
+                })
+            },
+            Signal::Other,
+        ),
     });
     Ok((channels.collect(), Vec::new()))
 }
@@ -83,7 +103,11 @@ impl<'b> Samples<'b> {
         units(second.checked_div(self.rate?.into())?)
     }
 
-    fn line(&mut self, line: &'b [u8]) -> Result<(), String> {
+    fn line(
+        &mut self,
+        line: &'b [u8],
+        wrong: impl Fn(String) -> CaptureError,
+    ) -> Result<(), String> {
         if let Some(comment) = line.strip_prefix(b";") {
             self.comment(&String::from_utf8_lossy(comment));
             return Ok(());
@@ -113,6 +137,7 @@ impl<'b> Samples<'b> {
         let fields = || line.split(|own| *own == b',');
         if self.lines.is_empty() {
             self.lines = vec![Levels::default(); fields().count()];
+            self.others = vec![None; self.lines.len()];
         }
         if fields().count() != self.lines.len() {
             return Err(format!(
@@ -120,16 +145,20 @@ impl<'b> Samples<'b> {
                 self.lines.len()
             ));
         }
-        for (own, field) in self.lines.iter_mut().zip(fields()) {
+        let lines = self.lines.iter_mut().zip(&mut self.others);
+        for ((own, other), field) in lines.zip(fields()) {
             let level = match field.trim_ascii() {
                 [level] => Level::of(*level),
                 _ => None,
             };
             let Some(level) = level else {
                 let shown: String = String::from_utf8_lossy(field).chars().take(20).collect();
-                return Err(format!(
-                    "`{shown}` is no level; export the logic channels alone, without times"
-                ));
+                other.get_or_insert_with(|| {
+                    wrong(format!(
+                        "`{shown}` is no level; export the logic channels alone, without times"
+                    ))
+                });
+                continue;
             };
             own.push(at, level);
         }
@@ -151,7 +180,7 @@ impl<'b> Samples<'b> {
 }
 
 /// A rate such as `1 MHz`, in samples a second.
-fn frequency(text: &str) -> Option<u64> {
+pub(super) fn frequency(text: &str) -> Option<u64> {
     let (number, unit) = text.trim().split_once(' ')?;
     let factor = match unit {
         "Hz" => 1.0,

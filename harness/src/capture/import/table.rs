@@ -11,6 +11,8 @@ pub(super) struct Table<'b> {
     pub(super) columns: Vec<String>,
     /// The row, from [`Table::next`].
     record: ByteRecord,
+    /// Lines in front of the table.
+    above: u64,
 }
 
 /// The first line of a text.
@@ -53,7 +55,22 @@ impl<'b> Table<'b> {
             reader,
             columns: columns(line),
             record: ByteRecord::new(),
+            above: 0,
         }
+    }
+
+    /// A table below lines of comments, which begin with `mark`; and those.
+    pub(super) fn below(bytes: &'b [u8], mark: u8) -> (Self, Vec<Cow<'b, str>>) {
+        let (mut rest, mut comments) = (bytes, Vec::new());
+        while rest.first() == Some(&mark) {
+            let end = rest.iter().position(|own| *own == b'\n');
+            let (line, below) = rest.split_at(end.map_or(rest.len(), |own| own + 1));
+            comments.push(String::from_utf8_lossy(line.trim_ascii()));
+            rest = below;
+        }
+        let mut table = Self::new(rest);
+        table.above = comments.len() as u64;
+        (table, comments)
     }
 
     /// Where a column is, by its name.
@@ -103,7 +120,7 @@ impl<'b> Table<'b> {
 
     /// The line on which the row begins.
     pub(super) fn line(&self) -> usize {
-        let line = self.record.position().map_or(1, csv::Position::line);
+        let line = self.above + self.record.position().map_or(1, csv::Position::line);
         usize::try_from(line).unwrap_or(usize::MAX)
     }
 

@@ -197,6 +197,15 @@ impl Score {
         }
     }
 
+    /// How long its octets take.
+    fn time(self) -> u64 {
+        self.uart
+            .format
+            .octet_time()
+            .units()
+            .saturating_mul(self.octets as u64)
+    }
+
     /// Whether more is damaged than a bad cable does: more than a quarter.
     const fn is_bad(self) -> bool {
         self.damaged * 4 > self.octets
@@ -223,7 +232,7 @@ impl fmt::Display for Score {
     }
 }
 
-/// Octets from which on a format that damages many of them is refused.
+/// Octets from which on a format that damages many of them is refused; fewer are shown, and give no verdict.
 const ENOUGH: usize = 100;
 
 /// The time, in thirds of a nanosecond, that lines spent in pulses that `wanted` chooses by their level and their length.
@@ -285,13 +294,15 @@ pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(UartFormat,
     let [Some(found), Some(other)] = both else {
         return Err(format!("the bus has no format; {REMEDY}"));
     };
-    let far_better = found.is_bad() && !other.is_bad() && other.octets * 5 >= found.octets * 4;
+    // A line without bias resistors is low where no station sends.
+    let covers = other.time().saturating_mul(5) >= found.time().saturating_mul(4);
+    let far_better = found.is_bad() && !other.is_bad() && covers;
     let found = if far_better { other } else { found };
     if found.octets == 0 {
         return Err("no octet is on the line: the level never changes as a start bit does; check which channel is the line".to_owned());
     }
     let told = format!("the line is {found}");
-    if !found.is_bad() || found.octets < ENOUGH {
+    if !found.is_bad() {
         return Ok((found.uart, told));
     }
     let others: Vec<Format> = formats
@@ -304,6 +315,9 @@ pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(UartFormat,
     if let Some(other) = other.filter(|other| other.damaged * 8 < found.damaged) {
         let told =
             format!("{told}; another format than the bus prescribes explains it better: {other}");
+        return Ok((found.uart, told));
+    }
+    if found.octets < ENOUGH {
         return Ok((found.uart, told));
     }
     Err(format!(

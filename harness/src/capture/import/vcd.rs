@@ -4,9 +4,10 @@
 //! names may share an identifier, and a file may end in the middle of a token where a program was stopped.
 
 use super::super::CaptureError;
-use super::levels::{Level, Levels};
+use super::levels::{Level, Levels, sample_time};
 use super::links::{ChannelRead, Signal};
 use super::numbers::{Time, units};
+use super::sigrok::frequency;
 use std::collections::HashMap;
 
 /// The time scales: their names, and their length in femtoseconds.
@@ -18,6 +19,9 @@ const UNITS: [(&str, i128); 6] = [
     ("ps", 1_000),
     ("fs", 1),
 ];
+
+/// Scopes around a wire that its name may have.
+const DEEPEST: usize = 32;
 
 /// Whether a file is a value change dump: its first token is a keyword of a header.
 pub(super) fn recognised(bytes: &[u8]) -> bool {
@@ -75,6 +79,8 @@ struct Wire {
 #[derive(Default)]
 struct Reader<'b> {
     wires: Vec<Wire>,
+    /// The time between samples, which sigrok writes into a comment.
+    sample: Option<Time>,
     by_identifier: HashMap<&'b [u8], usize>,
     scopes: Vec<&'b [u8]>,
     /// Femtoseconds of a tick.
@@ -127,10 +133,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Capt
             reader.token(at, token)?;
         }
     }
-    let (now, ended) = (reader.now, !reader.changed);
+    let (now, ended, sample) = (reader.now, !reader.changed, reader.sample);
     let wires = reader.wires.into_iter();
     let channels = wires.map(|mut own| {
         own.levels.end = ended.then_some(now);
+        own.levels.sample = sample;
         ChannelRead {
             names: own.names,
             signal: Signal::Levels(own.levels),
@@ -164,6 +171,11 @@ impl<'b> Reader<'b> {
             match (keyword, words.as_slice()) {
                 (b"$enddefinitions", _) => return Ok(true),
                 (b"$timescale", words) => self.tick = Some(tick(&words.concat(), at)?),
+                (b"$comment", [.., b"at", number, unit]) => {
+                    let rate =
+                        String::from_utf8_lossy(&[*number, b" ", *unit].concat()).into_owned();
+                    self.sample = frequency(&rate).and_then(sample_time);
+                }
                 (b"$scope", [_, name, ..]) => self.scopes.push(name),
                 (b"$upscope", _) => drop(self.scopes.pop()),
                 (b"$var", [_, b"1", identifier, name, ..]) => self.declare(identifier, name),
@@ -189,12 +201,23 @@ impl<'b> Reader<'b> {
             self.wires.push(Wire::default());
         }
         let name = String::from_utf8_lossy(name).into_owned();
-        if let Some(scope) = self.scopes.last() {
-            let scope = String::from_utf8_lossy(scope);
-            let long = format!("{scope}.{name}");
-            self.wires[place].names.extend([name, long]);
-        } else {
-            self.wires[place].names.push(name);
+        // By its name, with its scope, and with all scopes around it.
+        let depth = self.scopes.len();
+        let shown = [0, depth.min(1), depth.min(DEEPEST)];
+        let mut names = shown.map(|own| {
+            let scopes = self.scopes[depth - own..].iter();
+            let scopes = scopes.map(|own| String::from_utf8_lossy(own));
+            scopes
+                .chain([name.as_str().into()])
+                .collect::<Vec<_>>()
+                .join(".")
+        });
+        names.sort_by_key(String::len);
+        let own = &mut self.wires[place].names;
+        for name in names {
+            if !own.contains(&name) {
+                own.push(name);
+            }
         }
     }
 

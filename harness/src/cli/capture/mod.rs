@@ -63,6 +63,9 @@ pub struct CaptureArguments {
     /// Keep only what comes after the first line of text that contains this, and the 20000 bytes before it.
     #[arg(long, value_name = "TEXT")]
     pub trigger: Option<String>,
+    /// Judge these slaves or drives of shared lines and no others, such as 8,9; by default those that are no other device's.
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    pub judge: Vec<u8>,
     /// Print no line of text for what is heard.
     #[arg(long)]
     pub quiet: bool,
@@ -147,16 +150,24 @@ pub(crate) fn capture(arguments: &CaptureArguments, output: &mut Output) -> io::
 }
 
 /// Judges a part of a capture as `import` does.
-fn judge(files: &[PathBuf], line: Rate, part: NamedLink, output: &mut Output) -> io::Result<Exit> {
+fn judge(
+    files: &[PathBuf],
+    capture: &CaptureArguments,
+    part: NamedLink,
+    output: &mut Output,
+) -> io::Result<Exit> {
+    // All drives of a ring are judged.
+    let named = part.channel.is_some().then(|| capture.judge.clone());
     let arguments = ImportArguments {
         files: files.to_vec(),
         format: None,
         scenario: false,
         setup: None,
+        judge: named.unwrap_or_default(),
         // A real clock, and ports that give several bytes at a time.
         tolerance: Some(Duration::from_millis(50)),
         reading: ReadingArguments {
-            line: Some(line),
+            line: Some(capture.line),
             link: vec![part],
             ..ReadingArguments::default()
         },

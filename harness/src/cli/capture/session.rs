@@ -205,7 +205,7 @@ impl<'a> Session<'a> {
             let of_ring = || (part.channel.is_none()).then(|| self.unjudged()).flatten();
             let why = self.unheard(&part).or_else(of_ring).or(removed);
             match why {
-                None => exits.push(judge(&paths, self.arguments.line, part, output)?),
+                None => exits.push(judge(&paths, self.arguments, part, output)?),
                 Some(why) => {
                     output.say(&format!(
                         "  {} not judged: {}; `drivebench import` reads {}\n",

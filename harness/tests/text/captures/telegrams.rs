@@ -198,7 +198,7 @@ fn telegrams_of_a_capture_are_judged() {
     let [_, right] = captured("telegrams-right", talk);
     let said = ended(&drivebench(&["import", plain(&right)]), 0);
     assert!(
-        said.contains("passed") && said.contains("of drives compared"),
+        said.contains("passed") && said.contains("replies compared"),
         "{said}"
     );
     let wrong = talk.replace("slave 8\n", "slave 8\nslave 8 deviates hides-prm-req\n");
@@ -333,4 +333,40 @@ fn tshark_tells_ppo_types_of_one_length_apart() {
     assert_eq!(dissected(&capture, &only, &fields), ["1|50|1202", "4|50|"]);
     let four = [only.as_slice(), &["-o", "nordac.ppo:4"]].concat();
     assert_eq!(dissected(&capture, &four, &fields), ["4|0|", "4|50|"]);
+}
+
+/// A request and its reply in one packet, as an adapter gives them: both are shown where the interface is no station's.
+#[test]
+fn tshark_reads_several_telegrams_of_a_packet() {
+    if !has("tshark", "telegrams of one packet") {
+        return;
+    }
+    let status = [
+        0x10, 0x08, 0x02, 0x49, 0x53, 0x16, 0x10, 0x02, 0x08, 0x00, 0x0A, 0x16,
+    ];
+    let mut bytes = [
+        0xA1B2_C3D4_u32,
+        0x0004_0002,
+        0,
+        0,
+        0xFFFF,
+        250,
+        1,
+        0,
+        24,
+        24,
+    ]
+    .map(u32::to_le_bytes)
+    .concat();
+    bytes.extend([0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0]);
+    bytes.extend(status);
+    let path = file("telegrams-together.pcap");
+    std::fs::write(&path, bytes).expect("room");
+    let fields = ["nordac.service", "nordac.meaning", "nordac.sa"];
+    assert_eq!(
+        dissected(&path, &[], &fields),
+        ["FDL status,FDL status|,OK|2,8"]
+    );
+    let said = ended(&drivebench(&["import", plain(&path), "--link", "bus"]), 0);
+    assert!(said.contains("1 of 1 reply compared"), "{said}");
 }

@@ -52,6 +52,8 @@ pub(super) struct Follower {
     pub(super) exchanging: bool,
     /// Whether the last telegram to the slave was the one before.
     pub(super) fresh: bool,
+    /// Whether its last reply may have been one to a repetition of a request that is not known: it was not compared.
+    pub(super) may_repeat: bool,
     /// When its last reply had ended.
     pub(super) sent: Option<Instant>,
 }
@@ -73,6 +75,7 @@ impl Follower {
             unanswered: None,
             exchanging: false,
             fresh: false,
+            may_repeat: false,
             sent: None,
         }
     }
@@ -104,6 +107,7 @@ impl Follower {
 
     /// Compares a reply with what the request allows.
     pub(super) fn judge(&mut self, request: &Pdu, reply: &Telegram, octets: &[u8]) -> Found {
+        self.may_repeat = false;
         if request.da() == BROADCAST {
             return form("a request to all stations is answered");
         }
@@ -175,7 +179,7 @@ impl Follower {
         match std::mem::replace(&mut self.record, now) {
             _ if !control.fcv() => None,
             Record::Unknown => {
-                (self.way, self.fresh) = (Way::Unknown, false);
+                (self.way, self.fresh, self.may_repeat) = (Way::Unknown, false, true);
                 Some(None)
             }
             Record::Counted(before, count, former) if (before, count) == (master, bit) => {

@@ -2,17 +2,19 @@
 
 use super::doubt::Sender;
 use super::follower::{Follower, Record, Way};
+use super::standing::{Standing, standings};
 use super::symptom::ReplySubject;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
 use crate::buses::nordac::report::{Said, TelegramRun, runs};
+use crate::counted::counted;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::Image;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
-use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu};
+use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Reason};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Differences and doubts that are kept at most.
 const MOST_BREACHES: usize = 50;
@@ -47,6 +49,8 @@ pub struct JudgedSlaves {
     pub breaches: Vec<Breach>,
     /// Replies of slaves that were compared.
     pub compared: usize,
+    /// Replies that could be compared: those, and those that are damaged or that follow octets which are no single request.
+    pub replies: usize,
     /// What was not compared, in sentences.
     pub remarks: Vec<String>,
     /// What differs and may have another cause than a wrong slave, in sentences with their places: it accuses no slave, and nothing has
@@ -65,40 +69,50 @@ struct Asked {
 }
 
 /// Judges what the slaves of a line sent, in a capture that may begin in mid-conversation: its first octets may be the end of a telegram,
-/// or the reply to a request that was not heard. Times may be off by `tolerance`.
+/// or the reply to a request that was not heard.
+///
+/// `named` are the slaves that are judged; where there are none, those that are no other device's. Times may be off by
+/// `tolerance`.
 #[must_use]
-pub fn judge(trace: &Trace, tolerance: Span) -> JudgedSlaves {
-    let runs = runs(trace);
+pub fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
+    let mut runs = runs(trace);
     let senders = Sender::of_all(&runs);
-    judge_from(Some(tolerance), runs.into_iter().zip(senders))
+    // A telegram that the end of the capture has cut.
+    let cut = runs.pop_if(|own| own.from.is_some() && is_begun(own));
+    let mut judge = Judge {
+        midway: true,
+        recorded: Some(tolerance),
+        standings: standings(&runs, named),
+        ..Judge::default()
+    };
+    if cut.is_some() {
+        let about = "the capture ends in the middle of a reply, which was not compared";
+        judge.judged.remarks.push(about.to_owned());
+    }
+    judge.all_of(runs.into_iter().zip(senders))
+}
+
+/// Whether octets are a telegram, or as many as one has: a wrong check sum or end is in them and not one octet too few.
+fn is_complete(said: &Said) -> bool {
+    let left = match Telegram::decode(&said.octets) {
+        Decoded::Value { .. } => return true,
+        Decoded::NeedMore => return false,
+        Decoded::Bad { reason, offset } => (reason, said.octets.len() - 1 - offset),
+    };
+    [(Reason::CheckSum, 1), (Reason::End, 0)].contains(&left)
+}
+
+/// Whether octets are the beginning of a telegram.
+fn is_begun(run: &TelegramRun) -> bool {
+    let said = run.said().filter(|own| own.error.is_none());
+    said.is_some_and(|own| matches!(Telegram::decode(&own.octets), Decoded::NeedMore))
 }
 
 /// The same of octets that stations sent without a pause, from the first telegram of the line on.
 pub(in crate::buses::nordac) fn judge_runs(
     runs: impl IntoIterator<Item = TelegramRun>,
 ) -> JudgedSlaves {
-    judge_from(None, runs.into_iter().map(|own| (own, Sender::Known)))
-}
-
-fn judge_from(
-    recorded: Option<Span>,
-    runs: impl IntoIterator<Item = (TelegramRun, Sender)>,
-) -> JudgedSlaves {
-    let mut judge = Judge {
-        midway: recorded.is_some(),
-        recorded,
-        ..Judge::default()
-    };
-    for (number, (run, sender)) in (1..).zip(runs) {
-        judge.sender = sender;
-        match run.from {
-            None => judge.asks(number, &run),
-            Some(_) => judge.replies(number, &run),
-        }
-        judge.midway = false;
-    }
-    judge.finished();
-    judge.judged
+    Judge::default().all_of(runs.into_iter().map(|own| (own, Sender::Known)))
 }
 
 #[derive(Debug, Default)]
@@ -114,17 +128,49 @@ struct Judge {
     /// began; until the slave shows that it was not.
     restarted: BTreeMap<u8, (Instant, Follower)>,
     asked: Option<Asked>,
+    /// Whether a slave is judged; one that is not in it is.
+    standings: BTreeMap<u8, Standing>,
+    /// Replies of slaves that are not judged.
+    left_out: BTreeMap<u8, usize>,
+    /// The slaves of which a reply was compared.
+    heard: BTreeSet<u8>,
+    /// Replies that may repeat one to a request from before the capture, or to one that was damaged or not answered.
+    may_repeat: usize,
     judged: JudgedSlaves,
 }
 
 impl Judge {
+    fn all_of(mut self, runs: impl IntoIterator<Item = (TelegramRun, Sender)>) -> JudgedSlaves {
+        for (number, (run, sender)) in (1..).zip(runs) {
+            self.sender = sender;
+            match run.from {
+                None => self.asks(number, &run),
+                Some(_) => self.replies(number, &run),
+            }
+            self.midway = false;
+        }
+        self.finished();
+        self.judged
+    }
+
+    fn standing(&self, slave: u8) -> Standing {
+        let own = self.standings.get(&slave);
+        own.copied().unwrap_or_default()
+    }
+
     fn breach(
         &mut self,
         (telegram, slave): (usize, u8),
         (what, section): (Symptom, &'static str),
         (part, about): (&str, String),
     ) {
-        if let Some(why) = self.sender.doubt() {
+        let standing = self.standing(slave);
+        if !standing.is_judged() {
+            return;
+        }
+        let lost = "a tap does not show whether the request has reached the slave";
+        let why = self.sender.doubt().or(standing.doubt());
+        if let Some(why) = why.or((what == Missing && self.recorded.is_some()).then_some(lost)) {
             self.doubt(format!(
                 "telegram {telegram}, slave {slave}: {about}; {why}"
             ));
@@ -177,14 +223,23 @@ impl Judge {
             Some(Decoded::Value { value, used }) if sound && whole(used) => {
                 (value.pdu().copied(), false)
             }
-            Some(Decoded::Value { used, .. }) => (None, self.midway || !whole(used)),
-            _ => (None, self.midway),
+            // A tap may lose an octet, or damage one that the slave has read.
+            _ if self.recorded.is_some() => (None, true),
+            Some(Decoded::Value { used, .. }) => (None, !whole(used)),
+            _ => (None, false),
         };
+        let torn = doubtful && self.recorded.is_some();
         if let Some(pdu) = &pdu {
             self.sent(pdu);
         } else {
-            // What was damaged may have been heard by some.
-            self.all().for_each(|own| own.fresh = false);
+            // What was damaged may have been heard by some, and what a tap damages by all.
+            self.all().for_each(|own| {
+                own.fresh = false;
+                if torn {
+                    own.record = Record::Unknown;
+                    own.may_be_set_up();
+                }
+            });
         }
         self.asked = Some(Asked {
             number,
@@ -255,6 +310,30 @@ impl Judge {
 
     fn finished(&mut self) {
         self.asked = None;
+        let remarks = &mut self.judged.remarks;
+        for (slave, standing) in &self.standings {
+            let left_out = self.left_out.get(slave).copied().unwrap_or(0);
+            let named = *standing == Standing::Named && !self.heard.contains(slave);
+            if let Some(why) = standing.why_not() {
+                let count = counted(left_out, "reply");
+                remarks.push(format!("slave {slave} is not judged ({count}): {why}"));
+            } else if named && self.judged.doubts.len() < MOST_BREACHES {
+                let about = format!("slave {slave}: no reply of it was compared");
+                self.judged.doubts.push(about);
+            }
+        }
+        if self.may_repeat > 0 {
+            let count = counted(self.may_repeat, "reply");
+            remarks.push(format!(
+                "{count} not compared: the request may repeat one that was not heard or not answered"
+            ));
+        }
+        if let unread @ 1.. = self.judged.replies - self.judged.compared {
+            let count = counted(unread, "reply");
+            remarks.push(format!(
+                "{count} not compared: the reply or its request could not be read"
+            ));
+        }
         if self.judged.compared == 0 {
             self.judged
                 .remarks
@@ -268,10 +347,10 @@ impl Judge {
         let Some(said) = run.said() else {
             return;
         };
-        let damaged = run
-            .octets
-            .iter()
-            .any(|own| own.sent != own.received || own.error.is_some());
+        let mut octets = run.octets.iter();
+        let damaged = octets.any(|own| own.sent != own.received || own.error.is_some());
+        // A tap may lose an octet.
+        let damaged = damaged || self.recorded.is_some() && !is_complete(&said);
         let from = said.from.unwrap_or(0);
         let Some(asked) = asked else {
             if self.midway {
@@ -280,7 +359,13 @@ impl Judge {
             let about = "it sends again without a request in between".to_owned();
             return self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
         };
+        let address = asked.pdu.as_ref().map_or(from, Pdu::da);
+        let is_judged = self.standing(address).is_judged();
+        if !is_judged {
+            *self.left_out.entry(address).or_default() += 1;
+        }
         if damaged {
+            self.judged.replies += usize::from(is_judged);
             // On the way to the master: nothing is known of it.
             if let Some(pdu) = &asked.pdu {
                 for own in self.of(pdu.da()) {
@@ -289,18 +374,20 @@ impl Judge {
             }
             return;
         }
-        self.judged.compared += 1;
         let Some(request) = asked.pdu else {
             if !asked.doubtful {
+                self.judged.compared += usize::from(is_judged);
                 let about = format!(
                     "it replies to telegram {}, which is no request",
                     asked.number
                 );
                 self.breach((number, from), (Unasked, "EN 1"), (NO_REQUEST, about));
             }
+            // What the capture begins in the middle of was not heard; two telegrams in a row were, and hide the request.
+            let hidden = !(asked.doubtful && asked.number == 1);
+            self.judged.replies += usize::from(is_judged && hidden);
             return;
         };
-        let address = request.da();
         self.comes(address, said.at);
         let reply = said.telegram();
         let follower = self.follower(address);
@@ -309,6 +396,13 @@ impl Judge {
             Some(reply) => follower.judge(&request, reply, &said.octets),
         };
         let shown = follower.shown();
+        let may_repeat = follower.may_repeat;
+        if is_judged {
+            self.may_repeat += usize::from(may_repeat);
+            self.judged.compared += usize::from(!may_repeat);
+            self.judged.replies += usize::from(!may_repeat);
+            self.heard.insert(address);
+        }
         let why = found.as_ref().map(|own| &own.2);
         let why = why.or(shown.as_ref().map(|own| &own.1));
         if let Some((silent, restarted)) = self.explained(&request, &said) {
@@ -316,6 +410,9 @@ impl Judge {
                 self.restarted.insert(address, (silent, restarted));
                 return;
             };
+            if !is_judged {
+                return;
+            }
             self.doubt(format!(
                 "telegram {number}, slave {address}: {why}; its supply may have been switched off and on in the silence from {} on, which explains it",
                 silent.since_start()

@@ -9,6 +9,7 @@ mod diagnosis;
 mod doubt;
 mod follower;
 mod line;
+mod standing;
 mod symptom;
 #[cfg(test)]
 mod tests;
