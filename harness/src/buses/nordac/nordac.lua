@@ -1,7 +1,7 @@
 -- NORDAC vector on PROFIBUS DP (manual "PROFIBUS DP for NORDAC vector", chapters 3 to 5; EN 50170) for Wireshark and tshark, from 4.0 on.
 --
--- It reads what `drivebench trace --format pcapng` writes, or any capture of link type 250 (LINKTYPE_RTAC_SERIAL) with one telegram a packet and
--- one interface a station, named `master` or `slave 8`.
+-- It reads what `drivebench trace --format pcapng` writes, or any capture of link type 250 (LINKTYPE_RTAC_SERIAL) with whole telegrams in its
+-- packets: one a packet where interfaces are named by their station, `master` or `slave 8`, and any number where they are not.
 --
 --     drivebench dissector --bus nordac > nordac.lua
 --     tshark -X lua_script:nordac.lua -d rtacser.data,nordac -r drive.pcapng
@@ -612,24 +612,24 @@ local function experts(found, root)
     if found.refused then root:add_proto_expert_info(refused, found.refused) end
 end
 
-function nordac.dissector(tvb, pinfo, tree)
-    local sender = tostring(interface_name() or "")
-    local event = event_type() and event_type().value or 0x04
-    if not seen[pinfo.number] then
-        local bytes = {}
-        for place = 0, tvb:len() - 1 do bytes[place + 1] = tvb(place, 1):uint() end
-        seen[pinfo.number] = see(bytes, event, tostring(packet_comment() or ""), pinfo.number)
+-- The telegrams of a packet. A packet of a station's own interface is one; adapters give several, a request and its reply too, in one packet
+-- of an interface that is no station's. Where not all of it is telegrams, it is shown as one.
+local function telegrams(bytes, sender)
+    local parts, at = {}, 1
+    local of_station = sender == "master" or sender:match("^slave %d+$")
+    while not of_station and at <= #bytes do
+        local rest = { table.unpack(bytes, at) }
+        local own = decode(rest)
+        if not own then return { { at = 1, bytes = bytes } } end
+        table.insert(parts, { at = at, bytes = { table.unpack(rest, 1, own.used) } })
+        at = at + own.used
     end
-    local found = seen[pinfo.number]
+    return #parts > 0 and parts or { { at = 1, bytes = bytes } }
+end
+
+local function show(found, sender, tvb, tree)
     local own = found.own
-    pinfo.cols.protocol = "NORDAC"
-    local text = found.service .. (found.meaning ~= "" and "  " .. found.meaning or "")
-    pinfo.cols.info = sender .. "  " .. text
-    if own and own.da then
-        pinfo.cols.src = tostring(own.sa)
-        pinfo.cols.dst = own.da == 127 and "all" or tostring(own.da)
-    end
-    local root = tree:add(nordac, tvb(), "NORDAC, " .. text)
+    local root = tree:add(nordac, tvb(), "NORDAC, " .. found.text)
     root:add(F.sender, sender):set_generated()
     root:add(F.service, found.service):set_generated()
     root:add(F.meaning, found.meaning):set_generated()
@@ -637,6 +637,35 @@ function nordac.dissector(tvb, pinfo, tree)
     if found.request_in then root:add(F.request_in, found.request_in):set_generated() end
     if own and own.kind == "pdu" then show_pdu(found, own, tvb, root) end
     experts(found, root)
+end
+
+function nordac.dissector(tvb, pinfo, tree)
+    local sender = tostring(interface_name() or "")
+    local event = event_type() and event_type().value or 0x04
+    if not seen[pinfo.number] then
+        local bytes, all = {}, {}
+        for place = 0, tvb:len() - 1 do bytes[place + 1] = tvb(place, 1):uint() end
+        for _, part in ipairs(telegrams(bytes, sender)) do
+            local found = see(part.bytes, event, tostring(packet_comment() or ""), pinfo.number)
+            found.text = found.service .. (found.meaning ~= "" and "  " .. found.meaning or "")
+            found.at, found.length = part.at - 1, #part.bytes
+            table.insert(all, found)
+        end
+        seen[pinfo.number] = all
+    end
+    local all, texts = seen[pinfo.number], {}
+    for _, found in ipairs(all) do table.insert(texts, found.text) end
+    pinfo.cols.protocol = "NORDAC"
+    pinfo.cols.info = sender .. "  " .. table.concat(texts, " | ")
+    local own = all[1].own
+    if own and own.da then
+        pinfo.cols.src = tostring(own.sa)
+        pinfo.cols.dst = own.da == 127 and "all" or tostring(own.da)
+    end
+    for _, found in ipairs(all) do
+        local part = found.length > 0 and #all > 1 and tvb(found.at, found.length):tvb() or tvb
+        show(found, sender, part, tree)
+    end
     return tvb:len()
 end
 
