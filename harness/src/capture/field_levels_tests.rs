@@ -87,7 +87,7 @@ fn tables_of_levels() {
     refused(
         voltage.replace(": A, B", ": A").as_bytes(),
         &["bus=A"],
-        "it names 1 channels and has 2 columns",
+        "it names 1 of 2 columns",
     );
 }
 

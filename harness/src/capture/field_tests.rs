@@ -419,7 +419,7 @@ fn other_devices_on_the_line() {
 
 /// A tap does not show whether a request has reached the slave (EN 1): the master repeats it, and it is answered.
 #[test]
-fn a_request_without_a_reply_accuses_nobody() {
+fn a_request_without_a_reply_accuses_no_slave() {
     let lost = |exchange: &[Vec<u8>; 2]| [exchange[0].clone(), Vec::new()];
     let mut repeated = start();
     repeated.insert(4, lost(&repeated[4]));
@@ -433,9 +433,9 @@ fn a_request_without_a_reply_accuses_nobody() {
     }
 }
 
-/// A request that a tap has damaged, and that the slave has read and answered, accuses nobody.
+/// A request that a tap has damaged, and that the slave has read and answered, accuses no slave.
 #[test]
-fn a_request_that_a_tap_has_damaged_accuses_nobody() {
+fn a_request_that_a_tap_has_damaged_accuses_no_slave() {
     for number in (0..10).step_by(2) {
         let mut telegrams = serial(0x02, &timed(&start()));
         telegrams[number].1[8] = 0x08;

@@ -72,7 +72,7 @@ pub(super) fn read(
         return Err(CaptureError::Link {
             place: "the table".to_owned(),
             what: format!(
-                "it names {named} channels and has {columns} columns; export the logic channels alone, without times"
+                "it names {named} of {columns} columns; export the logic channels alone, without times"
             ),
         });
     }
