@@ -22,7 +22,14 @@ fn traces(scenario: &str) -> Vec<Trace> {
 
 fn traces_of(source: Source) -> Vec<Trace> {
     // A simulated drive is back at once; a real one is silent while it is off and starts.
-    let text = source.text.replace(" restart\n", " restart\nwait 400ms\n");
+    let lines = source
+        .text
+        .lines()
+        .map(|line| match line.strip_suffix(" restart") {
+            Some(start) if !start.ends_with('=') => format!("{line}\nwait 400ms\n"),
+            _ => format!("{line}\n"),
+        });
+    let text: String = lines.collect();
     let source = Source::from_bytes(source.name, text.into_bytes()).expect("a text");
     let entry = Entry::new(source, None).expect("no mistakes");
     let plan = entry.settled().expect("a plan");

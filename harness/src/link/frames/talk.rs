@@ -12,6 +12,9 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// A line of an adapter, and what ended it.
+type EndedLine = Result<(Vec<u8>, u8), BadMessage>;
+
 /// How long an adapter may take to answer a command of the opening.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -264,10 +267,7 @@ impl<'a> Talk<'a> {
     }
 
     /// The next line of an SLCAN adapter, and what ends it; `None` where none comes.
-    fn line(
-        &mut self,
-        end: Instant,
-    ) -> Result<Option<Result<(Vec<u8>, u8), BadMessage>>, AdapterError> {
+    fn line(&mut self, end: Instant) -> Result<Option<EndedLine>, AdapterError> {
         while let Some(character) = self.next(end)? {
             if let Some(line) = self.lines.push(character) {
                 return Ok(Some(line));
