@@ -43,6 +43,7 @@ fn run(text: &str) -> Capture {
         rate,
         traces,
         listened: None,
+        timed: true,
     }
 }
 

@@ -71,6 +71,7 @@ fn captures() -> impl Strategy<Value = Capture> {
         rate: Rate::ALL[rate],
         traces: rings.into_iter().map(trace).collect(),
         listened: None,
+        timed: true,
     })
 }
 
