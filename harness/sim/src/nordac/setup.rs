@@ -6,7 +6,7 @@ use harness_proto::nordac::properties::Properties;
 /// What an inverter keeps of the time before, where it was not just switched on, or had faults once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct History {
-    /// The control word in force: the last valid one stays, whoever controls the inverter now (3.2.1, bit 10).
+    /// The control word in force: the last valid one stays, whatever controls the inverter now (3.2.1, bit 10).
     pub stw: Option<u16>,
     /// The faults that were acknowledged, the oldest first (5.7).
     pub faults: Vec<u8>,

@@ -6,6 +6,9 @@ use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::sync::Mutex;
 
+/// What an adapter answers to a command.
+type Dialect = fn(&str) -> &'static str;
+
 /// More than anything here takes.
 const LONG: Span = Span::from_millis(60_000);
 
@@ -221,7 +224,7 @@ fn opening(said: &Said, last: &str) -> String {
 /// Both are asked as they can be; the mode that they keep while they have power is set back.
 #[test]
 fn the_firmware_of_canable_is_an_adapter() {
-    let dialects: [(fn(&str) -> &'static str, &str, Listening); 2] = [
+    let dialects: [(Dialect, &str, Listening); 2] = [
         (canable, "N C V S6 Z1 L M1 O", Listening::Only("M1")),
         (canable_2, "N C V V S6 M1 O", Listening::Unconfirmed("M1")),
     ];
@@ -263,7 +266,7 @@ fn listening_only_is_proven_or_permitted() {
         "L" => "\x07",
         command => good(command),
     };
-    let dialects: [(fn(&str) -> &'static str, &str, &str); 2] = [
+    let dialects: [(Dialect, &str, &str); 2] = [
         (mute, "to confirm that it listens only", "M1 O"),
         (deaf, "to listen only (L)", "L O"),
     ];
@@ -292,7 +295,7 @@ fn listening_only_is_proven_or_permitted() {
 #[test]
 fn an_adapter_is_not_opened_at_another_rate() {
     let rate = |bits| BitRate::from_bits_per_second(bits).expect("a rate");
-    let dialects: [(fn(&str) -> &'static str, u32); 3] = [
+    let dialects: [(Dialect, u32); 3] = [
         (canable, 800_000),
         (canable_2, 800_000),
         (canable_2, 400_000),

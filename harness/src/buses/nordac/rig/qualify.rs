@@ -347,7 +347,7 @@ mod tests {
             master: None,
         };
         let limits = Limits::default();
-        let mut link = guarded(Bench::new(&setup), limits.clone(), &[all[0].into()], false);
+        let mut link = guarded(Bench::new(&setup), limits, &[all[0].into()], false);
         let able = (link.capabilities().to_vec(), true);
         let patience = Span::from_millis(5);
         let mut player = Player::of(all, BusRate::K500, patience, limits, able);
