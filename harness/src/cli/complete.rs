@@ -254,6 +254,7 @@ mod tests {
             "TEXT",
             "TIME",
             "NUMBER",
+            "NUMBERS",
             "DRIVES",
             "RATE",
             "ID",
