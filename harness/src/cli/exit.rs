@@ -114,7 +114,7 @@ impl From<Exit> for ExitCode {
 mod tests {
     use super::*;
 
-    /// The gravest verdict decides, and what was only skipped has shown nothing.
+    /// The most serious verdict decides, and what was only skipped has shown nothing.
     #[test]
     fn verdicts_and_their_exit_codes() {
         let code = |gravest| match gravest {

@@ -55,7 +55,7 @@ pub(super) struct Talk<'a> {
     own_dialect: bool,
     /// Whether it answers commands.
     answers: bool,
-    /// Whether it was told to be silent, which it is until it is told to acknowledge.
+    /// Whether it was told to be silent, which it is until a command lets it acknowledge.
     silenced: bool,
     /// How much was read.
     read: usize,

@@ -97,7 +97,7 @@ impl Outcome {
         }
     }
 
-    /// The same where the transport reported so many line errors or losses without their place: neither a pass nor a failure is proven.
+    /// The same where the transport reported this number of line errors or losses without their place: neither a pass nor a failure is proven.
     pub(crate) fn unplaced(&mut self, count: u64) {
         let verdict = self.verdict;
         if count > 0

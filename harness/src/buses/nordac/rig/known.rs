@@ -20,10 +20,10 @@ const APART: [u16; 2] = [PPO_TYPE, ADDRESS];
 /// Who controls an inverter: the first of the settings of the bus in which a scenario may differ from the rig (2.5.1).
 pub(super) const INTERFACE: u16 = 1621;
 
-/// The PPO type. The module begins anew with another one.
+/// The PPO type. The module restarts with another one.
 pub(super) const PPO_TYPE: u16 = 1622;
 
-/// The address. The module begins anew with another one.
+/// The address. The module restarts with another one.
 pub(super) const ADDRESS: u16 = 1624;
 
 /// What loads the factory settings: every other parameter may have another value then, and the address is 126 (4.1.3, 5.5).

@@ -1,7 +1,7 @@
 //! What a scenario leaves changed in the slaves of a rig: put back, and read again to see it.
 //!
 //! Parameters are stored, the address and the PPO type among them; a fault and the control word in force stay until the power goes. What cannot be
-//! put back is told with the command that does it.
+//! put back is printed with the command that does it.
 
 use super::RigSlave;
 use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
@@ -21,7 +21,7 @@ use harness_proto::nordac::{Image, Parameter, ParameterRef, Pkw, Task};
 #[cfg(test)]
 mod tests;
 
-/// The bus mode (5.5): the module begins anew with another one, as with another PPO type or address.
+/// The bus mode (5.5): the module restarts with another one, as with another PPO type or address.
 const BUS_MODE: u16 = 1619;
 
 /// A parameter: its number and IND.
@@ -37,7 +37,7 @@ const fn rank(number: u16) -> u8 {
     }
 }
 
-/// Whether the module begins anew, and does not answer the task.
+/// Whether the module restarts, and does not answer the task.
 const fn restarts(number: u16) -> bool {
     matches!(number, BUS_MODE | PPO_TYPE | ADDRESS)
 }

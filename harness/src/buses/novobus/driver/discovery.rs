@@ -36,7 +36,7 @@ pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error>
 ///
 /// A check sequence brings back each drive that has noticed the one before it, and one that has not: that one hears its seventeen zeros. In a
 /// silence drives time out one byte apart, and every second one may not notice the one before it (9.9): a sound ring needs as many check
-/// sequences as it has drives at the most. So many are sent where something comes back behind the first two.
+/// sequences as it has drives at the most. This number is sent where something comes back behind the first two.
 fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
     let (first, heard) = counted(link, ring, &repair());
     let more = first.is_none() && !heard.is_empty() && link.trouble().is_none();

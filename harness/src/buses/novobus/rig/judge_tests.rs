@@ -70,7 +70,7 @@ pub(super) fn judged_on(
     judged_early(link, rig, (plan, way), change, (Span::ZERO, 0))
 }
 
-/// The same where each byte is stamped so much earlier, as behind a socket, which is not bound to the times of a line, and with so many line errors
+/// The same where each byte is stamped that much earlier, as behind a socket, which is not bound to the times of a line, and with this number of line errors
 /// whose bytes are not known.
 pub(super) fn judged_early(
     link: &mut dyn Link,

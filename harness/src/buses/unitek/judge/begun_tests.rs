@@ -51,7 +51,7 @@ fn wrong(frames: &[(u64, &str)], what: FrameSymptom, section: &str) {
 /// A read with its reply: the bus and the drive are known to be at work.
 const READ: [(u64, &str); 2] = [(100, "201#3DE200"), (104, "181#E2010000")];
 
-/// So many frames, each `every` tenths of a millisecond.
+/// This number of frames, one each `every` tenths of a millisecond.
 fn cycle(text: &'static str, every: u64, count: u64) -> Vec<(u64, &'static str)> {
     (0..count).map(|own| (own * every, text)).collect()
 }

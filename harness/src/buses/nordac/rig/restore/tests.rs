@@ -181,7 +181,7 @@ fn what_cannot_be_put_back_is_not_begun() {
     }
 }
 
-/// What is denied is told with the command that does it.
+/// What is denied is printed with the command that does it.
 #[test]
 fn what_is_not_put_back_is_told_with_its_command() {
     let limits = Limits {
