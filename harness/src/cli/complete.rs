@@ -250,7 +250,7 @@ mod tests {
     /// Every kind of name that an argument takes is offered, or is known to be free text.
     #[test]
     fn every_value_is_of_a_known_kind() {
-        const FREE: [&str; 26] = [
+        const FREE: [&str; 27] = [
             "TEXT",
             "TIME",
             "NUMBER",
