@@ -162,7 +162,6 @@ fn every_command_over(ways: &[&str]) {
 
 /// All that needs no permission is played over each way in, no correct drive is accused, and a changed frame of the record is found.
 #[test]
-#[ignore = "on a loaded computer `verify` may find frames of a skipped attempt that its capture does not have; .ci/nightly runs it"]
 fn scenarios_over_a_pty() {
     scenarios_over(&["pty"]);
 }
