@@ -33,9 +33,9 @@
 
 pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
+use harness_proto::counted;
 pub use scenario::verdict::Verdict;
 
-mod counted;
 mod embed;
 mod html;
 #[doc(hidden)]

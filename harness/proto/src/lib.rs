@@ -6,6 +6,7 @@
 //! *ND21 User Manual 1/96*).
 //!
 //! * [`time`]: virtual time, exact for every rate of every line; [`decode`]: what a decoder answers;
+//! * [`counted`]: numbers with their nouns;
 //! * [`can`]: frames of a CAN bus, their length on the wire, bit rates;
 //! * [`line`](mod@line): an asynchronous serial line: its rate, and what a receiver reads from it;
 //! * [`marks`]: how a stream of bytes carries line errors;
@@ -22,6 +23,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod can;
+pub mod counted;
 pub mod decode;
 pub mod line;
 pub mod marks;

@@ -6,6 +6,7 @@ use super::file::{CampaignFile, MAX_CASES, Pairs};
 use super::plan::cases;
 use super::run::{Campaign, CaseOutcome, Contradiction};
 use crate::campaign::report::share;
+use crate::counted::counted;
 use crate::partition::Partition;
 use std::fmt::Write as _;
 use std::sync::Mutex;
@@ -393,8 +394,10 @@ impl PlayedPairs {
             (None, None) => format!("{played} of {pairs} pairs"),
         };
         let mut text = format!(
-            "{}\n{}: {what} of {} faults\n\n",
-            self.title, self.name, self.singles
+            "{}\n{}: {what} of {}\n\n",
+            self.title,
+            self.name,
+            counted(self.singles, "fault")
         );
         let _infallible = write!(text, "  {:18}", "class");
         for apart in Apart::ALL {

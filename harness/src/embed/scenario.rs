@@ -1,6 +1,7 @@
 //! A scenario on simulated rings, from another program.
 
 use super::Error;
+use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::link::Link;
 use crate::report::page::page;
@@ -28,9 +29,9 @@ impl Scenario {
         match <[Source; 1]>::try_from(found) {
             Ok([source]) => Self::settled(source, None),
             Err(several) => Err(Error::NotFound(format!(
-                "{}: {} scenarios, and one is expected here",
+                "{}: {}, and one is expected here",
                 name.as_ref().display(),
-                several.len()
+                counted(several.len(), "scenario")
             ))),
         }
     }

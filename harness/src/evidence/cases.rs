@@ -3,6 +3,7 @@
 use super::files::{SCENARIOS, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
+use crate::counted::counted;
 use crate::library::Entry;
 use crate::link::{LinkEvent, Replay};
 use crate::rig::run::not_played;
@@ -143,7 +144,8 @@ impl Settling<'_> {
         if too_many || too_few {
             let count = attempts.len();
             self.wrong.push(format!(
-                "case {name}: {count} attempts are not as many as the rig's file asks for"
+                "case {name}: {}, not as many as the rig's file asks for",
+                counted(count, "attempt")
             ));
         }
     }

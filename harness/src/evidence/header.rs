@@ -95,7 +95,7 @@ pub(super) fn header(
     let own = rig.sizes();
     if own != *drives {
         return Err(format!(
-            "the record is of rings of {} drives, {RIG} has {}",
+            "the sizes of the record's rings are {}, and those of {RIG} are {}",
             sizes(drives),
             sizes(&own)
         ));

@@ -4,6 +4,7 @@ use super::confirm::Confirmation;
 use super::record::{KeptRun, LogLine, Progress};
 use super::swarm::ROUND;
 use super::{Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain, Target};
+use crate::counted::counted;
 use std::collections::BTreeMap;
 
 /// Tries the case of a finding on simulated drives, and again until it is confirmed or is not, as the run did. `known` says how often each
@@ -50,9 +51,10 @@ pub(crate) fn played_again<C: FuzzCase>(
 fn told<C: FuzzCase>(finding: &Finding<C>) -> String {
     let Finding { seen_again, of, .. } = finding;
     format!(
-        "{}: {}; seen again {seen_again} of {of} times",
+        "{}: {}; seen again {seen_again} of {},",
         finding.difference.signature(),
-        finding.difference.about()
+        finding.difference.about(),
+        counted(*of, "time")
     )
 }
 
@@ -113,7 +115,11 @@ pub(crate) fn impossible<C: FuzzCase>(kept: &KeptRun<C>) -> Vec<String> {
     } = kept.progress;
     let first = rounds.saturating_sub(1).saturating_mul(ROUND);
     if !(first..=rounds.saturating_mul(ROUND)).contains(&cases) {
-        wrong.push(format!("{rounds} rounds do not have {cases} cases"));
+        wrong.push(format!(
+            "{} do not have {}",
+            counted(rounds, "round"),
+            counted(cases, "case")
+        ));
     }
     let counted = [not_sent, repeats, shown].into_iter();
     if counted.fold(0, u64::saturating_add) > cases {

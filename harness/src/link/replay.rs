@@ -10,6 +10,7 @@
 use super::{
     Capability, Lead, Line, Link, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble,
 };
+use crate::counted::counted;
 use crate::medium::{Heard, Medium, Out, Pieces};
 use harness_proto::can;
 use harness_proto::line::Received;
@@ -147,13 +148,13 @@ impl Replay {
             LinkEvent::Look(look) => Some(format!("a look at {}", look.at)),
             LinkEvent::Begin(_) => Some("another conversation".to_owned()),
             LinkEvent::Sent(_, at, sent) => {
-                Some(format!("sending {} until {at}", counted(sent.as_out())))
+                Some(format!("sending {} until {at}", pieces_of(sent.as_out())))
             }
             LinkEvent::Fault(_, at, ..) => Some(format!("a fault at {at}")),
             LinkEvent::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
             LinkEvent::Probe(_, at, sent, _) => Some(format!(
                 "a probe with {} from {at} on",
-                counted(Out::Octets(sent))
+                pieces_of(Out::Octets(sent))
             )),
         };
         let strayed = self
@@ -286,7 +287,7 @@ impl Replay {
         let earliest = free.max(now) + took;
         let latest = next.map(|next| free.max(next) + took + known.held);
         if end < earliest || latest.is_some_and(|latest| !shared && end > latest) {
-            let pieces = counted(what);
+            let pieces = pieces_of(what);
             self.fails(format!(
                 "the times of the record cannot be: {pieces} sent at {now} have not left at {end}"
             ));
@@ -574,10 +575,10 @@ fn begins_with(what: Out<'_>, sent: &Pieces) -> bool {
 }
 
 /// A number of pieces, in words.
-fn counted(what: Out<'_>) -> String {
+fn pieces_of(what: Out<'_>) -> String {
     match what {
-        Out::Octets(octets) => format!("{} bytes", octets.len()),
-        Out::Frames(frames) => format!("{} frames", frames.len()),
+        Out::Octets(octets) => counted(octets.len(), "byte"),
+        Out::Frames(frames) => counted(frames.len(), "frame"),
     }
 }
 

@@ -6,6 +6,7 @@ use super::port_file::Port;
 use super::profile::KnownProfile;
 use super::session_error::SessionError;
 use crate::buses::syntax::Header;
+use crate::counted::counted;
 use crate::file::schema::{PathStep, compare, place, syntax};
 use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;
@@ -457,8 +458,9 @@ impl RigCheck<'_> {
         if address >= drives {
             let message = format!("ring {ring} has no drive {address}");
             let expected = format!(
-                "0 to {} expected here: the ring has {drives} drives",
-                drives.saturating_sub(1)
+                "0 to {} expected here: the ring has {}",
+                drives.saturating_sub(1),
+                counted(drives, "drive")
             );
             self.wrong(path, message, expected);
         }

@@ -6,6 +6,7 @@ use super::IDENT;
 use super::parameter::ParameterRef;
 use super::pkw::{Answer, Pkw, Task};
 use super::ppo::{Image, PpoType};
+use crate::counted::counted;
 use crate::profibus::Pdu;
 use crate::profibus::dp::{Diagnosis, Service, SetPrm};
 use crate::profibus::fdl::BadTelegram;
@@ -240,7 +241,8 @@ impl fmt::Display for ExchangeError {
             ),
             Self::Length { octets, expected } => write!(
                 f,
-                "the reply to Data_Exchange has {octets} octets, and the PPO type has {expected}"
+                "the reply to Data_Exchange has {}, and the PPO type has {expected}",
+                counted(*octets, "octet")
             ),
             Self::Unexpected => f.write_str("the reply is not one to Data_Exchange"),
             Self::NoAnswer { task } => write!(

@@ -400,8 +400,8 @@ pub(crate) fn explore<C: FuzzCase>(
 fn beyond(end: &RunEnd, bounds: &Bounds) -> String {
     let remedy = match end {
         RunEnd::Cases => format!(
-            "the run has {} cases already; give --cases with more",
-            bounds.cases
+            "the run has {} already; give --cases with more",
+            counted(bounds.cases, "case")
         ),
         RunEnd::Findings => format!(
             "the run has {} already; give --findings with more",

@@ -154,7 +154,7 @@ impl SessionCapture {
         written?;
         if missing > 0 {
             self.note_loss(&format!(
-                "{missing} bytes or frames lost: the record was full"
+                "the record was full; bytes or frames lost: {missing}"
             ))?;
         }
         Ok(())

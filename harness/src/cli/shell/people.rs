@@ -6,6 +6,7 @@ use super::session::{COMMANDS, SETTLED};
 use crate::cli::args::duration;
 use crate::cli::complete::fitting;
 use crate::cli::help::command;
+use crate::counted::counted;
 use crate::scenario::problem::nearest;
 use clap::Arg;
 use rustyline::completion::{Completer, Pair};
@@ -290,7 +291,12 @@ pub(super) fn text(result: &Value) -> String {
     let mut text = word(result, "found");
     if let Some(packets) = result["packets"].as_u64() {
         // Writing to a String cannot fail.
-        let _infallible = writeln!(text, "{packets} packets in {}", word(result, "path"));
+        let _infallible = writeln!(
+            text,
+            "{} in {}",
+            counted(packets, "packet"),
+            word(result, "path")
+        );
     }
     let Some(scenarios) = result["scenarios"].as_array() else {
         return text;

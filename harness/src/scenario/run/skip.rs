@@ -154,8 +154,8 @@ impl fmt::Display for Why {
             Self::NoInterposer(place) => write!(f, "the rig has no interposer at {place}"),
             Self::OtherSize(own, rig) => write!(
                 f,
-                "it is for rings of another size ({} drives, the rig has {})",
-                ranges(own),
+                "it is for rings of another size ({}, the rig has {})",
+                in_words(own),
                 sizes(rig)
             ),
             Self::Denied(words) => write!(f, "{DENIED}{words}"),
@@ -173,14 +173,17 @@ pub(crate) fn sizes(sizes: &[u8]) -> String {
     sizes.join(" and ")
 }
 
-/// The sizes that rings can have, in words.
-fn ranges(sizes: &[(u8, u8)]) -> String {
+/// `1 drive`, `2 to 8 and 250 drives`.
+fn in_words(sizes: &[(u8, u8)]) -> String {
+    if let [(1, 1)] = sizes {
+        return "1 drive".to_owned();
+    }
     let words = |(smallest, largest): &(u8, u8)| match smallest == largest {
         true => smallest.to_string(),
         false => format!("{smallest} to {largest}"),
     };
     let words: Vec<_> = sizes.iter().map(words).collect();
-    words.join(" and ")
+    format!("{} drives", words.join(" and "))
 }
 
 /// What is needed together, in words.
@@ -288,9 +291,8 @@ impl fmt::Display for Unlock {
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
             Self::Rings(drives) => match drives.as_slice() {
-                [(1, 1)] => f.write_str("a ring of 1 drive"),
-                [_] => write!(f, "a ring of {} drives", ranges(drives)),
-                all => write!(f, "rings of {} drives", ranges(all)),
+                [one] => write!(f, "a ring of {}", in_words(&[*one])),
+                all => write!(f, "rings of {}", in_words(all)),
             },
             Self::SecondRing => f.write_str("a second ring"),
             Self::Simulated => f.write_str("a simulated rig"),

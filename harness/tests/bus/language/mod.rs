@@ -507,9 +507,9 @@ fn checks_can_fail() {
         "cell FE13 of drive 1 holds 00",
     );
     fails(&steps("? corrected 1"), "0 check sequences came back");
-    fails(&steps("> 80\n? sent 2 bytes"), "1 bytes were sent");
-    fails(&steps("> 80\n? sent 1 bytes in 0.3us"), "the 1 bytes took");
-    fails(&steps("> 80\n? received 2 bytes"), "1 bytes were received");
+    fails(&steps("> 80\n? sent 2 bytes"), "1 byte sent");
+    fails(&steps("> 80\n? sent 1 bytes in 0.3us"), "the 1 byte took");
+    fails(&steps("> 80\n? received 2 bytes"), "received 1 byte");
     fails(&steps("! 0->master: cut\nrecover"), "did not come back");
 }
 

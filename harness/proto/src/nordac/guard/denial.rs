@@ -1,6 +1,7 @@
 //! Why a telegram is not completed.
 
 use super::limits::Limits;
+use crate::counted::counted;
 use crate::profibus::dp::Service;
 use core::fmt;
 
@@ -244,7 +245,8 @@ impl fmt::Display for Denial {
             ),
             Self::Wear { most } => write!(
                 f,
-                "{most} parameters were written, as many as `max_eeprom_writes` of the rig file permits"
+                "{} written, as many as `max_eeprom_writes` of the rig file permits",
+                counted(*most, "parameter")
             ),
         }
     }

@@ -3,6 +3,7 @@
 use super::effect::DriveAct;
 use super::known::Facts;
 use super::limits::Need;
+use crate::counted::counted;
 use crate::nd21::cells::cell_at;
 use crate::nd21::units::SpeedRange;
 use crate::novobus::address::RingSize;
@@ -203,11 +204,13 @@ impl fmt::Display for Denial {
             ),
             Cause::TooMany { most } => write!(
                 f,
-                "{most} bytes have been sent within a second; the rig's [limits] allow no more"
+                "{} sent within a second; the rig's [limits] allow no more",
+                counted(most, "byte")
             ),
             Cause::TooLong { most } => write!(
                 f,
-                "{most} bytes have been sent; the rig's [limits] allow no more"
+                "{} sent; the rig's [limits] allow no more",
+                counted(most, "byte")
             ),
             Cause::Closed => f.write_str("an earlier byte was not allowed"),
         }

@@ -2,6 +2,7 @@
 
 use super::super::address::RingSize;
 use super::super::command::Kind;
+use crate::counted::counted;
 use core::fmt;
 
 /// An end of a link.
@@ -123,17 +124,26 @@ impl fmt::Display for Fault {
             Self::Silent => f.write_str(
                 "nothing comes back: a link is broken or a drive is not ready for operation",
             ),
-            Self::WrongRingSize { counted, ring } => write!(
+            Self::WrongRingSize {
+                counted: found,
+                ring,
+            } => write!(
                 f,
-                "the ring has {counted} drives and not {} (ND21 9.3)",
+                "the ring has {} and not {} (ND21 9.3)",
+                counted(*found, "drive"),
                 ring.drives()
             ),
             Self::Late => f.write_str("answers come too late"),
             Self::Lost { bytes } => write!(
                 f,
-                "{bytes} bytes were lost: the answer was that for a later byte"
+                "{} lost: the answer was that for a later byte",
+                counted(*bytes, "byte")
             ),
-            Self::Extra { bytes } => write!(f, "{bytes} bytes came back that nobody had sent"),
+            Self::Extra { bytes } => write!(
+                f,
+                "{} came back that nobody had sent",
+                counted(*bytes, "byte")
+            ),
             Self::Protocol {
                 drive,
                 expected: Some(expected),

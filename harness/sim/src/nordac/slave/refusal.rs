@@ -1,5 +1,6 @@
 //! Why a slave refuses what a master sets it up with (EN 2).
 
+use harness_proto::counted::counted;
 use harness_proto::nordac::{IDENT, PpoType};
 use harness_proto::profibus::dp::SetPrm;
 use std::fmt;
@@ -58,7 +59,8 @@ impl fmt::Display for Refusal {
             Self::Short(octets) => {
                 write!(
                     f,
-                    "Set_Prm is refused: it has {octets} octets, and 7 are the fewest"
+                    "Set_Prm is refused: it has {}, and 7 are the fewest",
+                    counted(*octets, "octet")
                 )
             }
             Self::Ident(ident) => write!(
@@ -71,7 +73,8 @@ impl fmt::Display for Refusal {
             ),
             Self::UserData(octets) => write!(
                 f,
-                "Set_Prm is refused: it has {octets} octets of user parameters, and a NORDAC vector takes none"
+                "Set_Prm is refused: it has {} of user parameters, and a NORDAC vector takes none",
+                counted(*octets, "octet")
             ),
             Self::Configuration(octets, length, ppo) => write!(
                 f,

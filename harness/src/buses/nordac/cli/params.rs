@@ -17,6 +17,7 @@ use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, single};
+use crate::counted::counted;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::nordac::parameter::Flag;
@@ -51,10 +52,8 @@ pub(super) fn save(
         let found = parameters(&mut driver(session), slave)?;
         file::write(&arguments.file, &text(slave, &found))?;
         let path = arguments.file.display();
-        let count = found.len();
-        output.say(&format!(
-            "{count} parameters of slave {slave} are in {path}\n"
-        ));
+        let count = counted(found.len(), "parameter");
+        output.say(&format!("{count} of slave {slave} in {path}\n"));
         Ok(Exit::Passed)
     })
 }
@@ -119,9 +118,9 @@ pub(super) fn load(
                 "{kept} of them say how the inverter is reached and who controls it, and are never loaded (1619 to 1624)"
             ));
         }
-        let count = orders.len();
+        let count = counted(orders.len(), "parameter");
         output.say(&format!(
-            "{count} parameters were written, and the inverter answered with their values\n"
+            "{count} written, and the inverter answered with the values\n"
         ));
         Ok(match kept {
             0 => Exit::Passed,

@@ -1,5 +1,6 @@
 //! What a diagnosis and a status word can be, whatever has happened to a slave.
 
+use crate::counted::counted;
 use harness_proto::nordac::IDENT;
 use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::dp::Diagnosis;
@@ -11,8 +12,8 @@ const ZERO: [u8; 3] = [0xB1, 0xC2, 0xFF];
 pub(super) fn wrong(data: &[u8]) -> Option<String> {
     let Some(own) = Diagnosis::decode(data) else {
         return Some(format!(
-            "a diagnosis of {} octets is sent: 6, or 8 are expected",
-            data.len()
+            "a diagnosis of {} is sent: 6, or 8 are expected",
+            counted(data.len(), "octet")
         ));
     };
     let with_master = own.master.is_some();

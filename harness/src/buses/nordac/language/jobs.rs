@@ -4,6 +4,7 @@ use super::Nordac;
 use super::parse::word_name;
 use super::plan::{MASTER, PlannedJob, PlannedParameter, PlannedWanted, PlannedWord, SentTelegram};
 use super::syntax::WordName;
+use crate::counted::counted;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
@@ -331,7 +332,10 @@ fn exchange(runner: &mut Runner<'_, Nordac>, span: TextSpan, slave: u8) -> Resul
     let octets = data(span, slave, reply, Service::DataExchange.name())?;
     Image::decode(ppo, &octets).ok_or_else(|| {
         let (found, wanted) = (octets.len(), ppo.octets());
-        let message = format!("slave {slave} sends {found} bytes of inputs, {ppo} has {wanted}");
+        let message = format!(
+            "slave {slave} sends {} of inputs, {ppo} has {wanted}",
+            counted(found, "byte")
+        );
         Stop::failed(span, message)
     })
 }

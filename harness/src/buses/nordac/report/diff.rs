@@ -3,6 +3,7 @@
 use super::table::station;
 use super::telegrams::{Said, said};
 use super::words::Reader;
+use crate::counted::counted;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
 
@@ -71,7 +72,7 @@ impl TraceDifference {
     pub fn show(&self, names: [&str; 2]) -> String {
         let [left, right] = self.counts;
         let mut text = match &self.first {
-            None => format!("{left} telegrams are the same\n"),
+            None => format!("the same: {}\n", counted(left, "telegram")),
             Some((place, [one, other])) => format!(
                 "first difference: telegram {place} of {left} and {right}\n  {}: {one}\n  {}: {other}\n",
                 names[0], names[1]

@@ -1,6 +1,7 @@
 //! What is noted of a link to NORDAC inverters: which parameters are written, and how late replies come.
 
 use super::known::{ADDRESS, WIPES};
+use crate::counted::counted;
 use crate::medium::{Heard, Medium, Out};
 use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
 use crate::trouble::Trouble;
@@ -179,7 +180,10 @@ impl TelegramNotes {
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
         let ReceivedSum { pieces, sum } = self.heard;
-        format!("{pieces} octets from the slaves, checksum {sum:08X}")
+        format!(
+            "{} from the slaves, checksum {sum:08X}",
+            counted(pieces, "octet")
+        )
     }
 }
 

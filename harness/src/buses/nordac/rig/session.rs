@@ -8,6 +8,7 @@ use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
+use crate::counted::counted;
 use crate::guard::{Guarded, Safe, Standstill, Watch};
 use crate::medium::{ErrorMarks, Pieces};
 use crate::port::{PortAddress, PortSettings};
@@ -126,8 +127,9 @@ fn listen(session: &mut Session) -> Result<(), SessionError> {
         0 => Ok(()),
         _ if session.listens_only() => Ok(()),
         _ => Err(session.failed(&format!(
-            "{heard} octets came before anything was sent: another master uses the line, or its rate is another one; end it first, or set \
-             `listen_only = true`"
+            "{} came before anything was sent: another master uses the line, or its rate is another one; end it first, or set \
+             `listen_only = true`",
+            counted(heard, "octet")
         ))),
     }
 }

@@ -1,6 +1,7 @@
 //! Single requests to slaves, one after another: what looks at slaves, and takes them to their safe state.
 
 use super::MASTER;
+use crate::counted::counted;
 use crate::link::{Line, Octets, Trouble};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::master::{ExchangeError, StartError, Startup};
@@ -259,7 +260,7 @@ impl<'l> Talk<'l> {
         Diagnosis::decode(&data).ok_or_else(|| TalkError::Unexpected {
             slave,
             service: Service::SlaveDiag.name(),
-            found: format!("{} octets", data.len()),
+            found: counted(data.len(), "octet"),
         })
     }
 
@@ -342,7 +343,7 @@ fn unexpected(slave: u8, service: &'static str, reply: &SlaveReply) -> TalkError
         SlaveReply::Confirmed => "E5".to_owned(),
         SlaveReply::Present => "OK and no data".to_owned(),
         SlaveReply::NotActivated => "RS, no service activated".to_owned(),
-        SlaveReply::Data { data, .. } => format!("{} octets", data.len()),
+        SlaveReply::Data { data, .. } => counted(data.len(), "octet"),
         SlaveReply::Other(control) => format!("FC {:02X}", control.0),
     };
     TalkError::Unexpected {

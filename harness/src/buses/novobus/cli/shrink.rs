@@ -45,7 +45,7 @@ pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::i
     if rig.is_simulated() || sizes(&rig) != finding.case.sizes() {
         let sizes: Vec<_> = finding.case.sizes().iter().map(u8::to_string).collect();
         output.complain(&format!(
-            "the finding is of a rig with ports and {} drives in its rings, and {name} is another",
+            "the finding is of a rig with ports whose rings have the sizes {}, and {name} is another",
             sizes.join(", ")
         ));
         return Ok(Exit::Usage);

@@ -1,6 +1,7 @@
 //! Why a call of the driver failed.
 
 use super::axis::Axis;
+use crate::counted::counted;
 use crate::link::Trouble;
 use harness_proto::nd21::errors::{ErrorCode, display_digits};
 use harness_proto::novobus::master::{BusStop, Fault, Refused};
@@ -59,7 +60,8 @@ pub enum Error {
     },
     /// The drive's position would not settle at the value given.
     #[error(
-        "drive {axis}: the actual value is off by {deviation} increments after {attempts} attempts (ND21 13.2.1.2)"
+        "drive {axis}: the actual value is off by {deviation} increments after {} (ND21 13.2.1.2)",
+        counted(*.attempts, "attempt")
     )]
     NotSet {
         /// The drive.
@@ -70,7 +72,7 @@ pub enum Error {
         attempts: u8,
     },
     /// Every attempt of a step was disturbed so that it may have run once or twice.
-    #[error("{what} was disturbed {attempts} times")]
+    #[error("{what} was disturbed {}", counted(*.attempts, "time"))]
     Disturbed {
         /// What.
         what: String,

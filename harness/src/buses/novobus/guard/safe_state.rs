@@ -306,8 +306,8 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
         why = match (line.trouble(), recovery.drives, reported) {
             (Some(trouble), ..) => return Err(trouble.to_string()),
             (None, Some(found), _) => format!(
-                "the ring has {} drives, not {} as expected",
-                found.drives(),
+                "the ring has {}, not {} as expected",
+                counted(found.drives(), "drive"),
                 size.drives()
             ),
             (None, None, Some(drive)) => {

@@ -6,6 +6,7 @@
 
 use super::cells::{Area, Columns, areas};
 use super::walk::SenderState;
+use crate::counted::counted;
 use crate::html::{Attribute, Html};
 use crate::report::pcapng::name;
 use harness_proto::line::Rate;
@@ -376,8 +377,9 @@ impl<'t> RingPicture<'t> {
             Some(_) => "each at its time",
         };
         let mut text = format!(
-            "The links of a ring of {} drives across, headed by their senders; downwards {bytes} bytes, {down}.",
-            self.trace.stations
+            "The links of a ring of {} across, headed by their senders; downwards {}, {down}.",
+            counted(self.trace.stations, "drive"),
+            counted(bytes, "byte")
         );
         let faults = self.areas.iter().filter(|area| area.fault);
         for area in faults.clone().take(FAULTS) {

@@ -2,6 +2,7 @@
 
 use super::line_test;
 use crate::buses::novobus::driver::{Recovery, SpelledOut, count_behind, recover, unasked};
+use crate::counted::counted;
 use crate::link::{Link, Octets, Trouble, wait_keeping};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -17,7 +18,7 @@ const SHOWN: usize = 8;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unhealthy {
     /// Bytes come although the bench sends nothing.
-    #[error("{count} bytes came although nothing was sent ({bytes})")]
+    #[error("{} came although nothing was sent ({bytes})", counted(*.count, "byte"))]
     Talking {
         /// How many.
         count: usize,
@@ -62,7 +63,7 @@ pub enum Unhealthy {
     )]
     Broken(u8),
     /// Another number of drives.
-    #[error("the ring has {found} drives, the rig's file says {stated}")]
+    #[error("the ring has {}, the rig's file says {stated}", counted(*.found, "drive"))]
     Size {
         /// How many answered.
         found: u8,

@@ -7,6 +7,7 @@ use super::judge::{AttemptFacts, judge, known};
 use super::session::Session;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
+use crate::counted::counted;
 use crate::guard::Guarded;
 use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
@@ -430,8 +431,8 @@ pub(crate) fn opening(
     let divergence = before.iter().find_map(follow);
     let received: usize = before.iter().map(|own| own.received.len()).sum();
     Some(match divergence {
-        None => format!("{received} bytes as of a ring at rest"),
-        Some(divergence) => format!("{received} bytes; {divergence}"),
+        None => format!("{} as of a ring at rest", counted(received, "byte")),
+        Some(divergence) => format!("{}; {divergence}", counted(received, "byte")),
     })
 }
 

@@ -1,6 +1,7 @@
 //! A conversation of the master with a drive on a segment.
 
 use super::file::{CampaignStep, FrameCampaignFile};
+use crate::counted::counted;
 use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Outcome};
@@ -60,7 +61,7 @@ impl JobEnd {
                 Outcome::Started(_) => "started".to_owned(),
                 Outcome::Released => "released".to_owned(),
                 Outcome::NotReady(_) => "not ready".to_owned(),
-                Outcome::NoReply { tries } => format!("no reply to {tries} requests"),
+                Outcome::NoReply { tries } => format!("no reply to {}", counted(*tries, "request")),
             },
         }
     }

@@ -16,6 +16,7 @@ use crate::cli::failure::Failure;
 use crate::cli::file;
 use crate::cli::output::Output;
 use crate::cli::port_bench::{PortBench, on, single};
+use crate::counted::counted;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::unitek::guard::{Class, class};
@@ -47,8 +48,8 @@ pub(super) fn save(
             file::write(&arguments.file, &text(axis, &found))?;
             let path = arguments.file.display();
             output.say(&format!(
-                "{} parameters of drive {} are in {path}\n",
-                found.len(),
+                "{} of drive {} in {path}\n",
+                counted(found.len(), "parameter"),
                 axis.node
             ));
             Ok(Exit::Passed)
@@ -130,8 +131,8 @@ pub(super) fn load(
                 ));
             }
             output.say(&format!(
-                "{} parameters were written and read back\n",
-                orders.len()
+                "{} written and read back\n",
+                counted(orders.len(), "parameter")
             ));
             Ok(match kept {
                 0 => Exit::Passed,

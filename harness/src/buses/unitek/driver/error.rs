@@ -1,6 +1,7 @@
 //! Why a call to a drive came to nothing.
 
 use crate::buses::unitek::rig::Axis;
+use crate::counted::counted;
 use crate::link::Trouble;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::{Data, Reply};
@@ -11,8 +12,9 @@ use harness_proto::unitek::master::{Outcome, Refused};
 pub enum Error {
     /// No reply came. A drive sends no error reply, so nothing tells why.
     #[error(
-        "drive {node} does not answer for register {register:02X} ({}): {tries} requests, no reply; check its identifiers, the bit rate and its power",
-        name(*.register)
+        "drive {node} does not answer for register {register:02X} ({}): {}, no reply; check its identifiers, the bit rate and its power",
+        name(*.register),
+        counted(*.tries, "request")
     )]
     NoReply {
         /// Which drive.

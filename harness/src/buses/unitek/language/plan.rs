@@ -6,6 +6,7 @@ use super::syntax::{
 };
 use super::{Unitek, parse};
 use crate::buses::unitek::simulate::{DriveSetup, Setup};
+use crate::counted::counted;
 use crate::link::{Capability, FrameFault};
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
@@ -121,7 +122,10 @@ pub(super) fn settle(
             .drives
             .first()
             .map_or(TextSpan::default(), |line| line.span);
-        let what = format!("the bench has {size} drives, and the scenario {count}");
+        let what = format!(
+            "the bench has {}, and the scenario {count}",
+            counted(size, "drive")
+        );
         return Err(Problem::new(span, what, "as many `drive` lines expected"));
     }
     Ok(resume(&Setup {

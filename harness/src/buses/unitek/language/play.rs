@@ -6,6 +6,7 @@ use super::syntax::DriveHarm;
 use super::write::identifier;
 use crate::buses::AnyStimulus;
 use crate::buses::unitek::simulate::Bench;
+use crate::counted::counted;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
@@ -432,7 +433,10 @@ fn judge(span: TextSpan, outcome: Outcome, wanted: WantedOutcome) -> Result<(), 
             value(reply.register, reply.data.bits())
         ),
         (Outcome::NoReply { tries }, _) => {
-            format!("no reply has come to the driver, which asked {tries} times")
+            format!(
+                "no reply has come to the driver, which sent {}",
+                counted(tries, "request")
+            )
         }
     };
     Err(Stop::failed(span, message))

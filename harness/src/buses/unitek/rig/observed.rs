@@ -1,5 +1,6 @@
 //! What is noted of a link to UNITEK drives: what is written, and how fast replies come.
 
+use crate::counted::counted;
 use crate::medium::{Heard, Medium, Out};
 use crate::rig::segment::observed::{LinkNotes, ReceivedSum};
 use harness_proto::can::{self, Frame};
@@ -72,7 +73,10 @@ impl FrameNotes {
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
         let ReceivedSum { pieces, sum } = self.heard;
-        format!("{pieces} frames from the drives, checksum {sum:08X}")
+        format!(
+            "{} from the drives, checksum {sum:08X}",
+            counted(pieces, "frame")
+        )
     }
 }
 

@@ -11,6 +11,7 @@ use super::syntax::{
     TelegramHarm, TelegramStep, Wanted, WordKind, WordName, WordValue,
 };
 use crate::buses::nordac::simulate::{self, SlaveSetup, Stimulus};
+use crate::counted::counted;
 use crate::link::Capability;
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
@@ -135,7 +136,10 @@ pub(super) fn settle(
             .slaves
             .first()
             .map_or(TextSpan::default(), |line| line.span);
-        let what = format!("the bench has {size} slaves, and the scenario {count}");
+        let what = format!(
+            "the bench has {}, and the scenario {count}",
+            counted(size, "slave")
+        );
         return Err(Problem::new(span, what, "as many `slave` lines expected"));
     }
     let rate = header.rate.unwrap_or_default();

@@ -5,6 +5,7 @@ use super::step;
 use super::words::master_deviates;
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
+use crate::counted::counted;
 use crate::scenario::parse::header::{Part, given_twice, header_lines, once, read};
 use crate::scenario::parse::step as core;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
@@ -133,7 +134,10 @@ pub(crate) fn for_other_rings(header: &Header, rings: &[u8]) -> Option<Problem> 
         return None;
     }
     let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
-    let what = format!("the rig has {} drives", sizes.join(" and "));
+    let what = match rings {
+        [one] => format!("the rig has {}", counted(*one, "drive")),
+        _ => format!("the rig has {} drives", sizes.join(" and ")),
+    };
     let expected = "no `ring` line, or its sizes, expected here";
     Some(Problem::new(own[0].span, what, expected))
 }

@@ -4,6 +4,7 @@ use super::look::Miss;
 use crate::buses::novobus::language::plan::PlannedCheck;
 use crate::buses::novobus::language::syntax::Ending;
 use crate::buses::novobus::locate::{self, Location};
+use crate::counted::counted;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
@@ -78,8 +79,8 @@ impl Runner<'_> {
             PlannedCheck::Sent(bytes, time) => {
                 if *bytes != self.own.sent {
                     return failed(format!(
-                        "{} bytes were sent since the last check, expected {bytes}",
-                        self.own.sent
+                        "{} sent since the last check, expected {bytes}",
+                        counted(self.own.sent, "byte")
                     ));
                 }
                 let took = self.own.sent_to.since(self.own.sent_from);
@@ -88,7 +89,10 @@ impl Runner<'_> {
                     Some((time, tolerance))
                         if took + *tolerance + own < *time || *time + *tolerance + own < took =>
                     {
-                        failed(format!("the {bytes} bytes took {took}, expected {time}"))
+                        failed(format!(
+                            "the {} took {took}, expected {time}",
+                            counted(*bytes, "byte")
+                        ))
                     }
                     _ => Ok(()),
                 }
@@ -98,7 +102,10 @@ impl Runner<'_> {
                 if received == *bytes {
                     return Ok(());
                 }
-                failed(format!("{received} bytes were received, expected {bytes}"))
+                failed(format!(
+                    "received {}, expected {bytes}",
+                    counted(received, "byte")
+                ))
             }
         }
     }

@@ -1,9 +1,11 @@
 //! Numbers with their nouns.
 
-use std::fmt::Display;
+use alloc::format;
+use alloc::string::String;
+use core::fmt::Display;
 
 /// A number with its noun, which stands in the singular behind 1: `1 scenario`, `0 scenarios`.
-pub(crate) fn counted<N: Display + PartialEq + From<u8>>(number: N, noun: &str) -> String {
+pub fn counted<N: Display + PartialEq + From<u8>>(number: N, noun: &str) -> String {
     match noun.strip_suffix("ply") {
         _ if number == N::from(1) => format!("{number} {noun}"),
         Some(stem) => format!("{number} {stem}plies"),
