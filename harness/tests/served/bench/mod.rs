@@ -487,14 +487,28 @@ fn an_interruption_ends_in_the_safe_state() {
 fn a_port_that_vanishes_ends_the_run() {
     let mut served = Served::start("nd21", &[2], "tcp", true, &[]);
     let desk = Desk::of(&served);
+    let part = desk.path("part");
     let mut child = desk
-        .command(&["run", "--allow-motion"])
+        .command(&[
+            "run",
+            "--allow-motion",
+            "--partition",
+            "slice:1/2",
+            "--evidence",
+            part.to_str().expect("a name"),
+        ])
         .spawn()
         .expect("the program");
     playing(&mut child);
     let _gone = served.child.kill();
     let output = finish(child);
     ended(&output, 7, "the safe state is NOT confirmed");
+    // What is merged of such a part is not safe either, whatever its verdicts are.
+    let mut merge = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    merge
+        .args(["merge", "--output"])
+        .args([desk.path("merged"), part]);
+    ended(&merge.output().expect("the program"), 7, "incomplete");
     // As the operating system puts it: bytes were under way or were not.
     let said = said(&output);
     let lost = ["closed the connection", "the port is lost"];
