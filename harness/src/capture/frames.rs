@@ -409,7 +409,7 @@ mod tests {
             ("(1.0) can0 201#3D4", "pairs of hexadecimal digits"),
             ("(1.0) can0 201##0AA", "CAN FD"),
             ("(1.0) can0 FFF#00", "too large"),
-            ("hello", "as candump -L writes it"),
+            ("can0 hello", "as candump -L writes it"),
         ] {
             let log = format!("(0.5) can0 201#\n{line}\n");
             let error = super::super::read(log.as_bytes(), None)

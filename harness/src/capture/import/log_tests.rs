@@ -34,7 +34,7 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
         own(
             "headings, comments and tabs",
             "*** Team 9\r\n*** Lap\r\n\r\n# warm\n\r(1718000000.000100)\tcan0\t201#3D3000\n(1718000000.000500) can0 181#30CD0C00\n# cold\n\
-             (1718000000.100100) can0 201#3D3000 T\n(1718000000.100500) can0 181#30CC0C00 R\n",
+             (1718000000.100100) can0 201#3D3000 T\n(1718000000.100500) can0 181#30CC0C00 R\n^C\npi@box7:~$ \n",
             Some(1),
         ),
         ("screen", screen([""; 4]), None),
@@ -298,7 +298,11 @@ fn what_cannot_be_is_refused_with_its_line() {
             "line 2",
             "data bytes expected",
         ),
-        (format!("{screen}and more\n"), "line 2", "is expected"),
+        (
+            format!("{screen}and more\n{screen}"),
+            "line 2",
+            "is expected",
+        ),
         (
             format!("{busmaster}23:59:59:9500 Tx 1 MODE s 3 3D 30 00\n"),
             "line 7",
@@ -343,6 +347,19 @@ fn what_cannot_be_is_refused_with_its_line() {
         let error = read(&text, &[]).expect_err(&text);
         assert!(error.starts_with(place) && error.contains(words), "{error}");
     }
+}
+
+#[test]
+fn what_stands_behind_the_last_frame_is_counted() {
+    let text =
+        "```\n> can0  201   [3]  3D 30 00\n> can0  181   [4]  30 CD 0C 00\n```\nroot@box7:~# \n";
+    let own = read(text, &[]).expect("a log");
+    assert_eq!(shown(&own), FRAMES[..2]);
+    assert!(
+        own.notes
+            .iter()
+            .any(|own| own.starts_with("2 lines behind the last frame"))
+    );
 }
 
 /// Frames that candump has dropped: what differs accuses no drive.

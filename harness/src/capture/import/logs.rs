@@ -63,25 +63,44 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         lost: None,
     };
     let mut log = Log::default();
+    // What a terminal prints behind the last frame, such as the prompt of a shell: the first such line, and how many there are.
+    let mut behind: Option<(CaptureError, usize)> = None;
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() {
             continue;
         }
-        let read = (form.line)(&mut state, line).map_err(|what| {
-            let shown: String = line.chars().take(60).collect();
-            CaptureError::Link {
-                place: format!("line {}", number + 1),
-                what: format!("{shown:?}: {what}"),
+        match (form.line)(&mut state, line) {
+            Ok(None) => {}
+            Ok(Some(own)) => {
+                if let Some((error, _)) = behind {
+                    return Err(error);
+                }
+                state.begun = true;
+                log.frames.push(Logged {
+                    place: Place::of(number + 1),
+                    ..own
+                });
             }
-        })?;
-        if let Some(own) = read {
-            state.begun = true;
-            log.frames.push(Logged {
-                place: Place::of(number + 1),
-                ..own
-            });
+            Err(what) => {
+                let shown: String = line.chars().take(60).collect();
+                let error = CaptureError::Link {
+                    place: format!("line {}", number + 1),
+                    what: format!("{shown:?}: {what}"),
+                };
+                match log.frames.last() {
+                    Some(last) if !begins_a_frame(line, &last.channel) => {
+                        behind.get_or_insert((error, 0)).1 += 1;
+                    }
+                    _ => return Err(error),
+                }
+            }
         }
+    }
+    if let Some((_, count)) = behind {
+        let lines = counted(count, "line");
+        log.notes
+            .push(format!("{lines} behind the last frame not read"));
     }
     if state.headings > 0 {
         let headings = counted(state.headings, "line");
@@ -106,6 +125,13 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         unwrap_times(&mut log.frames, period);
     }
     Ok(log)
+}
+
+/// Whether a line begins as one of a frame does: with a time, a number, or the channel of the frame before.
+fn begins_a_frame(line: &str, channel: &str) -> bool {
+    let line = plain(line);
+    let first = line.split_whitespace().next().unwrap_or_default();
+    first == channel || first.starts_with(|own: char| own == '(' || own.is_ascii_digit())
 }
 
 /// Whether the times on a screen count from the first frame (`-tz`) or each from the one before (`-td`): both begin at 0 and look alike.
@@ -203,9 +229,10 @@ pub(super) fn logged(channel: &str, at: Option<Time>, what: What) -> Logged {
     }
 }
 
-/// A line without the colours of a terminal.
+/// A line without the colours of a terminal and without the mark of a quotation.
 fn plain(line: &str) -> String {
-    let mut parts = line.split('\x1b');
+    // A text that is quoted has this in front of each line.
+    let mut parts = line.trim_start_matches("> ").split('\x1b');
     let mut plain = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         plain.push_str(part.split_once('m').map_or(part, |own| own.1));
