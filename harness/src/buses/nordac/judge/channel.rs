@@ -3,23 +3,22 @@
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::{Parameter, Pkw};
 
-/// The tasks of an exchange since its start.
-#[derive(Clone, Debug, Default)]
+/// The tasks of an exchange, as far as they were heard. A slave shows the answer to a task of the time before until it has answered another
+/// one (3.4).
+#[derive(Clone, Debug)]
 pub(super) struct Tasks {
     sent: Vec<Pkw>,
-    before: Before,
+    /// The last answer that no task which was heard explains.
+    before: Option<Pkw>,
+    /// How many more of these may come.
+    earlier: u8,
 }
 
-/// The answer to a task of the time before, which a slave shows until it has answered another one (3.4).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Before {
-    /// No answer was compared yet.
-    #[default]
-    Unknown,
-    /// It may be this one.
-    Shown(Pkw),
-    /// It is over.
-    Over,
+impl Default for Tasks {
+    /// Those of an exchange that was under way before: one answer is shown, and another may be due.
+    fn default() -> Self {
+        Self::after(2)
+    }
 }
 
 /// Tasks that are kept at most; beyond them nothing is compared.
@@ -35,6 +34,19 @@ const OTHERS: [u16; 6] = [CONTROL_WORD, 970, 971, 1602, 1603, 1604];
 const CONTROL_WORD: u16 = 967;
 
 impl Tasks {
+    const fn after(earlier: u8) -> Self {
+        Self {
+            sent: Vec::new(),
+            before: None,
+            earlier,
+        }
+    }
+
+    /// Those of an exchange that begins: nothing is due.
+    pub(super) const fn begun() -> Self {
+        Self::after(1)
+    }
+
     /// A task goes out.
     pub(super) fn push(&mut self, task: Pkw) {
         if self.sent.last() != Some(&task) && self.sent.len() <= MOST {
@@ -44,18 +56,19 @@ impl Tasks {
 
     /// What is wrong with an answer, and the section; `None` if a right inverter can send it.
     pub(super) fn wrong(&mut self, answer: Pkw) -> Option<(&'static str, String)> {
-        let answers = |own: &Pkw| own.number() == answer.number() && own.ak() != 0;
-        let earlier = answer.ak() != 0 && !self.sent.iter().any(answers);
+        let found = self.unlike_all(answer);
         let same = |own: Pkw| (own.pke, own.ind) == (answer.pke, answer.ind);
-        self.before = match self.before {
-            Before::Unknown if earlier => Before::Shown(answer),
-            Before::Shown(own) if earlier && same(own) => Before::Shown(answer),
-            _ => Before::Over,
-        };
-        match self.before {
-            Before::Over => self.unlike_all(answer),
-            _ => None,
+        if found.is_none() {
+            (self.before, self.earlier) = (None, 0);
+        } else if !matches!(answer.ak(), 1 | 2 | 4..=7) {
+            return found;
+        } else if self.before.is_some_and(same) {
+            return None;
+        } else if let Some(left) = self.earlier.checked_sub(1) {
+            (self.before, self.earlier) = (Some(answer), left);
+            return None;
         }
+        found
     }
 
     fn unlike_all(&self, answer: Pkw) -> Option<(&'static str, String)> {
@@ -176,14 +189,14 @@ mod tests {
     #[test]
     fn an_answer_to_an_earlier_task() {
         let (earlier, own) = (Pkw::of(1, 1801, 0, 7), Pkw::of(1, 1800, 0, 9));
-        let mut tasks = Tasks::default();
+        let mut tasks = Tasks::begun();
         tasks.push(Pkw::of(1, 1800, 0, 0));
         for answer in [earlier, earlier, own, own] {
             assert_eq!(tasks.wrong(answer), None, "{answer}");
         }
         let again = tasks.wrong(earlier).expect("a difference");
         assert_eq!(again.0, "3.4.1");
-        let mut tasks = Tasks::default();
+        let mut tasks = Tasks::begun();
         assert_eq!(tasks.wrong(earlier), None);
         let other = tasks.wrong(Pkw::of(1, 1202, 0, 7)).expect("a difference");
         assert!(other.1.contains("answers no task"), "{}", other.1);

@@ -35,8 +35,8 @@ pub(super) enum Record {
     Unknown,
     /// The last request was not counted.
     Nothing,
-    /// Its master and frame count bit, and the reply to it.
-    Counted(u8, bool, Vec<u8>),
+    /// Its master and frame count bit, and the reply to it; `None` where the module may have restarted since.
+    Counted(u8, bool, Option<Vec<u8>>),
 }
 
 /// What the telegrams show of one slave.
@@ -130,6 +130,12 @@ impl Follower {
         }
         let found = self.service(request, reply);
         self.fresh = true;
+        if may_restart(request) {
+            self.may_be_set_up();
+            if let Record::Counted(_, _, reply) = &mut self.record {
+                *reply = None;
+            }
+        }
         found
     }
 
@@ -173,16 +179,20 @@ impl Follower {
         let control = request.fc();
         let (master, bit) = (request.sa(), control.fcb());
         let now = match control.fcv() || bit {
-            true => Record::Counted(master, bit, octets.to_vec()),
+            true => Record::Counted(master, bit, Some(octets.to_vec())),
             false => Record::Nothing,
+        };
+        let unknown = |own: &mut Self| {
+            (own.way, own.fresh, own.may_repeat) = (Way::Unknown, false, true);
+            Some(None)
         };
         match std::mem::replace(&mut self.record, now) {
             _ if !control.fcv() => None,
-            Record::Unknown => {
-                (self.way, self.fresh, self.may_repeat) = (Way::Unknown, false, true);
-                Some(None)
-            }
+            Record::Unknown => unknown(self),
             Record::Counted(before, count, former) if (before, count) == (master, bit) => {
+                let Some(former) = former else {
+                    return unknown(self);
+                };
                 let same = former == octets;
                 let why = "the reply to a repeated request is another one";
                 Some((!same).then(|| (Value, "EN 1", why.to_owned())))
@@ -278,7 +288,7 @@ impl Follower {
                 right: true,
                 watchdog,
             } if confirmed && master == request.sa() => {
-                self.tasks = Tasks::default();
+                self.tasks = Tasks::begun();
                 Way::Configured {
                     master,
                     ppo,
@@ -337,17 +347,8 @@ impl Follower {
             ));
         }
         self.exchanging = true;
-        let by_length = match data.len() {
-            4 => Some(PpoType::Three),
-            20 => Some(PpoType::Two),
-            _ => None,
-        };
-        let known = way.and_then(|(_, ppo)| ppo);
-        let image = known
-            .or(by_length)
-            .and_then(|ppo| Some((ppo, Image::decode(ppo, data)?)));
-        let (ppo, image) = image?;
-        self.inputs(&image, known.is_some() && ppo.has_pkw())
+        let ppo = way.and_then(|(_, ppo)| ppo).or_else(|| shown_by(data))?;
+        self.inputs(&Image::decode(ppo, data)?, ppo.has_pkw())
     }
 
     fn inputs(&mut self, image: &Image, tasks: bool) -> Found {
@@ -408,6 +409,33 @@ impl Follower {
             }
             _ => None,
         }
+    }
+}
+
+/// Whether a request carries a task behind which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
+fn may_restart(request: &Pdu) -> bool {
+    let exchanges = Service::of(request.dsap()) == Some(Service::DataExchange);
+    let task = outputs(request.data()).map(|own| own.pkw);
+    exchanges
+        && task.is_some_and(|own| {
+            own.task().is_change() && [970, 1602, 1619, 1622, 1624].contains(&own.number())
+        })
+}
+
+/// The outputs of a Data_Exchange as those of a PPO type that has a parameter channel.
+pub(super) fn outputs(data: &[u8]) -> Option<Image> {
+    let mut all = [PpoType::One, PpoType::Two].into_iter();
+    Image::decode(all.find(|own| own.octets() == data.len())?, data)
+}
+
+/// The PPO type of inputs, where its Chk_Cfg was not heard: a status word is never 0 (3.3), so PZD5 and PZD6 tell PPO 4 from PPO 1.
+fn shown_by(inputs: &[u8]) -> Option<PpoType> {
+    match (inputs.len(), inputs) {
+        (4, _) => Some(PpoType::Three),
+        (12, [.., 0, 0, 0, 0]) => Some(PpoType::Four),
+        (12, _) => Some(PpoType::One),
+        (20, _) => Some(PpoType::Two),
+        _ => None,
     }
 }
 

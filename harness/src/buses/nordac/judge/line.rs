@@ -1,17 +1,19 @@
 //! Follows the telegrams of a line, and judges those of its slaves.
 
+use super::channel::Tasks;
 use super::doubt::Sender;
-use super::follower::{Follower, Record, Way};
+use super::follower::{Follower, Record, Way, outputs};
 use super::standing::{Standing, standings};
 use super::symptom::ReplySubject;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
 use crate::buses::nordac::report::{Said, TelegramRun, runs};
 use crate::counted::counted;
 use harness_proto::decode::Decoded;
-use harness_proto::nordac::Image;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
-use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Reason};
+use harness_proto::profibus::fdl::{
+    BROADCAST, ED, Form as Shape, Function, Pdu, Reason, SD1, SD2, SD3, check_sum,
+};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::{BTreeMap, BTreeSet};
@@ -100,6 +102,29 @@ fn is_complete(said: &Said) -> bool {
         Decoded::Bad { reason, offset } => (reason, said.octets.len() - 1 - offset),
     };
     [(Reason::CheckSum, 1), (Reason::End, 0)].contains(&left)
+}
+
+/// Whether octets are as their sender sent them, though they are no telegram: all checks of a tap hold, and an address or a control octet is
+/// one that no slave may answer.
+fn is_undamaged(said: &Said) -> bool {
+    let reasons = [
+        Reason::Source,
+        Reason::Control,
+        Reason::Sap,
+        Reason::SapMissing,
+    ];
+    let Decoded::Bad { reason, .. } = Telegram::decode(&said.octets) else {
+        return false;
+    };
+    let body = match said.octets.as_slice() {
+        [SD1, body @ .., fcs, ED] if body.len() == 3 => Some((body, fcs)),
+        [SD2, le, ler, SD2, body @ .., fcs, ED] if le == ler && body.len() == usize::from(*le) => {
+            Some((body, fcs))
+        }
+        [SD3, body @ .., fcs, ED] if body.len() == 11 => Some((body, fcs)),
+        _ => None,
+    };
+    reasons.contains(&reason) && body.is_some_and(|(body, fcs)| check_sum(body) == *fcs)
 }
 
 /// Whether octets are the beginning of a telegram.
@@ -224,7 +249,9 @@ impl Judge {
                 (value.pdu().copied(), false)
             }
             // A tap may lose an octet, or damage one that the slave has read.
-            _ if self.recorded.is_some() => (None, true),
+            _ if self.recorded.is_some() && !(sound && said.as_ref().is_some_and(is_undamaged)) => {
+                (None, true)
+            }
             Some(Decoded::Value { used, .. }) => (None, !whole(used)),
             _ => (None, false),
         };
@@ -237,6 +264,7 @@ impl Judge {
                 own.fresh = false;
                 if torn {
                     own.record = Record::Unknown;
+                    own.tasks = Tasks::default();
                     own.may_be_set_up();
                 }
             });
@@ -257,12 +285,8 @@ impl Judge {
         }
         let exchanges = pdu.dsap().is_none() && service == Some(Service::DataExchange);
         self.follower(pdu.da());
-        for follower in self.of(pdu.da()).filter(|_| exchanges) {
-            if let Way::Configured { ppo: Some(ppo), .. } = follower.way
-                && let Some(image) = Image::decode(ppo, pdu.data())
-            {
-                follower.tasks.push(image.pkw);
-            }
+        if let Some(image) = outputs(pdu.data()).filter(|_| exchanges) {
+            self.of(pdu.da()).for_each(|own| own.tasks.push(image.pkw));
         }
     }
 

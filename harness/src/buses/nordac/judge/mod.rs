@@ -4,6 +4,8 @@
 //! value, and what parameters, a plant or the supply decide is not compared. It compares who replies and in which form, repetitions, the
 //! diagnosis, status words and answers of the parameter channel. Times are not compared: an adapter decides over them.
 
+#[cfg(test)]
+mod begun_tests;
 mod channel;
 mod diagnosis;
 mod doubt;
