@@ -1,7 +1,10 @@
 //! The segment behind streams of clients, without I/O: how telegrams are known, line errors, several masters.
 
+use super::language::Nordac;
 use super::serve::{SegmentServer, bench};
 use crate::medium::ErrorMarks;
+use crate::scenario::plan::Plan;
+use crate::scenario::source::Source;
 use crate::serve::ServedBus;
 use crate::web::LiveView;
 use harness_proto::time::{Instant, Span};
@@ -17,7 +20,10 @@ struct Clients {
 
 impl Clients {
     fn new(clients: usize, marks: ErrorMarks) -> Self {
-        let plan = bench(Some(&[8]), None).expect("a bench");
+        Self::of(bench(Some(&[8]), None).expect("a bench"), clients, marks)
+    }
+
+    fn of(plan: Plan<Nordac>, clients: usize, marks: ErrorMarks) -> Self {
         let mut server = SegmentServer::new(plan, clients, marks);
         (0..clients).for_each(|seat| server.come(seat));
         let now = Instant::START;
@@ -209,57 +215,101 @@ fn slaves_of_header_and_command_line() {
     assert_eq!(server.control("  # nothing"), None);
 }
 
-/// EN 2: the diagnosis shows that a slave refuses Set_Prm or Chk_Cfg. Why it does is said once, and `state` repeats it until it is over.
+/// EN 2: the diagnosis shows that a slave refuses Set_Prm or Chk_Cfg, not why. Why is said once, and `state` repeats it until it is over.
 #[test]
 fn why_a_slave_refuses_its_master_is_said() {
-    let set_prm = |status: u8, ident: u8, user: &[u8]| {
-        let data = [&[0x3D, 0x3E, status, 0, 0, 0x0B, 0x75, ident, 0], user].concat();
-        request(0x6C, &data)
-    };
-    let chk_cfg = |cfg: &[u8]| request(0x5C, &[&[0x3E, 0x3E], cfg].concat());
-    let mut clients = Clients::new(1, ErrorMarks::None);
-    for (telegram, why) in [
+    let set_prm = |master: u8, data: &[u8]| request(master, &[&[0x3D, 0x3E], data].concat());
+    let chk_cfg = |master: u8, cfg: &[u8]| request(master, &[&[0x3E, 0x3E], cfg].concat());
+    let right = set_prm(2, &[0x80, 0, 0, 0x0B, 0x75, 0x31, 0]);
+    let watchdog = |one, two| set_prm(2, &[0x88, one, two, 0x0B, 0x75, 0x31, 0]);
+    let configurations: [(&[u8], &str); 4] = [
         (
-            request(0x6C, &[0x3D, 0x3E, 0x80, 0, 0, 0x0B, 0x75, 0x31]),
-            "it has 6 octets",
+            &[0xF3, 0xF1],
+            "PPO1, to which the slave is set (1622), is F3 F1",
         ),
         (
-            set_prm(0x80, 0x32, &[]),
-            "ident number 7532, and a NORDAC vector has 7531",
+            &[0xF3, 0xF5],
+            "PPO2, to which the slave is set (1622), is F3 F5",
         ),
-        (
-            set_prm(0x88, 0x31, &[]),
-            "the watchdog on with the factors 0 and 0",
-        ),
-        (set_prm(0x80, 0x31, &[1, 2]), "2 octets of user parameters"),
-        (set_prm(0x80, 0x31, &[]), ""),
-        (
-            chk_cfg(&[0xF3, 0xF5]),
-            "its configuration is F3 F5, and that of PPO1",
-        ),
-        (set_prm(0x80, 0x31, &[]), ""),
-    ] {
-        for time in [0, 1] {
-            clients.send(0, &telegram);
-            assert_eq!(clients.heard(0), [0xE5], "{why}");
-            let news = clients.server.remarks().concat();
-            match why.is_empty() || time == 1 {
-                true => assert_eq!(news, ""),
-                false => assert!(
-                    news.starts_with("slave 8: ") && news.contains(why),
-                    "{news}"
-                ),
+        (&[0xF1], "PPO3, to which the slave is set (1622), is F1"),
+        (&[0xF5], "PPO4, to which the slave is set (1622), is F5"),
+    ];
+    for (place, (cfg, own)) in configurations.iter().enumerate() {
+        let header = format!("slave 8 ppo {}\n", place + 1);
+        let header = Source::from_bytes("setup".into(), header.into_bytes()).expect("a text");
+        let plan = bench(None, Some(&header)).expect("a bench");
+        let mut clients = Clients::of(plan, 1, ErrorMarks::None);
+        let mut rows = vec![
+            (chk_cfg(2, cfg), "the slave waits for Set_Prm".to_owned()),
+            (
+                set_prm(2, &[0x80, 0, 0, 0x0B, 0x75, 0x31]),
+                "it has 6 octets".to_owned(),
+            ),
+            (
+                set_prm(2, &[0x80, 0, 0, 0x0B, 0x75, 0x32, 0]),
+                "ident number 7532, and a NORDAC vector has 7531".to_owned(),
+            ),
+            (
+                watchdog(0, 5),
+                "the watchdog on with the factors 0 and 5".to_owned(),
+            ),
+            (
+                watchdog(5, 0),
+                "the watchdog on with the factors 5 and 0".to_owned(),
+            ),
+            (
+                set_prm(2, &[0x80, 0, 0, 0x0B, 0x75, 0x31, 0, 1, 2]),
+                "2 octets of user parameters".to_owned(),
+            ),
+        ];
+        let others = configurations.iter().map(|(other, _)| *other);
+        for other in others
+            .chain([&[][..], &[0xF3, 0xF1, 0xF1]])
+            .filter(|other| other != cfg)
+        {
+            rows.push((right.clone(), String::new()));
+            let shown: Vec<_> = other.iter().map(|own| format!("{own:02X}")).collect();
+            let shown = if other.is_empty() {
+                "empty".to_owned()
+            } else {
+                shown.join(" ")
+            };
+            let why = format!("its configuration is {shown}, and that of {own}");
+            rows.push((chk_cfg(2, other), why));
+        }
+        rows.push((right.clone(), String::new()));
+        rows.push((chk_cfg(2, cfg), String::new()));
+        let locked = "of master 3 is refused: master 2 has locked the slave";
+        rows.push((
+            set_prm(3, &[0x80, 0, 0, 0x0B, 0x75, 0x31, 0]),
+            format!("Set_Prm {locked}"),
+        ));
+        rows.push((chk_cfg(3, cfg), format!("Chk_Cfg {locked}")));
+        rows.push((right.clone(), String::new()));
+        for (telegram, why) in rows {
+            for time in [0, 1] {
+                clients.send(0, &telegram);
+                assert!(!clients.heard(0).is_empty(), "{why}");
+                let news = clients.server.remarks().concat();
+                match why.is_empty() || time == 1 {
+                    true => assert_eq!(news, ""),
+                    false => assert!(
+                        news.starts_with("slave 8: ") && news.contains(&why),
+                        "{news}, not {why}"
+                    ),
+                }
+                assert_eq!(news.lines().count(), usize::from(!news.is_empty()));
+                let state = format!("{:?}", clients.server.control("state 8"));
+                assert_eq!(state.contains("refused="), !why.is_empty(), "{state}");
+                assert!(state.contains(&why), "{state}");
             }
-            let state = format!("{:?}", clients.server.control("state 8"));
-            assert_eq!(state.contains("refused="), !why.is_empty(), "{state}");
-            assert!(state.contains(why), "{state}");
         }
     }
 }
 
-/// A telegram of master 2 to slave 8 with SAPs.
-fn request(control: u8, data: &[u8]) -> Vec<u8> {
-    let body = [&[0x88, 0x82, control], data].concat();
+/// A telegram of a master to slave 8 with SAPs.
+fn request(master: u8, data: &[u8]) -> Vec<u8> {
+    let body = [&[0x88, 0x80 | master, 0x4C], data].concat();
     let length = u8::try_from(body.len()).expect("short");
     let sum = harness_proto::profibus::fdl::check_sum(&body);
     [&[0x68, length, length, 0x68], &body[..], &[sum, 0x16]].concat()

@@ -19,6 +19,17 @@ pub enum Refusal {
     Watchdog([u8; 2]),
     /// Set_Prm has this number of octets of user parameters (GSD: User_Prm_Data_Len 0).
     UserData(usize),
+    /// Set_Prm or Chk_Cfg comes from a master while another one has locked the slave.
+    Locked {
+        /// The master that asks.
+        asks: u8,
+        /// The master that has locked it.
+        owner: u8,
+        /// Whether it was Chk_Cfg.
+        checks: bool,
+    },
+    /// Chk_Cfg comes before Set_Prm was accepted.
+    Early,
     /// Chk_Cfg has a configuration of this many octets, of which these are the first, and the slave is set to this PPO type.
     Configuration([u8; SHOWN], usize, PpoType),
 }
@@ -49,6 +60,9 @@ impl Refusal {
 }
 
 fn hex(octets: &[u8]) -> String {
+    if octets.is_empty() {
+        return "empty".to_owned();
+    }
     let all: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
     all.join(" ")
 }
@@ -76,6 +90,16 @@ impl fmt::Display for Refusal {
                 "Set_Prm is refused: it has {} of user parameters, and a NORDAC vector takes none",
                 counted(*octets, "octet")
             ),
+            Self::Locked {
+                asks,
+                owner,
+                checks,
+            } => write!(
+                f,
+                "{} of master {asks} is refused: master {owner} has locked the slave",
+                if *checks { "Chk_Cfg" } else { "Set_Prm" }
+            ),
+            Self::Early => f.write_str("Chk_Cfg is refused: the slave waits for Set_Prm"),
             Self::Configuration(octets, length, ppo) => write!(
                 f,
                 "Chk_Cfg is refused: its configuration is {}, and that of {ppo}, to which the slave is set (1622), is {}",

@@ -14,6 +14,7 @@ const ACTUAL_VALUE_STANDS: u8 = 0x04;
 impl Slave {
     pub(super) fn set_parameters(&mut self, at: Instant, sa: u8, data: &[u8]) -> Outcome {
         if self.state != DpState::WaitPrm && !self.is_own_master(sa) {
+            self.refuse_master(sa, false);
             return match self.properties.foreign_prm {
                 ForeignPrm::Sc => Outcome::Confirmed,
                 ForeignPrm::Rs => Outcome::Refused,
@@ -44,6 +45,15 @@ impl Slave {
         self.refusal = Some(why);
     }
 
+    fn refuse_master(&mut self, asks: u8, checks: bool) {
+        let refused = |owner| Refusal::Locked {
+            asks,
+            owner,
+            checks,
+        };
+        self.refusal = self.agreed.master.map(refused);
+    }
+
     fn take_tsdr(&mut self, bits: u8) {
         if bits != 0 {
             self.min_tsdr = bits.max(default_tsdr());
@@ -69,12 +79,16 @@ impl Slave {
 
     pub(super) fn check_configuration(&mut self, sa: u8, data: &[u8]) -> Outcome {
         if self.state == DpState::WaitPrm {
+            if !self.prm_fault && !self.cfg_fault {
+                self.refusal = Some(Refusal::Early);
+            }
             return match self.properties.chk_cfg_early {
                 ChkCfgEarly::Rs => Outcome::Refused,
                 ChkCfgEarly::Sc => Outcome::Confirmed,
             };
         }
         if !self.is_own_master(sa) {
+            self.refuse_master(sa, true);
             return Outcome::Refused;
         }
         self.refusal = None;
