@@ -11,10 +11,11 @@ use super::tally::{EarlierVerdicts, Tally};
 use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, Keep, PAGE, SplitRun, size};
 use crate::library::Entry;
-use crate::link::{Line, Octets, Trouble};
+use crate::link::{Capability, Line, Octets, Trouble};
 use crate::qualify::{Qualification, QualificationFacts};
 use crate::report::html::Head;
 use crate::report::plot::plot;
+use crate::rig::wrong_parity;
 use crate::rig::{Keeper, PlayedScenario, Rig, Run, Session, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::signals::interrupt_flag;
@@ -205,6 +206,15 @@ fn all(
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, EarlyEnd> {
+    let needs = |entry: &Entry| {
+        let plan = entry.plan.as_ref();
+        plan.is_some_and(|plan| plan.needs.contains(&Capability::LineErrors))
+    };
+    if session.opening().is_some() && (job.qualify || entries.iter().any(needs)) {
+        for why in wrong_parity::obstacles(session)? {
+            output.complain(&why);
+        }
+    }
     let mut run = match Run::new(session) {
         Ok(run) => run,
         Err(problems) => {

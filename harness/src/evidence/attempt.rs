@@ -9,6 +9,7 @@ use crate::library::Entry;
 use crate::link::{
     Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
 };
+use crate::rig::file::{Interposer, Transport};
 use crate::rig::judge::known;
 use crate::rig::judge::{AttemptFacts, judge};
 use crate::rig::run::{Way, opening, twin};
@@ -291,6 +292,18 @@ pub(super) fn reached(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
     links(header, interposers.map(|own| (own.ring, own.link)))
 }
 
+/// Those of them on which no byte can get a wrong parity bit: with an interposer that has one serial port for both directions.
+pub(super) fn keeping_parity(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
+    let one = |own: &&Interposer| {
+        own.upstream == own.downstream && own.upstream.transport == Transport::Serial
+    };
+    let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
+    let interposers = rig.file.interposer.iter().filter(one);
+    interposers
+        .map(|own| place(&drives, own.ring, own.link))
+        .collect()
+}
+
 /// The links on which bytes were seen: by ring and place.
 pub(super) fn heard(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
     let interposers = rig.file.interposer.iter().map(|own| (own.ring, own.link));
@@ -298,17 +311,19 @@ pub(super) fn heard(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
     links(header, interposers.chain(taps))
 }
 
+/// The ring and the place of a link between drives, as a rig's file names it.
+fn place(drives: &dyn Fn(usize) -> u8, ring: u8, link: LinkName) -> (usize, usize) {
+    let ring = usize::from(ring).saturating_sub(1);
+    let from = link.from;
+    let place = from.map_or(0, |from| drives(ring).saturating_sub(from));
+    (ring, usize::from(place))
+}
+
 /// The master's own links and those between drives that are given by the number of their ring; all links of simulated rings.
 fn links(header: &Header, inner: impl Iterator<Item = (u8, LinkName)>) -> Vec<(usize, usize)> {
     let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
     let inner: Vec<_> = inner
-        .map(|(ring, link)| {
-            let ring = usize::from(ring).saturating_sub(1);
-            let place = link
-                .from
-                .map_or(0, |from| drives(ring).saturating_sub(from));
-            (ring, usize::from(place))
-        })
+        .map(|(ring, link)| place(&drives, ring, link))
         .collect();
     let all = (0..header.drives.len())
         .flat_map(|ring| (0..=usize::from(drives(ring))).map(move |place| (ring, place)));

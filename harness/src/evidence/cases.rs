@@ -246,6 +246,7 @@ impl Opened {
                     header.capabilities.clone(),
                 )
                 .reaching(super::attempt::reached(&self.rig, header))
+                .keeping_parity(super::attempt::keeping_parity(&self.rig, header))
                 .listening(super::attempt::heard(&self.rig, header));
                 // What the guard knew of the drives is not in the record.
                 let limited = !header.limits.allow_everything();

@@ -80,6 +80,11 @@ impl<L: Line> Guarded<L> {
         }
     }
 
+    /// It turned out that the link behind the guard cannot do this.
+    pub(crate) fn lose(&mut self, capability: Capability) {
+        self.capabilities.retain(|own| *own != capability);
+    }
+
     /// A drive has shown that it monitors time-outs.
     pub(crate) fn expect_time_outs(&mut self) {
         for gate in &mut self.gates {
@@ -482,6 +487,10 @@ impl<L: Link> Link for Guarded<L> {
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
         self.inner.reaches(ring, link)
+    }
+
+    fn damages_parity(&self, ring: usize, link: usize) -> bool {
+        self.inner.damages_parity(ring, link)
     }
 
     fn listens(&self, ring: usize, link: usize) -> bool {

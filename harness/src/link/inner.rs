@@ -101,19 +101,24 @@ impl InnerLink {
         !matches!(self.ports, InnerPorts::Tap(_))
     }
 
+    /// Whether it has one UART, whose one parity setting is for both directions: switched for a byte that leaves, it damages those that come.
+    pub(crate) fn shares_parity(&self) -> bool {
+        matches!(&self.ports, InnerPorts::Interposer(wire) if wire.is_uart())
+    }
+
     /// What passing bytes on has cost.
     #[must_use]
     pub fn delay(&self) -> Delay {
         self.delay
     }
 
-    pub(crate) fn shows_errors(&self) -> bool {
-        match &self.ports {
-            InnerPorts::Tap(wire) | InnerPorts::Interposer(wire) => wire.abilities().shows_errors,
-            InnerPorts::TwoPortInterposer(up, down) => {
-                up.abilities().shows_errors && down.abilities().sends_wrong_parity
-            }
-        }
+    pub(crate) fn has_line_errors(&self) -> bool {
+        let (up, down) = match &self.ports {
+            InnerPorts::Tap(wire) => return wire.abilities().shows_errors,
+            InnerPorts::Interposer(wire) => (wire, wire),
+            InnerPorts::TwoPortInterposer(up, down) => (up, down),
+        };
+        up.abilities().shows_errors && down.abilities().sends_wrong_parity
     }
 
     pub(crate) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {

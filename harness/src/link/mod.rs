@@ -23,6 +23,7 @@ pub use inner::{Delay, InnerLink, InnerPorts};
 pub use octets::Octets;
 pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;
+pub(crate) use tamper::is_wrong_parity;
 pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::AnyStimulus;
@@ -330,6 +331,24 @@ pub trait PortLink: Link {
     /// Every time that the parity of a port was switched, to send a byte with a wrong parity bit.
     fn take_switches(&mut self) -> Vec<Switch>;
 
+    /// Whether the driver of a serial port switches the parity, as far as it says so; `None` at other ports.
+    fn switches_parity(&self, port: usize) -> Option<bool> {
+        let _none = port;
+        None
+    }
+
+    /// Whether a port is a serial one of which it is not known that it makes the line's rate.
+    fn has_unproven_rate(&self, port: usize) -> bool {
+        let _none = port;
+        false
+    }
+
+    /// Where a port leads, as the rig's file says it.
+    fn port_name(&self, port: usize) -> &str {
+        let _none = port;
+        "the port"
+    }
+
     /// The inner links at which the bench has a port.
     fn inner_links(&self) -> &[InnerLink];
 }
@@ -356,6 +375,12 @@ pub trait Link: Line {
 
     /// Whether a fault can be put on a link of a ring: 0 is the master's outgoing one.
     fn reaches(&self, ring: usize, link: usize) -> bool {
+        let _any = (ring, link);
+        true
+    }
+
+    /// Whether a byte on a link that is [reached](Self::reaches) can get a wrong parity bit.
+    fn damages_parity(&self, ring: usize, link: usize) -> bool {
         let _any = (ring, link);
         true
     }

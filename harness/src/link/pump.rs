@@ -119,10 +119,13 @@ impl<A: Accounting> Pump<A> {
         }
     }
 
-    /// Whether every port shows line errors at their byte.
-    pub(crate) fn shows_errors(&self) -> bool {
-        let shows = |port: &PortEnd<A>| port.wire.abilities().shows_errors;
-        self.ports.iter().all(shows) && self.inner.iter().all(InnerLink::shows_errors)
+    /// Whether every port shows line errors at their byte, and sends them.
+    pub(crate) fn has_line_errors(&self) -> bool {
+        let has = |port: &PortEnd<A>| {
+            let own = port.wire.abilities();
+            own.shows_errors && own.sends_wrong_parity
+        };
+        self.ports.iter().all(has) && self.inner.iter().all(InnerLink::has_line_errors)
     }
 
     /// Injects a fault.

@@ -326,6 +326,10 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.reaches(port, link)
     }
 
+    fn damages_parity(&self, port: usize, link: usize) -> bool {
+        self.link.damages_parity(port, link)
+    }
+
     fn listens(&self, port: usize, link: usize) -> bool {
         self.link.listens(port, link)
     }

@@ -31,6 +31,8 @@ pub struct Replay {
     drives: Vec<u8>,
     capabilities: Vec<Capability>,
     reaches: Vec<(usize, usize)>,
+    /// Links on which no byte gets a wrong parity bit.
+    keeps_parity: Vec<(usize, usize)>,
     /// Links on which bytes are seen.
     listens: Vec<(usize, usize)>,
     /// What was seen on them in this conversation.
@@ -94,6 +96,7 @@ impl Replay {
             .any(|event| matches!(event, LinkEvent::Look(_)));
         Self {
             reaches: reached.collect(),
+            keeps_parity: Vec::new(),
             listens,
             tapped: BTreeMap::new(),
             // Without looks it is not known which step came when.
@@ -117,6 +120,13 @@ impl Replay {
     #[must_use]
     pub fn reaching(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
         self.reaches.extend(links);
+        self
+    }
+
+    /// Lets no byte get a wrong parity bit on these links.
+    #[must_use]
+    pub fn keeping_parity(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        self.keeps_parity.extend(links);
         self
     }
 
@@ -499,6 +509,10 @@ impl Link for Replay {
 
     fn reaches(&self, port: usize, link: usize) -> bool {
         self.reaches.contains(&(port, link))
+    }
+
+    fn damages_parity(&self, port: usize, link: usize) -> bool {
+        !self.keeps_parity.contains(&(port, link))
     }
 
     fn listens(&self, port: usize, link: usize) -> bool {

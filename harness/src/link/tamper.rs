@@ -153,11 +153,12 @@ impl Tamper {
 /// Whether a fault needs bytes with a wrong parity bit or breaks on the wire.
 #[must_use]
 pub fn needs_line_errors(fault: LinkFault) -> bool {
-    match fault {
-        LinkFault::Flip(flips) => flips.noticed() == Some(LineError::Parity),
-        LinkFault::Break(_) => true,
-        _ => false,
-    }
+    is_wrong_parity(fault) || matches!(fault, LinkFault::Break(_))
+}
+
+/// Whether a fault gives a byte a wrong parity bit.
+pub(crate) fn is_wrong_parity(fault: LinkFault) -> bool {
+    matches!(fault, LinkFault::Flip(flips) if flips.noticed() == Some(LineError::Parity))
 }
 
 /// Whether no UART can be made to do it: a wrong start or stop bit, an overrun.

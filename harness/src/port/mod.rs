@@ -21,12 +21,13 @@ mod serial;
 mod tap;
 mod wire;
 
+pub use harness_uart::Counts;
 pub use holder::OtherProgram;
 pub(crate) use holder::is_exclusive;
 pub use last_words::{LastWords, Unsaid};
 pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
 pub use serial::Switch;
-pub use tap::{PortCounts, SilentTap, TapState};
+pub use tap::{SilentTap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
 
 use rustix::thread::set_current_timer_slack;

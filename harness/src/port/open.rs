@@ -93,6 +93,19 @@ pub enum OpenError {
         /// What it does not do.
         what: String,
     },
+    /// The chip makes another rate.
+    #[error(
+        "{port}: the port cannot make {asked} bit/s: its driver takes the rate, and its chip makes {made} bit/s, the nearest part of its base rate; use an \
+         adapter that makes it (the guide's page on wiring has a list)"
+    )]
+    Rate {
+        /// The port.
+        port: String,
+        /// The rate that it was asked for.
+        asked: u32,
+        /// The rate that it makes.
+        made: u32,
+    },
     /// No host, or it refuses.
     #[error("failed to connect to {address}: {error}. {}", unconnected(error))]
     Connect {

@@ -7,6 +7,7 @@ use super::holder::refuse_used;
 use super::open::{OpenError, printed};
 use harness_proto::line::{Format, Parity as LineParity, Received};
 use harness_proto::time::Span;
+use harness_uart::LowLatency;
 use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, PidfdGetfdFlags};
@@ -22,6 +23,12 @@ const MOST_SWITCHES: usize = 10_000;
 
 /// How long a drained port may take to take a byte.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Bits of a byte on the line with its parity bit.
+const BITS: u32 = 11;
+
+/// What the bytes of a driver that says too early that all have left may be late by: a USB adapter gets them each millisecond.
+const HASTY: Duration = Duration::from_millis(2);
 
 /// How much later than it came a byte may be read: adapters collect bytes for up to 16 ms.
 const LATEST: Duration = Duration::from_millis(20);
@@ -44,7 +51,20 @@ pub(super) struct Serial {
     fd: OwnedFd,
     /// Whether the right parity is odd.
     odd: bool,
+    /// Whether the driver switches the parity, as far as it says so.
+    switches_parity: bool,
+    /// How long a byte takes.
+    byte_time: Duration,
+    /// When what was written has left the line, at the earliest.
+    free: Instant,
+    /// The driver has said that all bytes have left before the line can have carried them.
+    hasty: bool,
     switches: Switches,
+    /// The overruns that the driver has counted.
+    overruns: Option<u32>,
+    /// Whether the driver says nothing of the rates that its chip makes, and the rate is none that every chip makes.
+    unproven_rate: bool,
+    low_latency: Option<LowLatency>,
 }
 
 /// The times that the parity was switched.
@@ -109,13 +129,19 @@ pub(super) fn open(
         LineParity::Odd => Parity::Odd,
         LineParity::Even => Parity::Even,
     };
-    let (fd, serial) = raw(path, format.bits_per_second, parity, &wrong)?;
-    set_marks(&fd, format).map_err(|what| OpenError::Setting {
+    let (fd, mut serial) = raw(path, format.bits_per_second, parity, &wrong)?;
+    let refused = |what| OpenError::Setting {
         port: name.clone(),
         what,
-    })?;
+    };
+    set_marks(&fd, format).map_err(refused)?;
+    serial.switches_parity = parity != Parity::None && tries_parity(&fd, serial.odd);
+    // The driver that has tried the other parity has the right one again, or the port is refused.
+    set_marks(&fd, format).map_err(refused)?;
+    rustix::termios::tcflush(&fd, QueueSelector::IFlush)
+        .map_err(|error| OpenError::of(path, &error.into()))?;
     if low_latency {
-        lower_latency(path);
+        serial.low_latency = LowLatency::of(&fd);
     }
     Ok((fd, serial))
 }
@@ -130,9 +156,9 @@ pub(super) fn open_plain(
         port: name.clone(),
         error: io::Error::other(format!("{bits_per_second} 8N1 ({error})")),
     };
-    let opened = raw(path, bits_per_second, Parity::None, &wrong)?;
-    lower_latency(path);
-    Ok(opened)
+    let (fd, mut serial) = raw(path, bits_per_second, Parity::None, &wrong)?;
+    serial.low_latency = LowLatency::of(&fd);
+    Ok((fd, serial))
 }
 
 /// Opens a serial port without flow control; nothing is read or sent.
@@ -153,6 +179,7 @@ fn raw(
         .map_err(|error| wrong(&error))?;
     let other = |error: Errno| OpenError::of(path, &error.into());
     let fd = duplicate(&port).map_err(other)?;
+    let made = harness_uart::real_rate(&fd, bits_per_second);
     // From here on the port is put back when `serial` is dropped.
     let serial = Serial {
         port,
@@ -161,11 +188,37 @@ fn raw(
             .try_clone()
             .map_err(|error| OpenError::of(path, &error))?,
         odd: parity == Parity::Odd,
+        switches_parity: false,
+        byte_time: Duration::from_secs(1) * BITS / bits_per_second.max(1),
+        free: Instant::now(),
+        hasty: false,
         switches: Switches::default(),
+        overruns: harness_uart::counts(&fd).map(|own| own.overruns),
+        unproven_rate: made.is_none() && !USUAL_RATES.contains(&bits_per_second),
+        low_latency: None,
     };
+    refuse_rate(path, bits_per_second, made)?;
     rustix::io::ioctl_fionbio(&fd, true).map_err(other)?;
     rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(other)?;
     Ok((fd, serial))
+}
+
+/// Rates that every serial port makes.
+const USUAL_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
+
+/// Refuses a rate in place of which the chip makes another one, by more than a fiftieth.
+///
+/// # Errors
+/// [`OpenError::Rate`].
+pub(super) fn refuse_rate(path: &Path, asked: u32, made: Option<u32>) -> Result<(), OpenError> {
+    match made.filter(|made| made.abs_diff(asked) > asked / 50) {
+        None => Ok(()),
+        Some(made) => Err(OpenError::Rate {
+            port: path.display().to_string(),
+            asked,
+            made,
+        }),
+    }
 }
 
 /// The settings with which a port is found, read before anything is set.
@@ -215,23 +268,12 @@ fn set_marks(fd: impl AsFd, format: Format) -> Result<(), String> {
     if !now.input_modes.contains(input) {
         return Err("the marking of line errors (INPCK and PARMRK)".to_owned());
     }
-    if now.output_speed() != format.bits_per_second {
+    // Some drivers say which rate the chip makes.
+    let asked = format.bits_per_second;
+    if now.output_speed().abs_diff(asked) > asked / 50 {
         return Err(format!("{} bit/s", format.bits_per_second));
     }
     Ok(())
-}
-
-/// Lowers the latency timer of a USB adapter, which by default collects bytes for up to 16 ms.
-fn lower_latency(path: &Path) {
-    let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    if let Some(name) = path.file_name() {
-        let timer = Path::new("/sys/bus/usb-serial/devices")
-            .join(name)
-            .join("latency_timer");
-        // Not every adapter has the timer, and not every user may set it. Bytes then arrive later, which the rig's check
-        // measures.
-        let _as_it_is = std::fs::write(timer, "1");
-    }
 }
 
 impl Serial {
@@ -239,16 +281,54 @@ impl Serial {
         &mut self.switches
     }
 
+    /// How many bytes the driver has lost since the last call, as far as it counts.
+    pub(super) fn take_overruns(&mut self, fd: &OwnedFd) -> u64 {
+        let now = self.overruns.and_then(|_| harness_uart::counts(fd));
+        let Some((before, now)) = self.overruns.zip(now.map(|own| own.overruns)) else {
+            return 0;
+        };
+        self.overruns = Some(now);
+        u64::from(now.wrapping_sub(before))
+    }
+
+    /// Whether it is not known that the port makes the rate that it was asked for.
+    pub(super) fn has_unproven_rate(&self) -> bool {
+        self.unproven_rate
+    }
+
+    /// Whether a byte with a wrong parity bit can be sent, as far as the driver says so.
+    pub(super) fn switches_parity(&self) -> bool {
+        self.switches_parity
+    }
+
+    /// This number of bytes was written.
+    pub(super) fn wrote(&mut self, bytes: usize) {
+        let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
+        self.free = self.free.max(Instant::now()) + self.byte_time * bytes;
+    }
+
+    /// Waits until all bytes have left the line.
+    pub(super) fn drain(&mut self, fd: &OwnedFd) -> io::Result<()> {
+        rustix::termios::tcdrain(fd)?;
+        settle(self.free, &mut self.hasty);
+        Ok(())
+    }
+
     /// Sends a byte with a wrong parity bit. What came before must have been read.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
-        let idle = send_wrong_parity(&mut fd.as_fd(), byte, self.odd)?;
+        let idle = send_wrong_parity(
+            &mut fd.as_fd(),
+            byte,
+            self.odd,
+            (self.byte_time, &mut self.hasty),
+        )?;
         self.switches.note(idle, Instant::now());
         Ok(())
     }
 
     /// Holds the line at 0.
     pub(super) fn send_break(&mut self, fd: &OwnedFd, span: Span) -> io::Result<()> {
-        rustix::termios::tcdrain(fd)?;
+        self.drain(fd)?;
         self.port.set_break().map_err(io::Error::from)?;
         std::thread::sleep(Duration::from_nanos(span.as_nanos()));
         self.port.clear_break().map_err(io::Error::from)
@@ -271,16 +351,33 @@ trait ParityPort {
 /// mark and space (CMSPAR) would be right for half of them, and fewer drivers know them.
 ///
 /// Says how long the line was held up. Whatever happens, what comes next has the right parity again, or it is an error.
-fn send_wrong_parity(port: &mut impl ParityPort, byte: u8, odd: bool) -> io::Result<Duration> {
+fn send_wrong_parity(
+    port: &mut impl ParityPort,
+    byte: u8,
+    odd: bool,
+    (byte_time, hasty): (Duration, &mut bool),
+) -> io::Result<Duration> {
     port.drain()?;
     let start = Instant::now();
-    let sent = port
-        .set_odd(!odd)
-        .and_then(|()| port.put(byte))
-        .and_then(|()| port.drain());
+    let sent = port.set_odd(!odd).and_then(|()| {
+        let begun = Instant::now();
+        port.put(byte)?;
+        port.drain()?;
+        settle(begun + byte_time, hasty);
+        Ok(())
+    });
     let restored = port.set_odd(odd);
     sent.and(restored)?;
     Ok(start.elapsed())
+}
+
+/// Waits behind a drain until bytes have left that are due at `free`. Some drivers of USB adapters say so too early.
+fn settle(free: Instant, hasty: &mut bool) {
+    let now = Instant::now();
+    *hasty |= now < free;
+    if *hasty {
+        std::thread::sleep((free + HASTY).saturating_duration_since(now));
+    }
 }
 
 impl ParityPort for BorrowedFd<'_> {
@@ -318,6 +415,13 @@ fn switch_parity(fd: impl AsFd, odd: bool) -> io::Result<()> {
     Err(io::Error::other(
         "the driver of this port does not switch the parity",
     ))
+}
+
+/// Whether a driver takes the other parity and the right one again; nothing is sent.
+fn tries_parity(fd: impl AsFd, odd: bool) -> bool {
+    [!odd, odd]
+        .into_iter()
+        .all(|odd| switch_parity(&fd, odd).is_ok())
 }
 
 #[cfg(test)]

@@ -7,8 +7,10 @@
 
 use super::holder::refuse_used;
 use super::open::OpenError;
+use super::serial::refuse_rate;
 use harness_proto::line::{Format, LineError, Parity, Received};
 use harness_proto::marks::Unmark;
+use harness_uart::{Counts, LowLatency};
 use rustix::fs::{Mode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{
@@ -27,6 +29,8 @@ pub struct SilentTap {
     fd: OwnedFd,
     path: PathBuf,
     unmark: Option<Unmark>,
+    kinds: ErrorKinds,
+    _low_latency: Option<LowLatency>,
 }
 
 impl Drop for SilentTap {
@@ -72,9 +76,11 @@ impl SilentTap {
         rustix::termios::tcsetattr(&fd, OptionalActions::Now, &mode).map_err(of)?;
         rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(of)?;
         let tap = Self {
-            fd,
             path: path.to_owned(),
             unmark: (marks || !pty).then(Unmark::default),
+            kinds: ErrorKinds::new(harness_uart::counts(&fd)),
+            _low_latency: LowLatency::of(&fd),
+            fd,
         };
         let now = rustix::termios::tcgetattr(&tap.fd).map_err(of)?;
         if let Some(what) = speaks(&now) {
@@ -95,6 +101,8 @@ impl SilentTap {
                 "{bits_per_second} 8{parity}{stop_bits} with marked line errors (INPCK and PARMRK)"
             )));
         }
+        let made = harness_uart::real_rate(&tap.fd, format.bits_per_second);
+        refuse_rate(path, format.bits_per_second, made)?;
         rustix::termios::ioctl_tiocexcl(&tap.fd).map_err(of)?;
         Ok(tap)
     }
@@ -110,6 +118,16 @@ impl SilentTap {
     /// # Errors
     /// The port cannot be read and is not merely gone.
     pub fn read(&mut self, heard: &mut Vec<Received>) -> io::Result<TapState> {
+        let before = heard.len();
+        let state = self.read_all(heard)?;
+        let new = heard.get_mut(before..).unwrap_or_default();
+        if new.iter().any(|own| own.error.is_some()) {
+            self.kinds.name(new, harness_uart::counts(&self.fd));
+        }
+        Ok(state)
+    }
+
+    fn read_all(&mut self, heard: &mut Vec<Received>) -> io::Result<TapState> {
         let mut chunk = [0; CHUNK];
         loop {
             let count = match rustix::io::read(&self.fd, &mut chunk) {
@@ -134,14 +152,10 @@ impl SilentTap {
         }
     }
 
-    /// What the kernel has counted at this port so far; `None` where it does not count for us.
+    /// What the driver has counted at this port so far; `None` where it does not count.
     #[must_use]
-    pub fn counts(&self) -> Option<PortCounts> {
-        let path = std::fs::canonicalize(&self.path).ok()?;
-        let number = path.to_str()?.strip_prefix("/dev/ttyS")?;
-        // Only root may read it.
-        let table = std::fs::read_to_string("/proc/tty/driver/serial").ok()?;
-        counts(&table, number)
+    pub fn counts(&self) -> Option<Counts> {
+        harness_uart::counts(&self.fd)
     }
 }
 
@@ -151,31 +165,34 @@ impl AsFd for SilentTap {
     }
 }
 
-/// What the kernel has counted at a port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PortCounts {
-    /// Bytes sent.
-    pub sent: u64,
-    /// Bytes lost because the port's queue was full.
-    pub overruns: u64,
-}
+/// Which line errors the driver has counted and no byte that was read has had. The kernel's marks do not tell a break from a damaged 00, nor a
+/// byte without a stop bit from one with a wrong parity bit.
+#[derive(Debug)]
+struct ErrorKinds(Option<Counts>);
 
-/// The counts of a port in the table of the kernel's driver: `0: uart:16550A port:000003F8 irq:4 tx:11 rx:0 oe:2`; counts of 0 are left out
-/// but those of bytes.
-fn counts(table: &str, number: &str) -> Option<PortCounts> {
-    let line = table
-        .lines()
-        .find_map(|line| line.strip_prefix(number)?.strip_prefix(':'))?;
-    let count = |name: &str| {
-        let count = line
-            .split_whitespace()
-            .find_map(|own| own.strip_prefix(name));
-        count?.parse().ok()
-    };
-    Some(PortCounts {
-        sent: count("tx:")?,
-        overruns: count("oe:").unwrap_or(0),
-    })
+impl ErrorKinds {
+    fn new(counts: Option<Counts>) -> Self {
+        Self(counts)
+    }
+
+    /// Gives damaged bytes the error that the driver has counted, where it has counted errors of one kind only.
+    fn name(&mut self, heard: &mut [Received], now: Option<Counts>) {
+        let Some((known, now)) = self.0.as_mut().zip(now) else {
+            return;
+        };
+        let new = now.since(*known);
+        let (kind, counted) = match [new.parity, new.framing, new.breaks] {
+            [0, 0, 0] => return,
+            [_, 0, 0] => (LineError::Parity, &mut known.parity),
+            [0, _, 0] => (LineError::Framing, &mut known.framing),
+            [0, 0, _] => (LineError::Break, &mut known.breaks),
+            _ => return *known = now,
+        };
+        for byte in heard.iter_mut().filter(|own| own.error.is_some()) {
+            byte.error = Some(kind);
+            *counted = counted.wrapping_add(1);
+        }
+    }
 }
 
 /// The mode of a tap: nothing is sent by itself, and every line error is marked.
@@ -376,14 +393,41 @@ mod tests {
         assert!(listens(&near, &even));
     }
 
+    /// A bad 00 is a break, a wrong parity bit or a missing stop bit, by what the driver has counted.
     #[test]
-    fn the_kernel_counts() {
-        let table = "serinfo:1.0 driver revision:\n0: uart:16550A port:000003F8 irq:4 tx:11 rx:0\n\
-                     1: uart:16550A port:000002F8 irq:3 tx:0 rx:900 oe:2 RTS|DTR\n10: uart:unknown port:00000000 irq:0\n";
-        let counted = |sent, overruns| Some(PortCounts { sent, overruns });
-        assert_eq!(counts(table, "0"), counted(11, 0));
-        assert_eq!(counts(table, "1"), counted(0, 2));
-        assert_eq!(counts(table, "10"), None);
-        assert_eq!(counts(table, "2"), None);
+    fn a_bad_byte_is_named_by_the_counts() {
+        let none = Counts::default();
+        let parity = Counts { parity: 1, ..none };
+        let framing = Counts { framing: 1, ..none };
+        let breaks = Counts { breaks: 1, ..none };
+        let both = Counts {
+            parity: 1,
+            ..breaks
+        };
+        for (counted, named) in [
+            (parity, LineError::Parity),
+            (framing, LineError::Framing),
+            (breaks, LineError::Break),
+            // As the mark says it.
+            (both, LineError::Break),
+            (none, LineError::Break),
+        ] {
+            let mut kinds = ErrorKinds::new(Some(none));
+            let mut heard = [Received::good(0x12), Received::bad(0, LineError::Break)];
+            kinds.name(&mut heard, Some(counted));
+            assert_eq!(
+                heard,
+                [Received::good(0x12), Received::bad(0, named)],
+                "{counted:?}"
+            );
+            // The next one is another one.
+            let mut next = [Received::bad(0, LineError::Break)];
+            let more = Counts {
+                framing: counted.framing + 1,
+                ..counted
+            };
+            kinds.name(&mut next, Some(more));
+            assert_eq!(next[0].error, Some(LineError::Framing), "{counted:?}");
+        }
     }
 }

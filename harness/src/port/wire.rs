@@ -160,10 +160,18 @@ impl Wire {
             Coding::Plain | Coding::Telnet(_) => Abilities::default(),
             Coding::Marked(_) | Coding::Serial(..) => Abilities {
                 shows_errors: true,
-                sends_wrong_parity: true,
+                sends_wrong_parity: match &self.coding {
+                    Coding::Serial(_, serial) => serial.switches_parity(),
+                    _ => true,
+                },
                 sends_break: true,
             },
         }
+    }
+
+    /// Whether it is a port of this computer with a parity of its own.
+    pub(crate) fn is_uart(&self) -> bool {
+        matches!(self.coding, Coding::Serial(..))
     }
 
     /// Whether bytes reach the other end as soon as they are handed over: no adapter collects them for a millisecond.
@@ -173,6 +181,11 @@ impl Wire {
             Coding::Plain | Coding::Marked(_) => self.plain_serial.is_none(),
             Coding::Serial(..) | Coding::Telnet(_) => false,
         }
+    }
+
+    /// Whether it is a serial port of which it is not known that it makes the rate that it was asked for.
+    pub(crate) fn has_unproven_rate(&self) -> bool {
+        matches!(&self.coding, Coding::Serial(_, serial) if serial.has_unproven_rate())
     }
 
     /// Number of line errors that the other end has reported without their bytes since the last call.
@@ -262,6 +275,9 @@ impl Wire {
             match first {
                 Waiting::Bytes(queue) => match rustix::io::write(&self.fd, queue.as_slices().0) {
                     Ok(taken) => {
+                        if let Coding::Serial(_, serial) = &mut self.coding {
+                            serial.wrote(taken);
+                        }
                         queue.drain(..taken);
                         self.bytes_waiting -= taken;
                         if !queue.is_empty() {
@@ -294,7 +310,11 @@ impl Wire {
 
     /// Sends a byte with a wrong parity bit on a serial port. What came before the parity is switched keeps its line errors.
     fn send_wrong_parity(&mut self, byte: u8) -> Result<(), Trouble> {
-        rustix::termios::tcdrain(&self.fd).map_err(|error| self.lost(error))?;
+        let drained = match &mut self.coding {
+            Coding::Serial(_, serial) => serial.drain(&self.fd),
+            _ => Ok(()),
+        };
+        drained.map_err(|error| self.lost(error))?;
         let mut early = std::mem::take(&mut self.early);
         let read = self.read_all(&mut early);
         self.early = early;
@@ -342,10 +362,13 @@ impl Wire {
     }
 
     fn read_all(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
-        let by = Instant::now();
+        let (by, before) = (Instant::now(), into.len());
         self.read_chunks(into)?;
         if let Coding::Serial(_, serial) = &mut self.coding {
             serial.switches().has_read_all(by);
+            if into.len() > before {
+                self.unplaced += serial.take_overruns(&self.fd);
+            }
         }
         Ok(())
     }

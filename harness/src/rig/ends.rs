@@ -108,6 +108,10 @@ impl Link for Ends {
         each!(self, own => own.reaches(ring, link))
     }
 
+    fn damages_parity(&self, ring: usize, link: usize) -> bool {
+        each!(self, own => own.damages_parity(ring, link))
+    }
+
     fn listens(&self, ring: usize, link: usize) -> bool {
         each!(self, own => own.listens(ring, link))
     }

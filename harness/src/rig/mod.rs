@@ -51,4 +51,4 @@ pub use crate::buses::rings::rig::{
     Driven, Keeper, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures,
     play_one,
 };
-pub(crate) use crate::buses::rings::rig::{judge, left_open, run, sim};
+pub(crate) use crate::buses::rings::rig::{judge, left_open, run, sim, wrong_parity};

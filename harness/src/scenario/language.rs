@@ -13,7 +13,7 @@ use super::run::player::{MAX_ROUND, Runner};
 use super::scanner::Scanner;
 use super::syntax::Scenario;
 use crate::buses::Bus;
-use crate::link::{Capability, Link};
+use crate::link::{Capability, Link, LinkFault};
 use crate::traffic::SegmentReport;
 use harness_proto::time::{Instant, Span};
 use std::fmt::Debug;
@@ -116,7 +116,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     fn simulate(plan: &Plan<Self>) -> Box<dyn Link>;
 
     /// The links on which faults are put, by port and place.
-    fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize)> {
+    fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize, LinkFault)> {
         let _none = plan;
         Vec::new()
     }

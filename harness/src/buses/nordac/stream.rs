@@ -233,6 +233,11 @@ impl PortLink for SegmentLink {
         self.pump.take_unplaced()
     }
 
+    fn has_unproven_rate(&self, port: usize) -> bool {
+        let own = self.pump.ports.get(port);
+        own.is_some_and(|own| own.wire.has_unproven_rate())
+    }
+
     fn take_switches(&mut self) -> Vec<Switch> {
         self.pump.take_switches()
     }

@@ -109,7 +109,7 @@ impl StreamLink {
         let wires = wires.map(|(wire, drives)| (wire, RoundTrip::new(drives)));
         let mut pump = Pump::new(wires, inner, rate.byte_time(), interrupt);
         pump.tolerance = TOLERANCE;
-        if pump.shows_errors() {
+        if pump.has_line_errors() {
             capabilities.push(Capability::LineErrors);
         }
         Self {
@@ -197,6 +197,16 @@ impl PortLink for StreamLink {
         self.pump.take_switches()
     }
 
+    fn switches_parity(&self, port: usize) -> Option<bool> {
+        let wire = &self.pump.ports.get(port)?.wire;
+        wire.is_uart().then(|| wire.abilities().sends_wrong_parity)
+    }
+
+    fn port_name(&self, port: usize) -> &str {
+        let own = self.pump.ports.get(port);
+        own.map_or("the port", |own| own.wire.name())
+    }
+
     fn inner_links(&self) -> &[InnerLink] {
         &self.pump.inner
     }
@@ -226,6 +236,11 @@ impl Link for StreamLink {
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
         self.spot(ring, link).is_some()
+    }
+
+    fn damages_parity(&self, ring: usize, link: usize) -> bool {
+        let mut inner = self.pump.inner.iter();
+        !inner.any(|own| (own.ring, own.place) == (ring, link) && own.shares_parity())
     }
 
     fn listens(&self, ring: usize, link: usize) -> bool {

@@ -9,7 +9,7 @@ use crate::cli::exit::Exit;
 use crate::link::Line as _;
 use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink, Listening};
 use crate::medium;
-use crate::port::{OpenError, PortCounts, SilentTap, TapState};
+use crate::port::{Counts, OpenError, SilentTap, TapState};
 use crate::trouble::Trouble;
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::line::{Format, Received};
@@ -69,8 +69,8 @@ pub(super) struct Tap {
     settings: TapSettings,
     cutter: Option<TelegramCutter>,
     /// What the kernel had counted at the port before, and the overruns until now.
-    before: Option<PortCounts>,
-    overruns: u64,
+    before: Option<Counts>,
+    overruns: u32,
     looked: Instant,
     /// The time of the last octet.
     last: u64,
@@ -166,7 +166,7 @@ impl Tap {
         }
     }
 
-    fn counts(&self) -> Option<PortCounts> {
+    fn counts(&self) -> Option<Counts> {
         match &self.ear {
             Ear::Octets(tap) => tap.counts(),
             Ear::Frames(_) | Ear::Opening(_) | Ear::Away => None,
@@ -200,7 +200,7 @@ impl Tap {
         if self.before.is_some() && self.looked.elapsed() >= AGAIN {
             self.looked = Instant::now();
             let overruns = self.counts().map_or(self.overruns, |own| own.overruns);
-            let lost = overruns.saturating_sub(self.overruns);
+            let lost = overruns.wrapping_sub(self.overruns);
             self.overruns = overruns;
             if lost > 0 {
                 let words = format!("{lost} or more bytes lost: the port's queue was full");
@@ -339,7 +339,7 @@ impl Tap {
                 None => "bytes sent: not counted by the driver".to_owned(),
                 Some((before, now)) => {
                     spoke = now.sent != before.sent;
-                    format!("bytes sent: {}", now.sent.saturating_sub(before.sent))
+                    format!("bytes sent: {}", now.since(before).sent)
                 }
             },
         };

@@ -7,6 +7,7 @@ use crate::explore::{CaseScope, ExploreError, RingScope, RingSetup, Spice};
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
+use crate::rig::wrong_parity;
 use crate::rig::{Rig, Run, Session, UseOptions};
 use crate::scenario::run::start_anew;
 use crate::signals::interrupt_flag;
@@ -43,6 +44,14 @@ pub(crate) fn on_ports(
             return Ok(exit_of(&error));
         }
     };
+    match wrong_parity::obstacles(&mut session) {
+        Ok(all) => all.iter().for_each(|why| output.complain(why)),
+        Err(error) => {
+            output.complain(&error.to_string());
+            let exit = exit_of(&error);
+            return Ok(give_back(session, exit, output).1);
+        }
+    }
     let worked = match Run::new(&mut session) {
         Ok(mut run) => work(&mut run, output),
         Err(problems) => {
@@ -123,7 +132,11 @@ pub(crate) fn scope(run: &mut Run<'_>) -> CaseScope {
     // On a simulated ring that is tried like one behind a port, only the master's own link is in reach.
     let (first, second) = rings(&rig, |ring, place| match rig.is_simulated() {
         true => place == 0,
-        false => link.reaches(ring, usize::from(place)),
+        false => {
+            let place = usize::from(place);
+            // A case's fault may be one of parity.
+            link.reaches(ring, place) && link.damages_parity(ring, place)
+        }
     });
     let own = |ring: &RingScope| !ring.links.is_empty();
     let reached = own(&first) || second.as_ref().is_some_and(own);

@@ -294,6 +294,10 @@ impl<N: LinkNotes> Link for Observed<'_, N> {
         self.link.reaches(port, link)
     }
 
+    fn damages_parity(&self, port: usize, link: usize) -> bool {
+        self.link.damages_parity(port, link)
+    }
+
     fn listens(&self, port: usize, link: usize) -> bool {
         self.link.listens(port, link)
     }

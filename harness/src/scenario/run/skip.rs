@@ -1,7 +1,7 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
 use crate::buses::LimitSetting;
-use crate::link::{Capability, Link};
+use crate::link::{Capability, Link, is_wrong_parity};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
 use crate::scenario::syntax::Bus;
@@ -24,6 +24,8 @@ pub enum Why {
     Lacks(Vec<Capability>),
     /// A fault is to be put on this link, where the rig has no interposer.
     NoInterposer(String),
+    /// A byte is to get a wrong parity bit on this link, where the interposer has one UART for both directions.
+    OneUart(String),
     /// What goes over this link must be seen, where the rig has no tap.
     NoTap(String),
     /// It is for rings with these numbers of drives, each from the first to the second, and the rig has those.
@@ -53,6 +55,8 @@ pub enum Unlock {
     Tap(String),
     /// An interposer at this link.
     Interposer(String),
+    /// An interposer with a port for each direction at this link.
+    TwoPorts(String),
     /// Ports that send and show line errors.
     LineErrors,
     /// Rings with these numbers of drives, each from the first to the second.
@@ -127,6 +131,7 @@ impl Why {
     pub fn group(&self) -> String {
         match self {
             Self::NoInterposer(_) => "the rig has no interposer".to_owned(),
+            Self::OneUart(_) => format!("an interposer has one port: {ONE_PARITY}"),
             Self::NoTap(_) => "the rig has no tap".to_owned(),
             Self::OtherSize(..) => "it is for rings of another size".to_owned(),
             Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
@@ -140,6 +145,9 @@ impl Why {
     }
 }
 
+/// Why an interposer with one port damages no parity bit.
+const ONE_PARITY: &str = "a UART has one parity setting for both directions, so wrong parity needs two ports, one for each direction";
+
 /// The start of a denial in a record; the guard's message follows.
 pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to its end: ";
 
@@ -151,6 +159,9 @@ impl fmt::Display for Why {
                 write!(f, "the rig has no {}", names.join(", no "))
             }
             Self::NoTap(place) => write!(f, "the rig has no tap at {place}"),
+            Self::OneUart(place) => {
+                write!(f, "the interposer at {place} has one port: {ONE_PARITY}")
+            }
             Self::NoInterposer(place) => write!(f, "the rig has no interposer at {place}"),
             Self::OtherSize(own, rig) => write!(
                 f,
@@ -289,7 +300,8 @@ impl fmt::Display for Unlock {
             Self::Port(setting) => write!(f, "{setting} in [port.1]"),
             Self::Tap(place) => write!(f, "a tap at {place}"),
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
-            Self::LineErrors => f.write_str("ports that show line errors"),
+            Self::TwoPorts(place) => write!(f, "two ports at the interposer at {place}"),
+            Self::LineErrors => f.write_str("ports that show line errors and send wrong parity"),
             Self::Rings(drives) => match drives.as_slice() {
                 [one] => write!(f, "a ring of {}", in_words(&[*one])),
                 all => write!(f, "rings of {}", in_words(all)),
@@ -318,9 +330,17 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
         .filter(|need| !able(need))
         .collect();
     let name = |(port, place): &(usize, usize)| L::link_name(plan, *port, *place);
-    let unreached: Vec<_> = L::fault_links(plan)
-        .into_iter()
+    let faults = L::fault_links(plan).into_iter();
+    let unreached: Vec<_> = faults
+        .map(|(ring, place, _)| (ring, place))
         .filter(|(ring, place)| !link.reaches(*ring, *place))
+        .collect();
+    let faults = L::fault_links(plan).into_iter();
+    let one_uart: BTreeSet<_> = faults
+        .filter(|(ring, place, fault)| {
+            is_wrong_parity(*fault) && !link.damages_parity(*ring, *place)
+        })
+        .map(|(ring, place, _)| (ring, place))
         .collect();
     // An interposer sees what it passes on.
     let unheard: Vec<_> = L::heard_links(plan)
@@ -328,16 +348,20 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
         .filter(|(ring, place)| !link.listens(*ring, *place))
         .filter(|place| !unreached.contains(place))
         .collect();
-    let why = match (missing.as_slice(), unreached.first(), unheard.first()) {
-        ([], None, None) => return None,
-        ([], Some(place), _) => Why::NoInterposer(name(place)),
-        ([], None, Some(place)) => Why::NoTap(name(place)),
-        (missing, ..) => Why::Lacks(missing.to_vec()),
+    let first = (unreached.first(), unheard.first(), one_uart.first());
+    let why = match (missing.as_slice(), first) {
+        ([], (None, None, None)) => return None,
+        ([], (Some(place), ..)) => Why::NoInterposer(name(place)),
+        ([], (None, Some(place), _)) => Why::NoTap(name(place)),
+        ([], (None, None, Some(place))) => Why::OneUart(name(place)),
+        (missing, _) => Why::Lacks(missing.to_vec()),
     };
     let unlocks = missing.iter().filter_map(|own| unlock(*own));
     let interposers = unreached.iter().map(name).map(Unlock::Interposer);
     let taps = unheard.iter().map(name).map(Unlock::Tap);
-    Some(Skip::from(why).and(unlocks.chain(interposers).chain(taps)))
+    let ports = one_uart.iter().map(name).map(Unlock::TwoPorts);
+    let places = interposers.chain(taps).chain(ports);
+    Some(Skip::from(why).and(unlocks.chain(places)))
 }
 
 /// What a plan for rings of other sizes needs beside them. Inner links are named as they are in its own rings.
@@ -358,7 +382,8 @@ pub fn lacks_as_well<L: Language>(
     let unlocks = missing.iter().filter_map(|own| unlock(**own));
     let mut unlocks: Vec<_> = unlocks.filter(|own| *own != Unlock::SecondRing).collect();
     if lacks(&Capability::Interposer) {
-        let places = inner(L::fault_links(plan).into_iter().collect());
+        let places = L::fault_links(plan).into_iter();
+        let places = inner(places.map(|(ring, place, _)| (ring, place)).collect());
         unlocks.extend(places.into_iter().map(Unlock::Interposer));
     }
     if lacks(&Capability::Tap) && lacks(&Capability::Interposer) {

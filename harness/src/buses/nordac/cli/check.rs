@@ -63,6 +63,14 @@ pub(crate) fn check(
         let _infallible = writeln!(text, "slave {address}: {about}");
     }
     drop(talk);
+    if session
+        .link()
+        .inner_mut()
+        .ports_mut()
+        .is_some_and(|own| own.has_unproven_rate(0))
+    {
+        text += "the driver of the port does not say whether its chip makes this rate: the guide's page on wiring tells which do\n";
+    }
     session.look_at_interlocks();
     let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = session.release();

@@ -8,7 +8,7 @@ use crate::cli::rig::ListFormat;
 use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::run::progress_bar;
 use crate::counted::counted;
-use crate::rig::figures::{Figures, RingFigures, measure};
+use crate::rig::figures::{Figures, RingFigures, WrongParity, measure};
 use crate::rig::{Rig, Session, UseOptions};
 use crate::signals::interrupt_flag;
 use clap::Args;
@@ -96,6 +96,13 @@ pub(crate) fn check(
         ));
         exit = Exit::RigError;
     }
+    for (found, (_, ring)) in figures.rings.iter().zip(rig.rings()) {
+        let port = ring.endpoint.port.as_deref().unwrap_or("the port");
+        if let Some(why) = found.wrong_parity.and_then(|own| own.obstacle(port)) {
+            output.complain(&why);
+            exit = Exit::RigError;
+        }
+    }
     for drive in &figures.drives {
         if let Some(contradiction) = &drive.contradiction {
             output.complain(&format!("drive {}: {contradiction}", drive.axis));
@@ -130,6 +137,9 @@ fn text(rig: &Rig, figures: &Figures) -> String {
             found.rate.bits_per_second(),
             late_of(found)
         );
+        if found.wrong_parity == Some(WrongParity::Noticed) {
+            text += "  a byte sent with a wrong parity bit was noticed\n";
+        }
     }
     for (ring, SpelledOut { drive, why }) in &figures.reported {
         let cause = match why {
@@ -203,6 +213,7 @@ fn object(rig: &Rig, figures: &Figures) -> serde_json::Value {
                 "most_ms": spread.map(|spread| spread[2]),
                 "lost": ring.lost,
                 "line_errors": ring.line_errors,
+                "wrong_parity": ring.wrong_parity.map(|own| own == WrongParity::Noticed),
             })
         })
         .collect();

@@ -15,7 +15,7 @@ use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
 use crate::buses::Bus;
 use crate::buses::novobus::simulate;
-use crate::link::{Link, Octets as _};
+use crate::link::{Link, LinkFault, Octets as _};
 use crate::scenario::language::{Language, Opening};
 use crate::scenario::pattern::{self, Expected, Pattern};
 use crate::scenario::plan::{Plan, PlannedStep};
@@ -94,7 +94,7 @@ impl Language for Novobus {
         Box::new(simulate::simulated(plan))
     }
 
-    fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize)> {
+    fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize, LinkFault)> {
         plan.fault_links().collect()
     }
 

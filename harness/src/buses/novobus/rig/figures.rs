@@ -1,6 +1,8 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::line_test::{self, RingPace};
+pub use super::wrong_parity::WrongParity;
+use super::wrong_parity::try_wrong_parity;
 use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut, State};
 use crate::link::{Line as _, Octets};
 use crate::rig::Rig;
@@ -33,6 +35,8 @@ pub struct RingFigures {
     pub rounds: Vec<Span>,
     /// Telegrams that did not come back as they must (9.3).
     pub lost: usize,
+    /// What became of a byte with a wrong parity bit; `None` where none was sent.
+    pub wrong_parity: Option<WrongParity>,
     /// Bytes received with a line error, and errors that the transport reported without their bytes.
     pub line_errors: u64,
 }
@@ -84,7 +88,11 @@ pub fn measure(
     let rings = (0..)
         .zip(&sizes)
         .map(|(ring, size)| round(&mut session, ring, *size));
-    let rings: Vec<_> = rings.collect();
+    let mut rings: Vec<_> = rings.collect();
+    for (ring, own) in rings.iter_mut().enumerate() {
+        // A ring that stays in the error mode shows when its drives are read.
+        own.wrong_parity = try_wrong_parity(&mut session, ring).ok().flatten();
+    }
     let rig = session.rig().clone();
     let shared = Shared::new(session);
     let read = drives(&shared, &rig, &sizes, told);
@@ -151,6 +159,7 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
         nominal,
         rounds,
         lost,
+        wrong_parity: None,
         line_errors,
     }
 }

@@ -15,6 +15,7 @@ pub mod named;
 pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;
+pub(crate) mod wrong_parity;
 
 pub use cause::LikelyCause;
 pub use condition::InterlockCondition;

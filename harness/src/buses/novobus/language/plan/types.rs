@@ -2,7 +2,7 @@
 
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::syntax::{CellPlace, Ending, Influence, Relation, Showing};
-use crate::link::{Capability, Moment, PlacedFault};
+use crate::link::{Capability, LinkFault, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep};
 use crate::scenario::problem::TextSpan;
@@ -311,11 +311,11 @@ impl Plan<Novobus> {
         self.steps.iter().any(asks)
     }
 
-    /// The links on which faults are put, by ring and place.
-    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    /// The faults on links, by ring and place.
+    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize, LinkFault)> + '_ {
         self.steps.iter().filter_map(|step| match step.action {
-            PlannedAction::Own(RingAct::Fault(ring, PlacedFault::Link(link, _), _)) => {
-                Some((ring, link))
+            PlannedAction::Own(RingAct::Fault(ring, PlacedFault::Link(link, fault), _)) => {
+                Some((ring, link, fault))
             }
             _ => None,
         })
