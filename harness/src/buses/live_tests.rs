@@ -286,6 +286,86 @@ fn captures_begun_in_mid_conversation_find_wrong_drives() {
     assert_eq!([at(3), at(20)], [Some(Verdict::Inconclusive); 2]);
 }
 
+/// ND21 9.1, 9.5, 9.7 to 9.9, 10.5, 14.3.6: what was set before a ring's first byte accuses no right drive, and a drive that is wrong from
+/// there on is found (the table in `novobus::capture::begin`).
+#[test]
+fn what_was_set_before_a_ring_is_captured_blames_no_right_drive() {
+    for (name, first) in [
+        ("10.5-silent-self-test", 20),
+        ("14.3.6-ee-selftest", 0),
+        ("14.3.6-ee-selftest", 143),
+        ("14.3.6-ee-selftest", 236),
+        ("9.8-two-check-sequences", 30),
+        ("9.9-byte-during-the-wait", 2),
+        ("9.9-byte-during-the-wait-silent", 2),
+    ] {
+        let tape = Tape::of(&traces(name), Rate::default());
+        let found = verdict(&begun_at(&tape, first, 0));
+        assert!(
+            found.is_some_and(|own| own != Verdict::Failed),
+            "{name} from piece {first}"
+        );
+    }
+    let sequence = "> 00*17 FF 44 72 4C 41\n";
+    let read = "> 88 FE C0 20 FE DE\n";
+    for (header, before, then) in [
+        ("", "> 00*20\n", [sequence, read].concat()),
+        (
+            "",
+            "> 00*8\n",
+            ["> 80*4\nwait 20ms\n", sequence, read].concat(),
+        ),
+        (
+            "",
+            "> 88 FE\n",
+            ["> C0 20 FE DE\nwait 20ms\n", read].concat(),
+        ),
+        (
+            "",
+            "> 88 FE C0\n",
+            ["> 20 FE DE\nwait 20ms\n", read].concat(),
+        ),
+        ("", read, ["> A8 C0 20 FE DE\nwait 20ms\n", read].concat()),
+        (
+            "",
+            "> 84 FE C0 20\n",
+            ["> 84 FE FE DE\nwait 20ms\n", read].concat(),
+        ),
+        (
+            "",
+            "! 2->1: cut\n> 80\n",
+            ["> 80*4\nwait 30ms\n! 2->1: join\n", read].concat(),
+        ),
+        ("", "! 2->1: cut\n> 80\n", "> 80*4\n".to_owned()),
+        ("", "> 80\n", "> 84 FE C0 20\n> 84 FE FE DE\n".to_owned()),
+    ] {
+        let begun = |wrong: &str, then: &str| {
+            let text = format!(
+                "title Begun\nsource nd21 9\nring 3\ndrive 1 memory FE20 = 5A\n{header}{wrong}\n{before}wait 20ms\n"
+            );
+            let of = |text: &str| {
+                let source = Source::from_bytes("begun".to_owned(), text.into()).expect("text");
+                Tape::of(&traces_of(source), Rate::default())
+            };
+            let first = of(&text).pieces.len();
+            verdict(&begun_at(&of(&format!("{text}{then}")), first, 0))
+        };
+        let found = begun("", &then);
+        assert!(
+            found.is_some_and(|own| own != Verdict::Failed),
+            "{before}-- {then}: {found:?}"
+        );
+        let later = ["wait 20ms\n", read].concat().repeat(3);
+        let found = begun(
+            "drive 1 deviates checksum-wrong\n",
+            &format!("{then}{later}"),
+        );
+        if then.contains("DE") {
+            assert_eq!(found, Some(Verdict::Failed), "{before}-- {then}, wrong");
+        }
+    }
+}
+
 /// A capture in a cabinet begins anywhere.
 #[test]
 fn captures_begun_in_mid_conversation_blame_no_right_drive() {

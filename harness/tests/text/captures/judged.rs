@@ -259,9 +259,16 @@ fn a_drive_may_be_silent_while_it_tests_itself() {
     );
     assert_ne!(wrong, silent);
     assert_eq!(judged(&wrong).verdict, Verdict::Failed);
-    let swallows =
-        "title t\nring 3\ndrive 1 deviates swallows-synco\n> 80*3\nwait 60ms\n> 82 FE 00\n";
-    assert_eq!(judged(swallows).verdict, Verdict::Failed);
+    // Where the capture begins with the silence, the reset may have been in front of it.
+    for (front, verdict) in [
+        ("> 82 00 00\n", Verdict::Failed),
+        ("", Verdict::Inconclusive),
+    ] {
+        let swallows = format!(
+            "title t\nring 3\ndrive 1 deviates swallows-synco\n{front}> 80*3\nwait 60ms\n> 82 00 00\n"
+        );
+        assert_eq!(judged(&swallows).verdict, verdict, "{front}");
+    }
 }
 
 /// A value that the manual leaves open and that explains every byte is named, and settles nothing.

@@ -1,7 +1,22 @@
 //! Where a capture begins: one that begins in mid-conversation is judged from where the ring was first silent.
+//!
+//! What may have been set in a ring before the first byte of a capture, although no byte travels, and from when on it does not matter:
+//!
+//! | before the first byte | until |
+//! |---|---|
+//! | a drive is in the error mode, or spells out an address (ND21 9.7); it has timed out and waits, or sends zeros (9.9) | the ring passes on a telegram, SYNCO or a check sequence ([`shown`]) |
+//! | a drive tests itself and is silent (10.5, 11.8), or is off; a link is broken | the same |
+//! | a telegram has begun, and the master made a pause in it (9.1) | an address comes back counted |
+//! | the drive of a short address (9.2) | an address comes back counted |
+//! | a command has begun in an earlier telegram (9.5) | an address comes back counted behind it |
+//! | contents of cells, enable, process data, EEPROM (14.2) | their first answers (`stimuli`) |
+//! | time-out monitoring (14.10.2), whole drives | it explains each byte (`open`) |
 
 use crate::capture::Capture;
-use harness_proto::novobus::sync::{MAX_NET_LENGTH, SyncByte};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
+use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::{Addressing, MAX_NET_LENGTH, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte, Trace};
 
@@ -106,4 +121,157 @@ fn later(octets: &[LineByte], start: Instant) -> &[LineByte] {
         .iter()
         .position(|own| own.at > start)
         .map_or(&[], |first| &octets[first..])
+}
+
+/// What a capture shows of what was set before its first byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// At this time every drive was in normal mode, and nothing in front of the capture matters any more.
+    From(Instant),
+    /// A ring never does, and right drives can send what it sends.
+    Never,
+    /// A ring never does, and sends bytes that right drives send in no mode.
+    Wrong,
+}
+
+/// When each ring has shown that its drives are in normal mode.
+pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
+    let rings = capture.traces.iter().filter_map(|ring| {
+        let find = |own: fn(&Channel) -> bool| ring.channels.iter().find(|link| own(link));
+        let first = find(|link| link.from.is_none())?;
+        let last = find(|link| link.to.is_none())?;
+        (!first.octets().is_empty())
+            .then(|| Beginning::of((capture, tolerance), ring, (first, last)).shown())
+    });
+    rings.fold(Shown::From(Instant::START), |all, own| match (all, own) {
+        (Shown::Wrong, _) | (_, Shown::Wrong) => Shown::Wrong,
+        (Shown::From(a), Shown::From(b)) => Shown::From(a.max(b)),
+        _ => Shown::Never,
+    })
+}
+
+/// What the master sent into a ring and what it received, each without damaged bytes.
+struct Beginning {
+    sent: Vec<(Instant, u8)>,
+    came: Vec<(Instant, u8)>,
+    roles: Vec<Role>,
+    drives: u8,
+    /// In this time a byte passes all drives, at the earliest and at the latest.
+    way: (Span, Span),
+    /// How much a time may be wrong.
+    tolerance: Span,
+}
+
+impl Beginning {
+    fn of(
+        (capture, tolerance): (&Capture, Span),
+        ring: &Trace,
+        (first, last): (&Channel, &Channel),
+    ) -> Self {
+        let good = |link: &Channel| {
+            let octets = link.octets().iter().filter(|own| own.error.is_none());
+            octets
+                .filter_map(|own| Some((own.at, own.received?)))
+                .collect()
+        };
+        let sent: Vec<(Instant, u8)> = good(first);
+        let bytes: Vec<_> = sent.iter().map(|(_, byte)| (*byte, true)).collect();
+        let way = capture.rate.byte_time().units() * u64::from(ring.stations);
+        Self {
+            roles: RingSize::new(ring.stations.into())
+                .map_or_else(|_| Vec::new(), |size| roles(size, &bytes)),
+            sent,
+            came: good(last),
+            drives: ring.stations,
+            way: (Span::from_units(way * 9 / 10), flight(capture)),
+            tolerance,
+        }
+    }
+
+    /// Whether a byte that came at a time can be the answer to one that was sent at another.
+    fn answers(&self, (sent, came): (Instant, Instant)) -> bool {
+        came + self.tolerance >= sent + self.way.0 && came <= sent + self.way.1 + self.tolerance
+    }
+
+    /// Whether a telegram begins with the byte at this place, and how its drive is named.
+    fn telegram(&self, place: usize) -> Option<Addressing> {
+        match SyncByte::decode(self.sent[place].1) {
+            Ok(SyncByte::Telegram(header)) => Some(header.addressing()),
+            _ => None,
+        }
+    }
+
+    /// From which of the bytes sent on an address shows that a telegram begins there: behind the rest of a command that no drive takes for
+    /// the beginning of one.
+    fn behind_a_rest(&self) -> usize {
+        let begins = |place: usize| matches!(self.roles[place], Role::Address { .. } | Role::Sync);
+        let first = (1..self.roles.len())
+            .find(|place| self.roles[*place] == Role::Foreign && begins(place - 1));
+        let Some(first) = first.filter(|place| self.sent[*place].1 != 0) else {
+            return 0;
+        };
+        let front = &self.roles[..first];
+        let drive = front.iter().rev().find_map(|own| own.drive());
+        let whole = |own: &Role| matches!(own, Role::Check { .. }) && own.drive() == drive;
+        if front.iter().any(whole) { 0 } else { first }
+    }
+
+    fn shown(&self) -> Shown {
+        let pairs = || self.came.windows(2).map(|two| [two[0], two[1]]);
+        let counted = |[(at, sync), (end, address)]: &[(Instant, u8); 2]| {
+            let asked = |place: usize| {
+                self.telegram(place) == Some(Addressing::AddressFollows)
+                    && self.sent[place].1 == *sync
+                    && self.sent[place + 1].1.wrapping_add(self.drives) == *address
+                    && self.answers((self.sent[place].0, *at))
+                    && self.answers((self.sent[place + 1].0, *end))
+            };
+            (self.behind_a_rest()..self.sent.len().saturating_sub(1)).any(asked)
+        };
+        let address = pairs().find(counted).map(|[_, (end, _)]| end);
+        let mut watch = SequenceWatch::default();
+        let sequence = self
+            .came
+            .iter()
+            .find(|(_, byte)| watch.see(*byte, true) == SequenceProgress::Complete);
+        // Where a short address, or no sync byte, is in front, more than the mode is not known.
+        let sync = (0..self.sent.len())
+            .find(|place| SyncByte::decode(self.sent[*place].1) != Ok(SyncByte::Synco));
+        let idle = sync.unwrap_or(self.sent.len());
+        let is_whole = sync.is_none_or(|place| {
+            self.telegram(place) == Some(Addressing::AddressFollows) || self.sent[place].1 == 0
+        });
+        let passed = |(at, byte): &&(Instant, u8)| {
+            self.sent[..idle]
+                .iter()
+                .any(|(sent, own)| own == byte && self.answers((*sent, *at)))
+        };
+        let synco = self
+            .came
+            .iter()
+            .find(passed)
+            .filter(|_| is_whole && self.behind_a_rest() == 0);
+        let all = [address, sequence.map(|own| own.0), synco.map(|own| own.0)];
+        match all.into_iter().flatten().min() {
+            Some(at) => Shown::From(at),
+            None if is_whole && !self.came.iter().all(|own| self.may_come(*own)) => Shown::Wrong,
+            None => Shown::Never,
+        }
+    }
+
+    /// Whether right drives in any mode can send a byte: zeros and numbers of the error mode, and bytes of the master's that drives count on
+    /// (ND21 9.7).
+    fn may_come(&self, (at, byte): (Instant, u8)) -> bool {
+        let counted = |own: u8| byte.wrapping_sub(own) <= self.drives;
+        let before = self
+            .sent
+            .first()
+            .is_some_and(|(first, _)| at.since(*first) < self.way.0);
+        before
+            || counted(0)
+            || self
+                .sent
+                .iter()
+                .any(|(sent, own)| self.answers((*sent, at)) && counted(*own))
+    }
 }

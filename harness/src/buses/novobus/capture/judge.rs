@@ -1,6 +1,6 @@
 //! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
-use super::begin::{after_silences, from, is_midway, is_one_telegram};
+use super::begin::{Shown, after_silences, from, is_midway, is_one_telegram, shown};
 use super::open::explanations;
 use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
@@ -54,6 +54,13 @@ const UNDER_WAY: &str = "the capture ends while bytes are under way: those that 
 const TESTS_ITSELF: &str = "what differs lies between a ResetH8 and the next silence, and nothing differs from there on: the drive may be silent while it tests \
      itself (ND21 10.5, 11.8); describe the drives with --setup";
 
+/// Why what differs in front of a capture's first passed telegram accuses no drive.
+const BEFORE: &str = "what differs lies in front of the first telegram that the ring passes on: before the capture a drive may have been in the error mode, in its \
+     self-test or without power, a telegram or a command may have begun, or a link may have been broken (ND21 9.1, 9.5, 9.7, 9.9, 10.5)";
+
+const NEVER_SILENT: &str = "the capture begins in mid-conversation, and its rings are never silent: what differs may come of bytes in front of it; begin it \
+     before the master sends";
+
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
     fn in_doubt(mut self, why: &str) -> Self {
@@ -95,8 +102,8 @@ fn first(problems: &Problems) -> String {
     format!("{}{remedy}", first.message)
 }
 
-/// Judges a capture; times are compared as far as the tolerance. One that begins in mid-conversation, and differs, is judged from where
-/// its rings were first silent: what bytes in front of it did to the drives is not known.
+/// Judges a capture; times are compared as far as the tolerance. One that begins in mid-conversation, or before its rings have shown that
+/// their drives are in normal mode, and differs, is judged from where its rings were first silent: what was in front of it is not known.
 ///
 /// # Errors
 /// [`JudgeError`].
@@ -105,7 +112,17 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
     if judged.verdict != Verdict::Failed {
         return Ok(judged);
     }
-    if !is_midway(capture) {
+    let is_midway = is_midway(capture);
+    let shown = shown(capture, options.tolerance);
+    // Its time in the capture; a byte that is missing at the end lies behind all.
+    let first = judged.master.first.as_ref();
+    let first = first.and_then(|first| first.sides[0]).map(|byte| byte.at);
+    let is_early = match shown {
+        Shown::From(at) => first.is_some_and(|first| first < at),
+        Shown::Never => true,
+        Shown::Wrong => false,
+    };
+    if !is_midway && !is_early {
         return match may_test_itself(capture, options, &judged)? {
             true => Ok(judged.in_doubt(TESTS_ITSELF)),
             false => Ok(judged),
@@ -113,16 +130,23 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
     }
     let starts = after_silences(capture);
     let Some(start) = starts.first() else {
-        return Ok(judged.in_doubt(
-            "the capture begins in mid-conversation, and its rings are never silent: what differs may come of bytes in front of it; begin it \
-             before the master sends",
-        ));
+        return Ok(judged.in_doubt(match is_midway {
+            true => NEVER_SILENT,
+            false => BEFORE,
+        }));
     };
     let mut judged = judge_whole(&from(capture, *start), options)?;
     judged.remarks.push(format!(
-        "the capture begins in mid-conversation: it is judged from {} on, where its rings were first silent, and bytes are counted from there",
+        "{}: it is judged from {} on, where its rings were first silent, and bytes are counted from there",
+        match is_midway {
+            true => "the capture begins in mid-conversation",
+            false => "the capture does not show what its drives did before",
+        },
         start.since_start()
     ));
+    if !is_midway && judged.verdict != Verdict::Failed {
+        return Ok(judged.in_doubt(BEFORE));
+    }
     if judged.verdict == Verdict::Passed && !is_one_telegram(capture, *start) {
         return Ok(judged.in_doubt(
             "more than the telegram under way was sent before: what differs there may come of bytes in front of the capture",
@@ -131,8 +155,16 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
     if judged.verdict != Verdict::Failed {
         return Ok(judged);
     }
+    let normal = match shown {
+        Shown::From(at) => starts.partition_point(|start| *start < at),
+        Shown::Never => starts.len(),
+        Shown::Wrong => 0,
+    };
+    if normal == starts.len() {
+        return Ok(judged.in_doubt(BEFORE));
+    }
     // What came before can show for a while, such as a reset. A fault that lasts shows from everywhere.
-    let later = starts.iter().skip(1);
+    let later = starts.iter().skip(normal.max(1));
     for start in later.step_by(starts.len().div_ceil(MOST_STARTS)) {
         if judge_whole(&from(capture, *start), options)?.verdict != Verdict::Failed {
             return Ok(judged.in_doubt(
@@ -154,7 +186,7 @@ fn may_test_itself(
     };
     let told = unforeseen(capture);
     let resets = told.iter().flat_map(|told| &told.resets);
-    let Some(reset) = resets.filter(|at| **at <= first).max() else {
+    let Some(reset) = resets.map(|(at, _)| at).filter(|at| **at <= first).max() else {
         return Ok(false);
     };
     let starts = after_silences(capture);
@@ -164,34 +196,51 @@ fn may_test_itself(
     Ok(judge_whole(&from(capture, *start), options)?.verdict != Verdict::Failed)
 }
 
+/// Judges a capture as one that begins with nothing under way. Without gaps up to the tolerance the model can be apart from a drive that
+/// does something in its own time (ND21 9.9, 10.5, 14.10.5), so that a capture that differs is played once more at its own times.
 fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let told = unforeseen(capture);
-    let judged = judge_as(capture, options, &told, &Header::default())?;
-    if judged.verdict != Verdict::Failed || options.setup.is_some() {
+    let none = Header::default();
+    let judged = judge_as(capture, options, &told, (&none, options.tolerance))?;
+    if judged.verdict != Verdict::Failed {
+        return Ok(judged);
+    }
+    if options.tolerance > Span::ZERO {
+        let exact = judge_as(capture, options, &told, (&none, Span::ZERO))?;
+        if exact.verdict != Verdict::Failed {
+            return Ok(exact);
+        }
+    }
+    if options.setup.is_some() {
         return Ok(judged);
     }
     for explanation in explanations(capture, &told) {
-        let Ok(mut explained) = judge_as(capture, options, &told, &explanation.header) else {
-            continue;
-        };
-        if explained.links.differ > 0 {
-            continue;
+        let gaps = [options.tolerance, Span::ZERO];
+        let exact = explanation.is_right && options.tolerance > Span::ZERO;
+        for gaps in &gaps[..1 + usize::from(exact)] {
+            let Ok(mut explained) = judge_as(capture, options, &told, (&explanation.header, *gaps))
+            else {
+                continue;
+            };
+            if explained.links.differ > 0 {
+                continue;
+            }
+            explained.remarks.push(explanation.remark);
+            if !explanation.is_right {
+                explained.verdict = Verdict::Inconclusive;
+            }
+            return Ok(explained);
         }
-        explained.remarks.push(explanation.remark);
-        if !explanation.is_right {
-            explained.verdict = Verdict::Inconclusive;
-        }
-        return Ok(explained);
     }
     Ok(judged)
 }
 
-/// Judges a capture beside simulated drives with more in their header.
+/// Judges a capture beside simulated drives with more in their header, with smaller gaps between bytes sent removed.
 fn judge_as(
     capture: &Capture,
     options: &JudgeOptions<'_>,
     told: &[Told],
-    more: &Header,
+    more: (&Header, Span),
 ) -> Result<Judged, JudgeError> {
     let (model, remarks) = model(capture, options, more)?;
     let model = as_captured(&model, capture);
@@ -278,9 +327,13 @@ fn not_captured(capture: &Capture) -> String {
 fn model(
     capture: &Capture,
     options: &JudgeOptions<'_>,
-    more: &Header,
+    (more, tolerance): (&Header, Span),
 ) -> Result<(Capture, Vec<String>), JudgeError> {
-    let text = scenario_with(capture, options, more)?;
+    let options = JudgeOptions {
+        tolerance,
+        ..options.clone()
+    };
+    let text = scenario_with(capture, &options, more)?;
     let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
     let entry = Entry::new(source, None)?;
     let Some(plan) = &entry.plan else {

@@ -9,6 +9,7 @@ use crate::buses::novobus::language::syntax::{
 use crate::capture::Capture;
 use crate::scenario::pattern::{Expected, Pattern};
 use harness_proto::nd21::{ee, ram};
+use std::collections::BTreeSet;
 
 /// `EE_selftest` with bit 7: time-out monitoring (ND21 14.3.6).
 const MONITORING: u8 = 0x80;
@@ -43,7 +44,7 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
     if capture.bytes() > MOST_BYTES {
         return Vec::new();
     }
-    let monitoring = monitoring(capture, told);
+    let monitoring = in_eeprom(capture, |ring, drive| !says(told, ring, drive));
     let with = |choice: &Choice, more: &Header, words: &str| Explanation {
         header: choice.in_all(capture.traces.len()).and(more),
         is_right: false,
@@ -60,31 +61,60 @@ pub(super) fn explanations(capture: &Capture, told: &[Told]) -> Vec<Explanation>
         .iter()
         .map(|choice| with(choice, &monitoring, " with time-out monitoring"));
     let whole = Header::whole(capture.traces.len());
+    // What a reset loads was written to the EEPROM before.
+    let reset: BTreeSet<(usize, u8)> = told
+        .iter()
+        .enumerate()
+        .flat_map(|(ring, own)| own.resets.iter().map(move |(_, drive)| (ring, *drive)))
+        .collect();
+    let until_then = reset
+        .iter()
+        .filter(|(ring, drive)| !says(told, *ring, *drive));
+    let until_then: Header = until_then
+        .map(|(ring, drive)| {
+            let flags = SetupKind::Memory(CellPlace::at(ram::FLAGS2), byte(0));
+            Setup::new(DriveRange::one(*ring, *drive), flags)
+        })
+        .collect();
+    let loads = in_eeprom(capture, |ring, drive| reset.contains(&(ring, drive)));
+    let loads = whole.and(&loads).and(&until_then);
     [
         Explanation::right(monitoring.clone(), "monitor time-outs (ND21 9.9, 14.10.2)"),
         Explanation::right(whole, "be whole ND21s, with their EEPROM (ND21 14.2.2)"),
     ]
     .into_iter()
+    .chain((!reset.is_empty()).then(|| {
+        Explanation::right(
+            loads,
+            "load time-out monitoring from their EEPROM at the reset (ND21 10.5, 14.3.6)",
+        )
+    }))
     .chain(plain)
     .chain(monitored)
     .collect()
 }
 
-/// Monitoring in each drive that did not report whether it monitors.
-fn monitoring(capture: &Capture, told: &[Told]) -> Header {
-    let on = || Written::Bytes(Pattern::of(&[Expected::Byte(MONITORING)], usize::MAX));
+/// Whether a drive has reported whether it monitors.
+fn says(told: &[Told], ring: usize, drive: u8) -> bool {
+    let told = told.get(ring);
+    told.is_some_and(|told| told.cells.contains_key(&(drive, ram::FLAGS2)))
+}
+
+fn byte(value: u8) -> Written {
+    Written::Bytes(Pattern::of(&[Expected::Byte(value)], usize::MAX))
+}
+
+/// Monitoring in the EEPROM of these drives. What a drive reported of its RAM holds until a reset.
+fn in_eeprom(capture: &Capture, of: impl Fn(usize, u8) -> bool) -> Header {
     let rings = capture.traces.iter().enumerate();
     let drives =
         rings.flat_map(|(ring, trace)| (0..trace.stations).map(move |drive| (ring, drive)));
-    let says = |ring: usize, drive: u8| {
-        let told = told.get(ring);
-        told.is_some_and(|told| told.cells.contains_key(&(drive, ram::FLAGS2)))
-    };
     drives
-        .filter(|(ring, drive)| !says(*ring, *drive))
+        .filter(|(ring, drive)| of(*ring, *drive))
         .map(|(ring, drive)| {
             let place = CellPlace::in_eeprom(ee::SELFTEST);
-            Setup::new(DriveRange::one(ring, drive), SetupKind::Eeprom(place, on()))
+            let on = SetupKind::Eeprom(place, byte(MONITORING));
+            Setup::new(DriveRange::one(ring, drive), on)
         })
         .collect()
 }

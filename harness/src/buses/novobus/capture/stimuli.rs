@@ -29,8 +29,8 @@ pub(crate) struct Told {
     /// (ND21 9.4), and data of cells that were written and that a drive may write itself or may have lost in a silence, without its supply
     /// (14.2), or that a reset may have changed (10.5), with their checking bytes.
     pub(crate) own: BTreeSet<usize>,
-    /// When the bytes of each ResetH8 were sent (10.5).
-    pub(crate) resets: Vec<Instant>,
+    /// When the bytes of each ResetH8 were sent, and to which drive (10.5).
+    pub(crate) resets: Vec<(Instant, u8)>,
 }
 
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
@@ -53,13 +53,19 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .filter(|(role, (_, (byte, _)))| !(*role == Role::Idle && *byte == PAUSE))
         .map(|(role, (at, _))| Asked { role, at: *at })
         .collect();
-    let is_reset = |own: &&Asked| matches!(own.role, Role::Command { section: RESET, .. });
+    let reset = |own: &Asked| match own.role {
+        Role::Command {
+            section: RESET,
+            drive,
+        } => Some((own.at, drive?)),
+        _ => None,
+    };
     let mut told = Told {
-        resets: asked.iter().filter(is_reset).map(|own| own.at).collect(),
+        resets: asked.iter().filter_map(reset).collect(),
         ..Told::default()
     };
     for link in trace.channels.iter().filter(|link| link.from.is_some()) {
-        let own = of_link(link, &asked);
+        let own = of_link(link, &asked, size.drives());
         let last = link.to.is_none();
         for (cell, value) in own.cells {
             // A drive's own link tells of it what no later link can have damaged.
@@ -84,6 +90,22 @@ struct Asked {
     at: Instant,
 }
 
+/// In such a silence of the master's every byte has come back, also at the lowest rate from the largest ring.
+const QUIET: Span = Span::from_millis(20);
+const QUIET_A_DRIVE: Span = Span::from_micros(1_200);
+
+/// Where the bytes behind each silence of the master's begin, where fewer bytes came than were sent: those in front of it that are missing do
+/// not come any more.
+fn behind_silences(asked: &[Asked], came: usize, stations: u8) -> Vec<(Instant, usize)> {
+    if came >= asked.len() {
+        return Vec::new();
+    }
+    let quiet = QUIET + QUIET_A_DRIVE * u64::from(stations);
+    let pairs = asked.windows(2).enumerate();
+    let behind = pairs.filter(|(_, two)| two[1].at.since(two[0].at) > quiet);
+    behind.map(|(place, two)| (two[1].at, place + 1)).collect()
+}
+
 /// Where the bytes behind each whole check sequence begin, with the time at which it had been sent.
 fn behind_sequences(asked: &[Asked]) -> Vec<(Instant, usize)> {
     let in_sequence = |own: Option<&Asked>| own.is_some_and(|own| own.role == Role::CheckSequence);
@@ -104,9 +126,10 @@ fn behind(sequences: &[(Instant, usize)], beside: usize, at: Instant) -> usize {
 }
 
 /// Reads a link beside what was asked. What comes back stands beside what was asked until bytes are lost or drives send zeros unasked (9.9);
-/// a whole check sequence ends that (9.8).
-fn of_link(link: &Channel, asked: &[Asked]) -> Told {
+/// a whole check sequence ends that (9.8), and where bytes were lost, a silence of the master's.
+fn of_link(link: &Channel, asked: &[Asked], stations: u8) -> Told {
     let sequences = behind_sequences(asked);
+    let silences = behind_silences(asked, link.octets().len(), stations);
     let mut reader = Reader {
         told: Told::default(),
         own: link.from.filter(|_| link.to.is_some()),
@@ -135,6 +158,9 @@ fn of_link(link: &Channel, asked: &[Asked]) -> Told {
         {
             reader.maybe_restarted();
         }
+        let silent = silences.partition_point(|(sent, _)| *sent < at);
+        let silent = silences.get(silent.wrapping_sub(1));
+        beside = silent.map_or(beside, |own| beside.max(own.1));
         let role = asked.get(beside).map_or(Role::Foreign, |own| own.role);
         beside += 1;
         if watch.see(byte.byte, byte.error.is_none()) == SequenceProgress::Complete {
