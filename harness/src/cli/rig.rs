@@ -35,7 +35,7 @@ pub enum RigCommand {
     /// Measures how long a byte takes round the ring. The drives stay as they are. The exit code is 3 if something differs from the
     /// rig's file.
     Check(CheckRigArguments),
-    /// Print a block for a rig's file for each serial port; opens no port.
+    /// Print a block for a rig's file for each serial port and CAN interface; opens none.
     Scan,
     /// Reserve a rig until `rig unlock`; other users get exit code 75.
     Lock {
@@ -131,11 +131,14 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
         RigCommand::Schema => format!("{:#}\n", schema()),
         RigCommand::Scan => {
             let ports = scan::scan(Path::new("/"));
-            if ports.is_empty() {
-                let message = "this machine has no serial port; plug the adapter in and try again";
+            let interfaces = scan::interfaces(Path::new("/"));
+            if ports.is_empty() && interfaces.is_empty() {
+                let message = "this machine has no serial port and no CAN interface; plug the adapter in and try again";
                 return Err(Failure::Said(Exit::NothingSelected, message.to_owned()));
             }
-            scan::propose(&ports)
+            let between = if ports.is_empty() { "" } else { "\n" };
+            let interfaces = scan::propose_interfaces(&interfaces);
+            scan::propose(&ports) + between + &interfaces
         }
         RigCommand::Lock { rig, purpose } => {
             let rig = find(rig)?;

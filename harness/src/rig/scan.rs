@@ -1,4 +1,4 @@
-//! The serial ports of this machine, and what udev says of each.
+//! The serial ports of this machine, with what udev says of each, and its CAN interfaces.
 //!
 //! Linux tells it in files: `/sys/class/tty/*` has the ports, `/run/udev/data/c4:64` the keys of the port with
 //! these numbers. Nothing is opened, so that no port is disturbed.
@@ -114,6 +114,24 @@ pub fn scan(root: &Path) -> Vec<FoundPort> {
     ports
 }
 
+/// The CAN interfaces of the machine whose files stand under `root`.
+#[must_use]
+pub fn interfaces(root: &Path) -> Vec<String> {
+    // ARPHRD_CAN of `linux/if_arp.h`.
+    let is_can = |folder: &Path| {
+        std::fs::read_to_string(folder.join("type")).is_ok_and(|kind| kind.trim() == "280")
+    };
+    let entries = std::fs::read_dir(root.join("sys/class/net"));
+    let entries = entries.into_iter().flatten().take(MAX_PORTS);
+    let mut names: Vec<_> = entries
+        .filter_map(Result::ok)
+        .filter(|entry| is_can(&entry.path()))
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect();
+    names.sort_by_key(|name| natural(Path::new(name)));
+    names
+}
+
 /// ttyUSB2 before ttyUSB10.
 fn natural(device: &Path) -> (String, u32) {
     let name = device.display().to_string();
@@ -179,8 +197,7 @@ pub fn propose(ports: &[FoundPort]) -> String {
             "{gap}# {device}{model}\n[ring.1]\ndrives = 1                      # how many there are\n\
              transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n"
         );
-        let at_slcan = |bus: &PortBus| bus.adapters().contains(&"slcan");
-        for bus in PortBus::ALL.into_iter().filter(at_slcan) {
+        for bus in with_adapter("slcan") {
             let _infallible = write!(
                 text,
                 "# Or, if it is an SLCAN adapter, in a file with schema = 2:\n# [port.1]\n# bus = {}\n# slcan = {}\n# drives = [{{ node = 1 }}]\n",
@@ -190,6 +207,29 @@ pub fn propose(ports: &[FoundPort]) -> String {
         }
     }
     text
+}
+
+/// A block of a rig file for each CAN interface.
+#[must_use]
+pub fn propose_interfaces(names: &[String]) -> String {
+    let mut text = String::new();
+    for name in names {
+        for bus in with_adapter("socketcan") {
+            let _infallible = write!(
+                text,
+                "# {name}, in a file with schema = 2:\n[port.1]\nbus = {}\nsocketcan = {}\ndrives = [{{ node = 1 }}]\n",
+                quoted(bus.name()),
+                quoted(name)
+            );
+        }
+    }
+    text
+}
+
+/// The buses that are reached by an adapter of this kind.
+fn with_adapter(kind: &'static str) -> impl Iterator<Item = PortBus> {
+    let has = move |bus: &PortBus| bus.adapters().contains(&kind);
+    PortBus::ALL.into_iter().filter(has)
 }
 
 fn quoted(text: &str) -> String {

@@ -419,6 +419,14 @@ fn tree() -> tempfile::TempDir {
         put(&format!("sys/class/tty/{name}/dev"), &format!("{dev}\n"));
     };
     put("sys/class/tty/tty1/dev", "4:1\n");
+    for (name, kind) in [
+        ("can10", "280"),
+        ("vcan2", "280"),
+        ("can2", "280"),
+        ("lo", "772"),
+    ] {
+        put(&format!("sys/class/net/{name}/type"), &format!("{kind}\n"));
+    }
     tty("ttyS0", "4:64");
     put("sys/class/tty/ttyS0/type", "0\n");
     tty("ttyS1", "4:65");
@@ -475,6 +483,14 @@ fn scan_finds_ports_and_what_udev_says_of_them() {
         scan::resolve(&ports, &[("ID_PATH".to_owned(), "x".to_owned())].into()).expect_err("none");
     assert!(none.to_string().contains("none of /dev/ttyS1"), "{none}");
     assert!(scan::scan(Path::new("/no/such/folder")).is_empty());
+    let names = scan::interfaces(root.path());
+    assert_eq!(names, ["can2", "can10", "vcan2"]);
+    let text = scan::propose_interfaces(&names[..1]);
+    let can = good(&format!("schema = 2\n[rig]\nid = \"new\"\n{text}"));
+    assert!(
+        can.port()
+            .is_some_and(|port| port.socketcan.as_deref() == Some("can2"))
+    );
 }
 
 fn program(folder: &Path, arguments: &[&str]) -> (Output, String) {
