@@ -14,6 +14,11 @@ const LONGEST: usize = 65_536;
 /// Something that was written is not read back.
 pub fn import(data: &[u8]) {
     let data = &data[..data.len().min(LONGEST)];
+    // What the kernel says of a CAN interface, and a frame of one.
+    let _any = harness_socketcan::State::parse(data);
+    if let Some(frame) = data.first_chunk() {
+        harness_socketcan::decode(frame, &mut |_| {});
+    }
     // The user may say what a channel or an interface is.
     for link in ["bus", "1->0=0"] {
         let settings = ReadSettings {

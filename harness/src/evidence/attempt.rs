@@ -189,6 +189,9 @@ pub(super) fn again_on_segment(
     let mut judged = judge.judge(&source, &recorded.events)?;
     let unplaced = recorded.verdict.as_ref().map_or(0, |own| own.unplaced);
     judged.outcome.unplaced(unplaced);
+    if unplaced > 0 {
+        judge.doubt();
+    }
     let (other, made) = match &judged.played {
         Some((events, traces)) => (
             first_difference(&recorded.events, events),

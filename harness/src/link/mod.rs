@@ -322,11 +322,16 @@ pub trait PortLink: Link {
     /// No file descriptor is left.
     fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>>;
 
-    /// Allows sending again after an interruption, so that a safe state can be reached. Other trouble stays.
+    /// Allows sending again after an interruption, or at an interface that is back, so that a safe state can be reached. Other trouble stays.
     fn resume(&mut self);
 
     /// Number of line errors since the last call that the transport reported without their byte.
     fn take_unplaced(&mut self) -> u64;
+
+    /// The same of reports that do not say whether something was lost.
+    fn take_doubtful(&mut self) -> u64 {
+        0
+    }
 
     /// Every time that the parity of a port was switched, to send a byte with a wrong parity bit.
     fn take_switches(&mut self) -> Vec<Switch>;

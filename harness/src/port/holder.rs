@@ -15,6 +15,21 @@ pub struct OtherProgram {
     program: String,
 }
 
+impl OtherProgram {
+    fn of(pid: u32) -> Option<Self> {
+        let program = std::fs::read_to_string(format!("/proc/{pid}/comm")).ok()?;
+        let program = program.trim_end().to_owned();
+        Some(Self { pid, program })
+    }
+
+    /// The process that listens at the other end.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn behind(end: impl AsFd) -> Option<Self> {
+        let peer = rustix::net::sockopt::socket_peercred(end).ok()?;
+        Self::of(peer.pid.as_raw_nonzero().get().try_into().ok()?)
+    }
+}
+
 impl fmt::Display for OtherProgram {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, process {}", self.program, self.pid)
@@ -35,10 +50,7 @@ pub(super) fn holder(path: &Path) -> Option<OtherProgram> {
         let mut files = files.into_iter().flatten().filter_map(Result::ok);
         files.any(|file| std::fs::read_link(file.path()).is_ok_and(|to| to == path))
     };
-    let pid = pids.into_iter().find(has_it)?;
-    let program = std::fs::read_to_string(format!("/proc/{pid}/comm")).ok()?;
-    let program = program.trim_end().to_owned();
-    Some(OtherProgram { pid, program })
+    OtherProgram::of(pids.into_iter().find(has_it)?)
 }
 
 /// Refuses a port that another program has locked (flock, as pyserial's `exclusive`; TIOCEXCL, which lets root in all the same), or that

@@ -6,7 +6,7 @@
 
 use super::check::Rig;
 use super::state::{self, Holder};
-use crate::port::is_exclusive;
+use crate::port::{OtherProgram, is_exclusive};
 use crate::regular::{self, Links};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
@@ -302,6 +302,9 @@ pub enum PortLockError {
         /// How this was detected: `flock` or `TIOCEXCL`.
         how: &'static str,
     },
+    /// Another process has its interface.
+    #[error("the interface is in use by another program{}", .0.iter().map(|own| format!(": {own}")).collect::<String>())]
+    Other(Option<OtherProgram>),
     /// The system refused.
     #[error("failed to lock the port: {0}")]
     Io(#[from] io::Error),
@@ -342,6 +345,34 @@ impl PortLock {
         rustix::termios::ioctl_tiocexcl(&lock.port).map_err(io::Error::from)?;
         lock.exclusive = true;
         Ok(lock)
+    }
+}
+
+impl PortLock {
+    /// Locks a CAN interface, which is no file: by a name that the kernel keeps for this network namespace, as it does those of interfaces.
+    ///
+    /// # Errors
+    /// Another program of ours has it, which is named where the kernel shows it; or the system refused.
+    #[cfg(target_os = "linux")]
+    pub fn of_interface(name: &str) -> Result<Self, PortLockError> {
+        use std::os::linux::net::SocketAddrExt;
+        use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
+        let address = SocketAddr::from_abstract_name(format!("drivebench/{name}"))?;
+        let port = match UnixListener::bind_addr(&address) {
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
+                let other = UnixStream::connect_addr(&address).ok();
+                return Err(PortLockError::Other(other.and_then(OtherProgram::behind)));
+            }
+            other => other?.into(),
+        };
+        let exclusive = false;
+        Ok(Self { port, exclusive })
+    }
+
+    /// Other systems have no CAN interfaces.
+    #[cfg(not(target_os = "linux"))]
+    pub fn of_interface(_name: &str) -> Result<Self, PortLockError> {
+        Err(PortLockError::Io(io::ErrorKind::Unsupported.into()))
     }
 }
 

@@ -34,8 +34,7 @@ pub struct Port {
     /// The bus of the socketcand server; default `can0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// A CAN interface of the Linux kernel, such as `can0`, in builds with the feature `socketcan`. Its rate and listen-only are set by
-    /// `ip link`. Never tried on a kernel with CAN.
+    /// A CAN interface of the Linux kernel, such as `can0`. Its rate and listen-only are set by `ip link`, and have to be those of this file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub socketcan: Option<String>,
     /// A serial adapter of a line of octets: a device such as `/dev/ttyUSB0`, or a pseudo terminal.

@@ -212,6 +212,12 @@ impl<D: PortDrives> PortSession<D> {
         ports.map_or(0, |ports| ports.take_unplaced())
     }
 
+    /// The same, and what may have been lost.
+    pub(crate) fn take_doubtful(&mut self) -> u64 {
+        let ports = self.link.inner_mut().ports_mut();
+        ports.map_or(0, |ports| ports.take_unplaced() + ports.take_doubtful())
+    }
+
     /// Whether it has been used for longer than its file allows.
     #[must_use]
     pub fn overdue(&self) -> bool {
@@ -363,9 +369,19 @@ pub(crate) fn patience(port: &Port) -> Span {
 /// # Errors
 /// It is in use.
 pub(crate) fn lock(rig: &Rig, place: &str, port: impl AsFd) -> Result<PortLock, SessionError> {
-    let lock = PortLock::acquire(port);
+    locked(rig, place, PortLock::acquire(port))
+}
+
+/// The lock of a place, or an error about it.
+pub(crate) fn locked(
+    rig: &Rig,
+    place: &str,
+    lock: Result<PortLock, PortLockError>,
+) -> Result<PortLock, SessionError> {
     lock.map_err(|error| match error {
-        PortLockError::Busy { .. } => in_use(rig, &format!("{place}: {error}")),
+        PortLockError::Busy { .. } | PortLockError::Other(_) => {
+            in_use(rig, &format!("{place}: {error}"))
+        }
         PortLockError::Io(_) => failed(rig, &format!("{place}: {error}")),
     })
 }

@@ -126,9 +126,15 @@ pub(crate) fn capture(arguments: &CaptureArguments, output: &mut Output) -> io::
             return Ok(exit);
         }
     };
+    let serial = arguments.tap.iter().any(TapAt::is_serial);
     output.say(&format!(
-        "listening at {}; the program sends nothing. DTR and RTS rise when a port is opened: leave TX and RTS unwired\n",
-        counted(arguments.tap.len(), "tap")
+        "listening at {}; the program sends nothing{}\n",
+        counted(arguments.tap.len(), "tap"),
+        if serial {
+            ". DTR and RTS rise when a port is opened: leave TX and RTS unwired"
+        } else {
+            ""
+        }
     ));
     while !stop.load(Ordering::Relaxed) && !session.is_over() {
         let heard = match session.step(new_file.swap(false, Ordering::Relaxed)) {

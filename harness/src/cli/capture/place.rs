@@ -45,6 +45,17 @@ impl fmt::Display for TapPort {
 }
 
 impl TapAt {
+    /// Whether its port has modem lines.
+    pub(super) const fn is_serial(&self) -> bool {
+        !matches!(
+            self.port,
+            TapPort::Frames(
+                AdapterPlace::Kernel { .. } | AdapterPlace::Socketcand { .. },
+                _
+            )
+        )
+    }
+
     /// The interface of the capture; `rate` is that of rings.
     pub(super) fn place(&self, rate: Rate) -> RecordedPlace {
         let (carries, bits_per_second) = match &self.port {

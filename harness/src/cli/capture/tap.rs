@@ -6,8 +6,11 @@ use crate::buses::{TelegramCutter, live_text, sender_of};
 use crate::capture::live::LiveText;
 use crate::capture::{AWAY, Piece, RecordedPlace};
 use crate::cli::exit::Exit;
+use crate::counted::counted;
 use crate::link::Line as _;
-use crate::link::frames::{AdapterError, AdapterPlace, AdapterSettings, FrameLink, Listening};
+use crate::link::frames::{
+    AdapterError, AdapterPlace, AdapterSettings, FrameLink, Listening, Reports,
+};
 use crate::medium;
 use crate::port::{Counts, OpenError, SilentTap, TapState};
 use crate::trouble::Trouble;
@@ -76,6 +79,8 @@ pub(super) struct Tap {
     last: u64,
     pub(super) pieces: u64,
     pub(super) damaged: u64,
+    /// What CAN adapters have reported beside frames and errors.
+    reports: Reports,
 }
 
 /// How a port is opened.
@@ -152,6 +157,7 @@ impl Tap {
             last: 0,
             pieces: 0,
             damaged: 0,
+            reports: Reports::default(),
         };
         own.note_listening();
         own.before = own.counts();
@@ -191,7 +197,7 @@ impl Tap {
                 let state = tap.read(&mut heard)?;
                 self.octets(now, heard, &mut pieces);
                 if state == TapState::Gone {
-                    self.leave(now, &mut pieces);
+                    self.leave(now, AWAY.to_owned(), &mut pieces);
                 }
             }
             Ear::Frames(_) => self.frames(now, &mut pieces),
@@ -269,21 +275,28 @@ impl Tap {
                 medium::Heard::Octet(_) => {}
             }
         }
-        let overruns = crate::link::PortLink::take_unplaced(&mut **link);
-        if overruns > 0 {
-            let words = "frames lost: the adapter's queue was full".to_owned();
-            pieces.push(Piece::Event(now, words));
-        }
-        let interrupted = link.trouble() == Some(&Trouble::Interrupted);
-        if !sound && !interrupted {
-            self.leave(now, pieces);
+        let reports = link.take_reports();
+        let words = losses(&reports);
+        pieces.extend(words.map(|own| Piece::Event(now, own)));
+        self.reports.add(&reports);
+        let trouble = link.trouble().cloned();
+        if !sound && trouble != Some(Trouble::Interrupted) {
+            let of_kernel = matches!(
+                self.at.port,
+                TapPort::Frames(AdapterPlace::Kernel { .. }, _)
+            );
+            let why = match trouble {
+                Some(trouble) if of_kernel => format!("frames may be lost: {trouble}"),
+                _ => AWAY.to_owned(),
+            };
+            self.leave(now, why, pieces);
         }
     }
 
-    fn leave(&mut self, now: u64, pieces: &mut Vec<Piece>) {
+    fn leave(&mut self, now: u64, why: String, pieces: &mut Vec<Piece>) {
         self.ear = Ear::Away;
         self.looked = Instant::now();
-        pieces.push(Piece::Event(now, AWAY.to_owned()));
+        pieces.push(Piece::Event(now, why));
     }
 
     /// Takes a port up again when it has come back.
@@ -348,10 +361,49 @@ impl Tap {
             TapPort::Link(_) | TapPort::Line(..) => ("bytes", "damaged"),
         };
         let text = format!(
-            "  {} at {}: {} {pieces}, {} {errors}; {silent}\n",
-            self.at.name, self.at.port, self.pieces, self.damaged
+            "  {} at {}: {} {pieces}, {} {errors}{}; {silent}\n",
+            self.at.name,
+            self.at.port,
+            self.pieces,
+            self.damaged,
+            beside(&self.reports)
         );
         (text, spoke)
+    }
+}
+
+/// Events for losses. The words mark a capture as one of which frames are missing.
+fn losses(reports: &Reports) -> impl Iterator<Item = String> {
+    let late = (reports.late > 0).then(|| {
+        let frames = counted(reports.late, "frame");
+        format!("{frames} lost: the computer read too late")
+    });
+    let [full, may_be] = [
+        (
+            reports.overruns,
+            "frames lost: the adapter's queue was full",
+        ),
+        (
+            reports.doubtful,
+            "frames may be lost: the adapter does not say which message its controller sent",
+        ),
+    ]
+    .map(|(count, words)| (count > 0).then(|| words.to_owned()));
+    [late, full, may_be].into_iter().flatten()
+}
+
+/// The same for a summary, with the messages that say nothing wrong.
+fn beside(reports: &Reports) -> String {
+    let lost = match (reports.late, reports.overruns) {
+        (0, 0) if reports.doubtful > 0 => ", some may be lost".to_owned(),
+        (0, 0) => String::new(),
+        (late, 0) => format!(", {late} lost"),
+        (0, _) => ", some lost".to_owned(),
+        (late, _) => format!(", {late} and more lost"),
+    };
+    match reports.messages {
+        0 => lost,
+        count => format!("{lost}, {count} other messages of the controller"),
     }
 }
 
@@ -375,5 +427,40 @@ const fn error_words(error: CanError) -> &'static str {
         CanError::ErrorFrame => "an error on the bus",
         CanError::NoAcknowledge => "a frame without an acknowledge",
         CanError::BusOff => "the adapter is bus-off",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every loss is an event that keeps the capture from accusing a drive, and stands in the summary.
+    #[test]
+    fn losses_are_events_and_stand_in_the_summary() {
+        let of = |late, overruns, doubtful, messages| Reports {
+            late,
+            overruns,
+            doubtful,
+            messages,
+        };
+        for (reports, events, words) in [
+            (of(0, 0, 0, 0), 0, ""),
+            (of(0, 0, 0, 9), 0, ", 9 other messages of the controller"),
+            (of(2721, 0, 0, 0), 1, ", 2721 lost"),
+            (of(2, 1, 0, 0), 2, ", 2 and more lost"),
+            (of(0, 3, 1, 0), 2, ", some lost"),
+            (
+                of(0, 0, 1, 2),
+                1,
+                ", some may be lost, 2 other messages of the controller",
+            ),
+        ] {
+            let all: Vec<_> = losses(&reports).collect();
+            assert!(
+                all.len() == events && all.iter().all(|own| own.contains(" lost: ")),
+                "{all:?}"
+            );
+            assert_eq!(beside(&reports), words);
+        }
     }
 }

@@ -1,10 +1,11 @@
 //! A client's end of SLCAN and socketcand: frames out, what is heard in, without I/O.
 
 use super::clock::AdapterClock;
-use crate::frames::slcan::{self, Report, STAMP_PERIOD, SlcanCommand, flags};
-use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest, class};
+use crate::frames::slcan::{self, STAMP_PERIOD, SlcanCommand, flags};
+use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
+use harness_socketcan::{Report, decode_error};
 use std::collections::VecDeque;
 
 /// How long an answer may take; an adapter that does not answer every command is not waited for any longer.
@@ -21,10 +22,29 @@ const MOST_UNANSWERED: usize = 4;
 pub(super) enum Event {
     /// Something on the bus, and when.
     Heard(Instant, CanEvent),
-    /// The adapter has lost frames.
+    /// This many frames are lost, since the computer read too late.
+    Late(u32),
+    /// The adapter has lost frames, and does not say how many.
     Overrun,
+    /// Something of which an adapter does not say whether frames were lost by it.
+    MayBeLost,
+    /// A message of the adapter that says nothing wrong.
+    Message,
     /// Nothing more is carried, and why.
     Ended(String),
+}
+
+impl Event {
+    /// What an interface has reported at `read`.
+    pub(super) const fn of(report: Report, read: Instant) -> Self {
+        match report {
+            Report::Heard(heard) => Self::Heard(read, heard),
+            Report::Late(count) => Self::Late(count),
+            Report::Lost => Self::Overrun,
+            Report::MayBeLost => Self::MayBeLost,
+            Report::Message => Self::Message,
+        }
+    }
 }
 
 /// A language, and the state of a conversation in it.
@@ -93,7 +113,7 @@ impl Adapter {
     pub(super) fn push(&mut self, character: u8, read: Instant) -> Vec<Event> {
         match self {
             Self::Slcan(own) => own.push(character, read),
-            Self::Socketcand(own) => own.push(character, read).into_iter().collect(),
+            Self::Socketcand(own) => own.push(character, read),
         }
     }
 }
@@ -165,25 +185,29 @@ impl Slcan {
         let Some(line) = self.lines.push(character) else {
             return Vec::new();
         };
-        let report = line.and_then(|(line, end)| Report::parse(&line, end));
+        let report = line.and_then(|(line, end)| slcan::Report::parse(&line, end));
         match report {
-            Ok(Report::Frame(frame, stamp)) => {
+            Ok(slcan::Report::Frame(frame, stamp)) => {
                 let at = stamp.map_or(read, |stamp| {
                     self.clock.at(Span::from_millis(stamp.into()), read)
                 });
                 vec![Event::Heard(at, CanEvent::Frame(frame))]
             }
-            Ok(Report::Refused) => self.refused(read),
-            Ok(Report::Flags(bits)) => {
+            Ok(slcan::Report::Refused) => self.refused(read),
+            Ok(slcan::Report::Flags(bits)) => {
                 self.answered(|command| command == SlcanCommand::Flags);
                 status(bits, read)
             }
-            Ok(Report::Done | Report::Taken { .. }) => {
+            Ok(slcan::Report::Done | slcan::Report::Taken { .. }) => {
                 self.answered(|command| command != SlcanCommand::Flags);
                 Vec::new()
             }
             // Answers to commands of the opening, and lines that only some adapters have.
-            Ok(Report::Version(_) | Report::SerialNumber(_) | Report::Other(_)) => Vec::new(),
+            Ok(
+                slcan::Report::Version(_)
+                | slcan::Report::SerialNumber(_)
+                | slcan::Report::Other(_),
+            ) => Vec::new(),
             Err(error) => vec![Event::Ended(error.to_string())],
         }
     }
@@ -241,42 +265,36 @@ impl Socketcand {
         }
     }
 
-    fn push(&mut self, character: u8, read: Instant) -> Option<Event> {
-        let answer = self.messages.push(character)?;
+    fn push(&mut self, character: u8, read: Instant) -> Vec<Event> {
+        let Some(answer) = self.messages.push(character) else {
+            return Vec::new();
+        };
         let answer = answer.and_then(|message| SocketcandAnswer::parse(&message));
-        let heard = match answer {
+        match answer {
             Ok(SocketcandAnswer::Frame(frame, stamp)) => {
                 let since = Span::from_micros(
                     (stamp.seconds % SECONDS) * 1_000_000 + u64::from(stamp.micros),
                 );
-                return Some(Event::Heard(
-                    self.clock.at(since, read),
-                    CanEvent::Frame(frame),
-                ));
+                let at = self.clock.at(since, read);
+                vec![Event::Heard(at, CanEvent::Frame(frame))]
             }
-            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::BUS_OFF != 0 => {
-                CanError::BusOff
+            Ok(SocketcandAnswer::ErrorFrame(bits, _)) => {
+                let mut events = Vec::new();
+                decode_error(bits, None, &mut |own| events.push(Event::of(own, read)));
+                events
             }
-            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::NO_ACKNOWLEDGE != 0 => {
-                CanError::NoAcknowledge
-            }
-            Ok(SocketcandAnswer::ErrorFrame(bits, _)) if bits & class::RESTARTED != 0 => {
-                return None;
-            }
-            Ok(SocketcandAnswer::ErrorFrame(..)) => CanError::ErrorFrame,
             Ok(SocketcandAnswer::Hi | SocketcandAnswer::Ok | SocketcandAnswer::Echo) => {
                 self.echo = false;
-                return None;
+                Vec::new()
             }
-            Ok(SocketcandAnswer::Error(_)) if std::mem::take(&mut self.echo) => return None,
+            Ok(SocketcandAnswer::Error(_)) if std::mem::take(&mut self.echo) => Vec::new(),
             Ok(SocketcandAnswer::Error(text)) => {
-                return Some(Event::Ended(format!(
+                vec![Event::Ended(format!(
                     "the server of socketcand reports: {text}"
-                )));
+                ))]
             }
-            Err(error) => return Some(Event::Ended(error.to_string())),
-        };
-        Some(Event::Heard(read, CanEvent::Error(heard)))
+            Err(error) => vec![Event::Ended(error.to_string())],
+        }
     }
 }
 
@@ -388,7 +406,7 @@ mod tests {
         );
         let errors = events(
             &mut own,
-            "< error 040 1.0 >< error 020 1.0 >< error 088 1.0 >< error 100 1.0 >",
+            "< error 040 1.0 >< error 020 1.0 >< error 088 1.0 >< error 100 1.0 >< error 002 1.0 >< error 004 1.0 >",
             at(9),
         );
         let error = |error| Event::Heard(at(9), CanEvent::Error(error));
@@ -397,7 +415,11 @@ mod tests {
             [
                 error(CanError::BusOff),
                 error(CanError::NoAcknowledge),
-                error(CanError::ErrorFrame)
+                error(CanError::ErrorFrame),
+                Event::Message,
+                Event::Message,
+                // The language does not carry whether the controller's memory was full.
+                Event::MayBeLost,
             ]
         );
         // A server without `echo`.

@@ -1,5 +1,4 @@
-//! Frames over a CAN adapter in real time: SLCAN behind a serial port, a pseudo terminal or a socket, socketcand, and, with the feature
-//! `socketcan`, an interface of Linux.
+//! Frames over a CAN adapter in real time: SLCAN behind a serial port, a pseudo terminal or a socket, socketcand, and an interface of Linux.
 //!
 //! Time is the computer's monotonic clock. A frame is stamped by the adapter where it has stamps, and with the time of reading where it
 //! has none. When a frame of the bench itself was on the bus is not reported by either language: it counts as sent as soon as the bus can
@@ -43,6 +42,28 @@ pub(crate) const SLACK: Span = Span::from_millis(30);
 /// The longest sleep: a request to end is looked for at least this often.
 const NAP: Span = Span::from_millis(50);
 
+/// What an adapter reports beside frames and errors, counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Reports {
+    /// Frames lost since the computer read too late.
+    pub(crate) late: u64,
+    /// Losses of which the adapter does not say how many frames.
+    pub(crate) overruns: u64,
+    /// Messages of which the adapter does not say whether frames were lost.
+    pub(crate) doubtful: u64,
+    /// Messages that say nothing wrong: lost arbitration, back in the state error-active.
+    pub(crate) messages: u64,
+}
+
+impl Reports {
+    pub(crate) const fn add(&mut self, more: &Self) {
+        self.late += more.late;
+        self.overruns += more.overruns;
+        self.doubtful += more.doubtful;
+        self.messages += more.messages;
+    }
+}
+
 /// A link over a CAN adapter, with one port.
 #[derive(Debug)]
 pub struct FrameLink {
@@ -71,7 +92,7 @@ pub struct FrameLink {
     /// Frames in the log at most.
     most_recorded: usize,
     carried: u64,
-    unplaced: u64,
+    reports: Reports,
     interrupt: Arc<AtomicBool>,
     beats: Arc<AtomicU64>,
     trouble: Option<Trouble>,
@@ -90,12 +111,23 @@ impl FrameLink {
     ) -> Result<Self, AdapterError> {
         wake_on_time();
         let (transport, listening) = open::open(settings, &interrupt)?;
+        let mut own = Self::over(transport, settings, senders, interrupt);
+        own.listening = listening;
+        Ok(own)
+    }
+
+    fn over(
+        transport: Box<dyn Transport>,
+        settings: &AdapterSettings,
+        senders: Vec<(can::Id, u8)>,
+        interrupt: Arc<AtomicBool>,
+    ) -> Self {
         let now = time::Instant::now();
-        Ok(Self {
+        Self {
             transport,
             rate: settings.rate,
             listen_only: settings.listen_only,
-            listening,
+            listening: Listening::MayAcknowledge,
             senders,
             tolerance: SLACK,
             start: now,
@@ -109,11 +141,11 @@ impl FrameLink {
             log: Vec::new(),
             most_recorded: MOST_RECORDED,
             carried: 0,
-            unplaced: 0,
+            reports: Reports::default(),
             interrupt,
             beats: Arc::default(),
             trouble: None,
-        })
+        }
     }
 
     /// Sets how exact its times are; 30 ms at first.
@@ -124,6 +156,11 @@ impl FrameLink {
     /// What is known of the adapter's acknowledgements.
     pub(crate) const fn listening(&self) -> Listening {
         self.listening
+    }
+
+    /// What the adapter has reported since the last call.
+    pub(crate) fn take_reports(&mut self) -> Reports {
+        std::mem::take(&mut self.reports)
     }
 
     /// Keeps no trace from now on: a capture takes what is received.
@@ -206,7 +243,10 @@ impl FrameLink {
         for event in events {
             match event {
                 Event::Heard(at, heard) => self.hear(at - begun, heard),
-                Event::Overrun => self.unplaced += 1,
+                Event::Late(count) => self.reports.late += u64::from(count),
+                Event::Overrun => self.reports.overruns += 1,
+                Event::MayBeLost => self.reports.doubtful += 1,
+                Event::Message => self.reports.messages += 1,
                 Event::Ended(why) => {
                     let why = format!("{}: {why}", self.transport.name());
                     self.end(Trouble::Lost(why));
@@ -229,6 +269,10 @@ impl FrameLink {
                 let from = from.map_or(0, |(_, drive)| *drive);
                 let start = at - self.rate.time_of(frame.wire_bits());
                 self.keep(Some(from), start, at, frame);
+            }
+            // Until the kernel has restarted it, it hears nothing.
+            can::CanEvent::Error(CanError::BusOff) if self.transport.restarts() => {
+                self.reports.overruns += 1;
             }
             can::CanEvent::Error(CanError::BusOff) => {
                 let why = format!(
@@ -412,14 +456,20 @@ impl PortLink for FrameLink {
     }
 
     fn resume(&mut self) {
-        if self.trouble == Some(Trouble::Interrupted) {
-            self.trouble = None;
-            self.interrupt = Arc::default();
+        match self.trouble {
+            Some(Trouble::Interrupted) => self.interrupt = Arc::default(),
+            Some(Trouble::Lost(_)) if self.transport.revive() => {}
+            _ => return,
         }
+        self.trouble = None;
     }
 
     fn take_unplaced(&mut self) -> u64 {
-        std::mem::take(&mut self.unplaced)
+        std::mem::take(&mut self.reports.late) + std::mem::take(&mut self.reports.overruns)
+    }
+
+    fn take_doubtful(&mut self) -> u64 {
+        std::mem::take(&mut self.reports.doubtful)
     }
 
     fn take_switches(&mut self) -> Vec<Switch> {

@@ -32,7 +32,7 @@ pub enum AdapterPlace {
         /// The bus, such as `can0`.
         channel: String,
     },
-    /// An interface of Linux's SocketCAN, in builds with the feature `socketcan`. Never tried on a kernel with CAN.
+    /// An interface of Linux's SocketCAN.
     Kernel {
         /// Its name, such as `can0`.
         interface: String,
@@ -98,7 +98,8 @@ impl fmt::Display for AdapterPlace {
 pub struct AdapterSettings {
     /// The adapter.
     pub place: AdapterPlace,
-    /// The rate of the bus. A server of socketcand and an interface of the kernel have a rate of their own, which is not changed.
+    /// The rate of the bus. A server of socketcand and an interface of the kernel have a rate of their own, which is not changed; that of
+    /// an interface has to be this one.
     pub rate: BitRate,
     /// Whether the adapter sends nothing: with SLCAN not even acknowledges.
     pub listen_only: bool,
@@ -164,12 +165,9 @@ pub enum AdapterError {
          kbit/s"
     )]
     Rate(BitRate),
-    /// The program has no interfaces of the kernel.
-    #[error(
-        "{0}: this program is built without CAN interfaces of the kernel; build it with `cargo build --profile installed --features socketcan`, or \
-         serve the interface with socketcand"
-    )]
-    NotBuilt(String),
+    /// An interface of the kernel cannot be used: why, and what to do.
+    #[error("{0}")]
+    Interface(String),
     /// The program was interrupted.
     #[error("interrupted")]
     Interrupted,
@@ -200,8 +198,7 @@ pub(super) fn open(
             Ok((opened, Listening::MayAcknowledge))
         }
         AdapterPlace::Kernel { interface } => {
-            let (kernel, listening) =
-                Kernel::open(interface, settings.listen_only, settings.may_acknowledge)?;
+            let (kernel, listening) = Kernel::open(interface, settings)?;
             Ok((Box::new(kernel), listening))
         }
     }

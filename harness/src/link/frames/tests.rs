@@ -524,21 +524,15 @@ fn an_interruption_ends_sending_and_can_be_taken_back() {
     assert!(matches!(stopped, Err(AdapterError::Interrupted)));
 }
 
-/// The default build has no interfaces of the kernel, and says how to get them.
-#[cfg(not(feature = "socketcan"))]
+/// What an adapter says of itself ends nothing, and only what may have been lost is doubtful.
 #[test]
-fn an_interface_of_the_kernel_needs_its_feature() {
-    let settings = AdapterSettings {
-        place: AdapterPlace::Kernel {
-            interface: "can0".to_owned(),
-        },
-        rate: BitRate::K500,
-        listen_only: true,
-        may_acknowledge: false,
-    };
-    let why = refused(&settings);
-    assert!(
-        why.contains("can0") && why.contains("--features socketcan"),
-        "{why}"
-    );
+fn ordinary_messages_disturb_nothing() {
+    let mut link = opened(&socketcand(|message| match message {
+        "< send 100 0 >" => "< error 002 18.0 >< error 004 18.0 >< frame 181 18.0 AA >",
+        _ => "< ok >",
+    }));
+    link.send(0, Out::Frames(&[frame("100#")]));
+    assert_eq!(next(&mut link), Some(can::CanEvent::Frame(frame("181#AA"))));
+    assert_eq!((link.take_unplaced(), link.take_doubtful()), (0, 1));
+    assert_eq!(link.take_reports().messages, 1);
 }

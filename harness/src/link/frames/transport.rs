@@ -35,6 +35,14 @@ pub(super) trait Transport: fmt::Debug + Send {
     fn receive(&mut self, now: Instant, events: &mut Vec<Event>) -> Result<(), Trouble>;
     /// Frames that another thread can send.
     fn last_words(&self, frames: &[Frame]) -> io::Result<Vec<LastWords>>;
+    /// Whether it goes on by itself behind bus-off.
+    fn restarts(&self) -> bool {
+        false
+    }
+    /// Takes it up again where it was lost, and is back soon.
+    fn revive(&mut self) -> bool {
+        false
+    }
 }
 
 /// A stream of characters.

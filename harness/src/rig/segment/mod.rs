@@ -150,4 +150,7 @@ pub(crate) trait SegmentJudge {
     /// # Errors
     /// The text is no scenario of this bus, in a sentence.
     fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String>;
+
+    /// Something was lost in the attempt that was judged last.
+    fn doubt(&mut self) {}
 }

@@ -54,6 +54,9 @@ pub(crate) trait PortPlayer: Sized {
     /// Waits until an attempt may begin.
     fn wait(&mut self, _own: &Self::Own, _link: &mut dyn Link) {}
 
+    /// Something was lost in the last attempt: what probes have settled by a silence in it is not known.
+    fn doubt(&mut self) {}
+
     /// One attempt over a link, with what was received before the scenario, in words.
     fn attempt(&mut self, own: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
 
@@ -183,13 +186,14 @@ impl<P: PortPlayer> PortRun<P> {
         if anew && looked && self.session.sound().is_ok() {
             self.restart();
         }
-        let _before = self.session.take_unplaced();
+        let _before = self.session.take_doubtful();
         let mut recording = Recording::new(self.session.link(), sink);
         let (mut outcome, before) = self.player.attempt(own, &mut recording);
         let traces = vec![recording.trace(0)];
+        // A link that is lost may be back at the end of the run.
         let tripped = matches!(
             self.session.guarded().trouble(),
-            Some(Trouble::Interlock(_))
+            Some(Trouble::Interlock(_) | Trouble::Lost(_))
         );
         let played = outcome.verdict != Verdict::Skipped && !anew;
         if played && tripped {
@@ -208,8 +212,15 @@ impl<P: PortPlayer> PortRun<P> {
         if outcome.verdict == Verdict::Failed && self.over.is_none() {
             self.session.hear_of_losses();
         }
-        let unplaced = self.session.take_unplaced();
+        // A pass needs every reply; what differs may be a reply that is lost.
+        let unplaced = match outcome.verdict {
+            Verdict::Passed => self.session.take_unplaced(),
+            _ => self.session.take_doubtful(),
+        };
         outcome.unplaced(unplaced);
+        if unplaced > 0 {
+            self.player.doubt();
+        }
         Attempt {
             opening: Some(before),
             unplaced,
@@ -353,6 +364,10 @@ impl<P: PortPlayer> PortJudge<P> {
 }
 
 impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
+    fn doubt(&mut self) {
+        self.player.doubt();
+    }
+
     fn segments(&self) -> [OnSegment; 2] {
         [true, false].map(|motion| P::segment(&self.rig, motion))
     }

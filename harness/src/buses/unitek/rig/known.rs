@@ -42,6 +42,8 @@ pub(super) struct Known {
     pub(super) replies: BTreeMap<u8, Reply>,
     /// The shortest time from a request to its reply, if one came later than on an idle bus.
     pub(super) reply_delay: Option<Span>,
+    /// Frames were lost while this was found out.
+    pub(super) doubtful: bool,
 }
 
 impl Known {
@@ -54,6 +56,7 @@ impl Known {
             settled: BTreeSet::new(),
             replies: BTreeMap::new(),
             reply_delay: None,
+            doubtful: false,
         }
     }
 

@@ -57,6 +57,10 @@ impl PortPlayer for Player {
         }
     }
 
+    fn doubt(&mut self) {
+        self.forget();
+    }
+
     fn shows_life(&mut self, beats: Beats) {
         self.beats = beats;
     }

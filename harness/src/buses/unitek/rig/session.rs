@@ -12,7 +12,7 @@ use crate::medium::{Heard, Pieces};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::{
-    PortDrives, PortSession, failed, lock, patience, setup_text, unopened,
+    PortDrives, PortSession, failed, lock, locked, patience, setup_text, unopened,
 };
 use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
@@ -210,6 +210,8 @@ fn adapter(
     })?;
     let device = port.slcan.as_ref().filter(|place| place.contains('/'));
     let lock = device.map(|place| lock(rig, place, link.fd()));
-    let locks = lock.transpose()?.into_iter().collect();
+    let interface = port.socketcan.as_ref();
+    let interface = interface.map(|name| locked(rig, name, PortLock::of_interface(name)));
+    let locks = lock.or(interface).transpose()?.into_iter().collect();
     Ok((Ends::Ports(Box::new(link)), locks))
 }

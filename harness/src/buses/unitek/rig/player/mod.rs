@@ -153,6 +153,12 @@ impl Player {
         self.qualifies = true;
     }
 
+    /// Reads and probes the drives again before the next scenario. What they hold stays known until then, to be set back.
+    pub(super) fn forget(&mut self) {
+        let drives = self.known.iter_mut().flatten();
+        drives.for_each(|known| known.doubtful = true);
+    }
+
     /// What may be done.
     pub(super) const fn limits(&self) -> &Limits {
         &self.limits

@@ -42,6 +42,12 @@ impl Player {
     /// The same of one drive.
     fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<(), Error> {
         let axes = [known.axis];
+        if known.doubtful {
+            *known = Known {
+                first: std::mem::take(&mut known.first),
+                ..Known::new(known.axis)
+            };
+        }
         let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
         if known.cells.is_empty() {
             known.read_all(&mut driver)?;
@@ -109,5 +115,50 @@ impl Player {
             }
         }
         Ok(at_rest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::buses::unitek::rig::Axis;
+    use crate::buses::unitek::simulate::{Bench, Setup};
+    use harness_proto::can::BitRate;
+    use harness_proto::time::Span;
+    use harness_proto::unitek::guard::Limits;
+    use harness_proto::unitek::properties::UnknownRegister;
+
+    /// A reply that a late computer has lost is no silence of the drive (dump: an unassigned register reads FACE).
+    #[test]
+    fn what_was_found_out_while_frames_were_lost_is_found_out_again() {
+        let mut bench = Bench::new(&Setup::of(1));
+        let axis = Axis {
+            node: 1,
+            rx: 0x201,
+            tx: 0x181,
+        };
+        let patience = Span::from_millis(20);
+        let can = (Bench::CAPABILITIES.to_vec(), true);
+        let mut player = Player::of(vec![axis], BitRate::K500, patience, Limits::default(), can);
+        let mut value = |player: &mut Player, change: UnknownRegister| {
+            player
+                .learn(&mut Observed::new(&mut bench))
+                .expect("a drive");
+            let known = &mut player.known.as_mut().expect("a drive")[0];
+            std::mem::replace(&mut known.properties.unknown_register, change)
+        };
+        assert_eq!(
+            value(&mut player, UnknownRegister::Silent),
+            UnknownRegister::Face
+        );
+        assert_eq!(
+            value(&mut player, UnknownRegister::Silent),
+            UnknownRegister::Silent
+        );
+        player.forget();
+        assert_eq!(
+            value(&mut player, UnknownRegister::Face),
+            UnknownRegister::Face
+        );
     }
 }
