@@ -16,7 +16,7 @@ use crate::capture::Capture;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::{Addressing, MAX_NET_LENGTH, SyncByte};
+use harness_proto::novobus::sync::{Addressing, MAX_NET_LENGTH, PAUSE, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte, Trace};
 
@@ -127,7 +127,11 @@ fn later(octets: &[LineByte], start: Instant) -> &[LineByte] {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     /// At this time every drive was in normal mode, and nothing in front of the capture matters any more.
-    From(Instant),
+    From {
+        at: Instant,
+        /// Bytes that the master sent before had not come back by then.
+        lost: bool,
+    },
     /// A ring never does, and right drives can send what it sends.
     Never,
     /// A ring never does, and sends bytes that right drives send in no mode.
@@ -143,9 +147,16 @@ pub(super) fn shown(capture: &Capture, tolerance: Span) -> Shown {
         (!first.octets().is_empty())
             .then(|| Beginning::of((capture, tolerance), ring, (first, last)).shown())
     });
-    rings.fold(Shown::From(Instant::START), |all, own| match (all, own) {
+    let nothing = Shown::From {
+        at: Instant::START,
+        lost: false,
+    };
+    rings.fold(nothing, |all, own| match (all, own) {
         (Shown::Wrong, _) | (_, Shown::Wrong) => Shown::Wrong,
-        (Shown::From(a), Shown::From(b)) => Shown::From(a.max(b)),
+        (Shown::From { at: a, lost: b }, Shown::From { at, lost }) => Shown::From {
+            at: a.max(at),
+            lost: b || lost,
+        },
         _ => Shown::Never,
     })
 }
@@ -253,10 +264,20 @@ impl Beginning {
             .filter(|_| is_whole && self.behind_a_rest() == 0);
         let all = [address, sequence.map(|own| own.0), synco.map(|own| own.0)];
         match all.into_iter().flatten().min() {
-            Some(at) => Shown::From(at),
+            Some(at) => Shown::From {
+                at,
+                lost: self.is_lost(at),
+            },
             None if is_whole && !self.came.iter().all(|own| self.may_come(*own)) => Shown::Wrong,
             None => Shown::Never,
         }
+    }
+
+    /// Whether bytes do not come back that were sent long before this time.
+    fn is_lost(&self, at: Instant) -> bool {
+        let due = |own: &&(Instant, u8)| own.0 + self.way.1 + self.tolerance < at && own.1 != PAUSE;
+        let came = self.came.iter().take_while(|own| own.0 < at).count();
+        self.sent.iter().filter(due).count() > came
     }
 
     /// Whether right drives in any mode can send a byte: zeros and numbers of the error mode, and bytes of the master's that drives count on

@@ -118,7 +118,7 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
     let first = judged.master.first.as_ref();
     let first = first.and_then(|first| first.sides[0]).map(|byte| byte.at);
     let is_early = match shown {
-        Shown::From(at) => first.is_some_and(|first| first < at),
+        Shown::From { at, lost } => lost || first.is_some_and(|first| first < at),
         Shown::Never => true,
         Shown::Wrong => false,
     };
@@ -156,7 +156,7 @@ pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, Ju
         return Ok(judged);
     }
     let normal = match shown {
-        Shown::From(at) => starts.partition_point(|start| *start < at),
+        Shown::From { at, .. } => starts.partition_point(|start| *start < at),
         Shown::Never => starts.len(),
         Shown::Wrong => 0,
     };
