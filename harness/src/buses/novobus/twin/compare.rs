@@ -521,51 +521,5 @@ pub(crate) fn unknowable(address: u16) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::buses::novobus::link::BesideTheBus;
-    use crate::link::{Line, Octets};
-    use crate::scenario::simulate::bench;
-    use crate::scenario::source::Source;
-
-    /// ND21 14.2.1: cells that a drive changes by itself, standing or turning, are not compared.
-    #[test]
-    fn what_changes_by_itself_is_not_compared() {
-        let text = "title x\nring 1\ndrive 0 model nd21\ndrive 0 input GPIN3 GPIN5 high\nwrite-word 0 nsoll = 0400\n";
-        let source = Source {
-            name: "test".to_owned(),
-            text: text.to_owned().into(),
-        };
-        let plan = crate::library::Entry::new(source, None)
-            .expect("no mistakes")
-            .plan;
-        let mut link = bench(&plan.expect("novobus"));
-        // 9.3, 10.2: nsoll of drive 0 becomes 0400.
-        let turn = [0x8C, 0xFF, 0x63, 0x00, 0x04, 0x08, 0xFF, 0x6E];
-        let cells = |link: &crate::buses::SimulatedLink| -> Vec<(u16, Option<u8>)> {
-            (0xFD80..=0xFF7F)
-                .map(|cell| (cell, link.peek(0, 0, cell)))
-                .collect()
-        };
-        let mut changed = BTreeSet::new();
-        for sent in [&[][..], &turn] {
-            link.send_octets(0, sent);
-            link.run_until(link.now() + Span::from_millis(10));
-            let before = cells(&link);
-            for _ in 0..300 {
-                link.run_until(link.now() + Span::from_millis(1));
-                let pairs = cells(&link).into_iter().zip(&before);
-                changed.extend(pairs.filter(|(now, was)| now != *was).map(|(now, _)| now.0));
-            }
-        }
-        assert!(
-            changed.contains(&ram::CNT2) && changed.contains(&ram::LAGEIST),
-            "{changed:04X?}"
-        );
-        let compared: Vec<_> = changed
-            .iter()
-            .filter(|cell| own::kept(**cell, 0).bits == 0xFF)
-            .collect();
-        assert!(compared.is_empty(), "{compared:04X?}");
-    }
-}
+#[path = "compare_tests.rs"]
+mod tests;
