@@ -1,6 +1,7 @@
 //! Where scenarios come from: the files and folders that are named, or the built-in ones.
 
 use crate::buses::{Bus, settle};
+use crate::regular;
 use crate::scenario::parse::{self, parse};
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, nearest};
@@ -317,7 +318,8 @@ fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
         return Ok(source.clone());
     }
     let known: Vec<_> = sources.iter().map(|source| last(&source.name)).collect();
-    let remedy = match nearest(last(&wanted), &known) {
+    let near = regular::near_in_folder(name);
+    let remedy = match near.as_deref().or(nearest(last(&wanted), &known)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => containing(&wanted, &known),
     };

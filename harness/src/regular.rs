@@ -6,6 +6,9 @@ use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+/// Names of a folder that are compared with one that is not there.
+const MOST_NAMES: usize = 10_000;
+
 /// What to do about a symbolic link as the last part of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Links {
@@ -52,14 +55,52 @@ pub(crate) fn open(path: &Path, links: Links) -> io::Result<File> {
     if links == Links::Refuse && path.symlink_metadata()?.is_symlink() {
         return Err(refused("it is a symbolic link, which could lead anywhere"));
     }
-    let file = OpenOptions::new()
+    let opened = OpenOptions::new()
         .read(true)
         .custom_flags(links.flags())
-        .open(path)?;
+        .open(path);
+    let file = opened.map_err(|error| match (error.kind(), links) {
+        (io::ErrorKind::NotFound, Links::Follow) => {
+            io::Error::new(io::ErrorKind::NotFound, no_such_file(path))
+        }
+        _ => error,
+    })?;
     match file.metadata()?.is_file() {
         true => Ok(file),
         false => Err(refused("it is not a regular file")),
     }
+}
+
+/// What is said of a file that is not there: the name that was probably meant, if its folder has one.
+fn no_such_file(path: &Path) -> String {
+    let folder = folder_of(path);
+    match near_in_folder(path) {
+        Some(near) => format!("no such file; did you mean `{near}`?"),
+        None if !folder.is_dir() => {
+            format!("no such file: there is no folder {}", folder.display())
+        }
+        None => "no such file, and no similar name is in its folder".to_owned(),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|own| *own != Path::new(""));
+    folder.unwrap_or(Path::new("."))
+}
+
+/// The most similar name in the folder of a file that is not there, if one is near.
+pub(crate) fn near_in_folder(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_string_lossy().to_lowercase();
+    let names = std::fs::read_dir(folder_of(path)).ok()?.flatten();
+    let names = names.map(|own| own.file_name().to_string_lossy().into_owned());
+    let names = names.take(MOST_NAMES).map(|own| {
+        (
+            strsim::damerau_levenshtein(&wanted, &own.to_lowercase()),
+            own,
+        )
+    });
+    let far = wanted.chars().count().max(3) / 3;
+    names.filter(|own| own.0 <= far).min().map(|own| own.1)
 }
 
 /// Opens a regular file, or the pipe of a shell substitution `<(...)`, which this process has open already.
@@ -173,6 +214,24 @@ fn refused(why: &str) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_is_not_there_is_named_with_a_similar_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("Drive1.log"), "text").expect("room");
+        for (name, words) in [
+            ("drive.log", "no such file; did you mean `Drive1.log`?"),
+            (
+                "other.txt",
+                "no such file, and no similar name is in its folder",
+            ),
+            ("logs/drive.log", "no such file: there is no folder "),
+        ] {
+            let error = open_input(&folder.path().join(name)).expect_err(name);
+            assert!(error.to_string().starts_with(words), "{error}");
+            assert_eq!(error.kind(), io::ErrorKind::NotFound);
+        }
+    }
 
     #[test]
     fn only_regular_files_are_opened() {

@@ -303,8 +303,8 @@ pub(crate) struct JudgedFrames {
     pub(crate) verdict: Verdict,
     /// How many frames or telegrams of drives were compared.
     pub(crate) compared: usize,
-    /// How many replies could be compared, on a bus on which drives only reply.
-    pub(crate) replies: Option<usize>,
+    /// How many could be compared.
+    pub(crate) replies: usize,
     /// What differs, a sentence each.
     pub(crate) differences: Vec<String>,
     /// What was not compared, a sentence each.

@@ -17,6 +17,7 @@ pub(crate) mod files;
 pub mod frame_diff;
 mod frames;
 pub mod fuzz;
+pub(crate) mod gap;
 mod import;
 pub(crate) mod live;
 mod order;

@@ -8,8 +8,8 @@ use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings, diff as compare,
-    is_capture, judge, read_files, scenario,
+    Capture, CaptureError, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings,
+    diff as compare, is_capture, judge, read_files, scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -179,15 +179,13 @@ fn told(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let (count, what) = buses::counted_pieces(&capture.traces);
-    let compared = match judged.replies {
-        Some(all) => format!("{} of {} compared", judged.compared, counted(all, "reply")),
-        None => format!("{} of drives compared", judged.compared),
-    };
     output.result(&format!(
-        "{} {title}: {} in {}, {compared}\n",
+        "{} {title}: {} in {}, {} of {} compared\n",
         output.verdict(judged.verdict).trim_end_matches(' '),
         counted(count, what),
         capture.end(),
+        judged.compared,
+        counted(judged.replies, "reply"),
     ))?;
     for line in &judged.differences {
         output.result(&format!("  {line}\n"))?;
@@ -265,6 +263,11 @@ fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> O
                 output.say(&format!("  note: {note}\n"));
             }
             Some(imported)
+        }
+        // It names its file.
+        Err(error @ CaptureError::File(..)) => {
+            output.complain(&error.to_string());
+            None
         }
         Err(error) => {
             let names = paths.iter().map(|own| own.display().to_string());

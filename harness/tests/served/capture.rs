@@ -143,7 +143,7 @@ fn taps_listen_and_send_nothing() {
 }
 
 /// An SLCAN adapter: it takes the commands that open it, but for one that it refuses, and keeps all commands.
-struct SlcanAdapter {
+pub(crate) struct SlcanAdapter {
     listener: TcpListener,
     refuses: &'static str,
     told: Vec<String>,
@@ -151,7 +151,7 @@ struct SlcanAdapter {
 }
 
 impl SlcanAdapter {
-    fn new(refuses: &'static str) -> Self {
+    pub(crate) fn new(refuses: &'static str) -> Self {
         Self {
             listener: TcpListener::bind("127.0.0.1:0").expect("a port"),
             refuses,
@@ -160,12 +160,12 @@ impl SlcanAdapter {
         }
     }
 
-    fn address(&self) -> String {
+    pub(crate) fn address(&self) -> String {
         self.listener.local_addr().expect("an address").to_string()
     }
 
     /// Answers a client until it has opened the channel, or was refused.
-    fn answer(&mut self) {
+    pub(crate) fn answer(&mut self) {
         let (mut stream, _) = self.listener.accept().expect("a client");
         let mut byte = [0];
         let mut command = String::new();
@@ -191,13 +191,13 @@ impl SlcanAdapter {
         self.stream = Some(stream);
     }
 
-    fn says(&mut self, text: &str) {
+    pub(crate) fn says(&mut self, text: &str) {
         let stream = self.stream.as_mut().expect("it is open");
         stream.write_all(text.as_bytes()).expect("a client");
     }
 
     /// All that it was told until the client has gone.
-    fn end(mut self) -> Vec<String> {
+    pub(crate) fn end(mut self) -> Vec<String> {
         let mut rest = String::new();
         let stream = self.stream.as_mut().expect("it is open");
         stream.read_to_string(&mut rest).expect("a text");
@@ -487,7 +487,7 @@ fn every_bus_is_captured_by_extcap() {
         (
             "unitek",
             "unitek-dump-00-1f",
-            "11 frames in 1.778 ms, 5 of drives compared",
+            "11 frames in 1.778 ms, 5 of 5 replies compared",
         ),
         (
             "nordac",

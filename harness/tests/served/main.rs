@@ -3,6 +3,7 @@
 mod bench;
 mod capture;
 mod capture_located;
+mod capture_named;
 #[path = "../common/debian.rs"]
 mod debian;
 mod dp;

@@ -299,7 +299,7 @@ fn a_capture_is_read_by_import() {
             "sim:unitek:1",
             "1",
             "SPEED_ACTUAL",
-            "4 of drives compared",
+            "4 of 4 replies compared",
             0,
         ),
         ("sim:nordac", "8", "HIW", "replies compared", 0),

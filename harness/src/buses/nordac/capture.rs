@@ -68,7 +68,7 @@ pub(crate) fn judged(traces: &[Trace], (named, tolerance): (&[u8], Span)) -> Jud
     let mut all = JudgedFrames {
         verdict: Verdict::Passed,
         compared: 0,
-        replies: Some(0),
+        replies: 0,
         differences: Vec::new(),
         remarks: Vec::new(),
     };
@@ -76,7 +76,7 @@ pub(crate) fn judged(traces: &[Trace], (named, tolerance): (&[u8], Span)) -> Jud
     for trace in traces {
         let judged = judge(trace, named, tolerance);
         all.compared += judged.compared;
-        all.replies = all.replies.map(|own| own + judged.replies);
+        all.replies += judged.replies;
         in_doubt |= !judged.doubts.is_empty() || judged.compared < judged.replies;
         all.remarks.extend(judged.doubts);
         all.remarks.extend(judged.remarks);

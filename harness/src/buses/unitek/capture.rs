@@ -101,9 +101,8 @@ pub(crate) fn judged(
         tolerance,
     };
     let wanted = |own: &u8| named.is_empty() || named.contains(own);
-    let (mut known, mut remarks) = (BTreeSet::new(), Vec::new());
+    let mut remarks = Vec::new();
     let mut note = |own: u8| {
-        known.insert(own);
         if !wanted(&own) {
             remarks.push(format!(
                 "drive {own} is not judged: `--judge` does not name it"
@@ -137,11 +136,12 @@ pub(crate) fn judged(
         )
     };
     remarks.extend(judged.remarks);
-    let missing = named.iter().filter(|own| !known.contains(own));
+    let missing = named.iter().filter(|own| !judged.heard.contains(own));
     let missing: Vec<_> = missing
-        .map(|own| format!("drive {own}: no frame to or from it is in the capture"))
+        .map(|own| format!("drive {own}: no frame of it was compared"))
         .collect();
-    let in_doubt = !judged.doubts.is_empty() || !missing.is_empty();
+    let in_doubt =
+        !judged.doubts.is_empty() || !missing.is_empty() || judged.compared < judged.replies;
     remarks.extend(missing);
     remarks.extend(judged.doubts);
     let only_times = judged
@@ -165,7 +165,7 @@ pub(crate) fn judged(
             (true, _) => Verdict::Passed,
         },
         compared: judged.compared,
-        replies: None,
+        replies: judged.replies,
         differences: judged.breaches.iter().map(difference).collect(),
         remarks,
     })
@@ -244,8 +244,85 @@ fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use harness_proto::time::Span;
+    use crate::buses::unitek::report::sender_of;
     use harness_sim::record::Channel;
+
+    /// A trace of these frames, one each 100 ms.
+    fn trace(frames: &[&str]) -> Trace {
+        let frame = |(text, place): (&&str, u64)| {
+            let frame: Frame = text.parse().expect("a frame");
+            let start = Instant::START + Span::from_millis(100 * place);
+            LineFrame {
+                from: sender_of(&frame),
+                start,
+                at: start + Span::from_micros(90),
+                frame,
+                ended: FrameEnd::Good,
+            }
+        };
+        Trace {
+            channels: vec![Channel::of_frames(
+                frames.iter().zip(0..).map(frame).collect(),
+            )],
+            ..Trace::empty(1)
+        }
+    }
+
+    /// Only drives that are named are judged, and each of them must have sent something.
+    #[test]
+    fn the_drives_that_are_named_are_judged() {
+        const BOTH: [&str; 8] = [
+            "201#3DE200",
+            "181#E2010000",
+            "202#3DE200",
+            "182#E2010000",
+            "202#510400",
+            "202#3D5100",
+            "182#51000000",
+            "203#3DE200",
+        ];
+        let trace = [trace(&BOTH)];
+        for (named, verdict, compared) in [
+            (&[][..], Verdict::Failed, 3),
+            (&[1], Verdict::Passed, 1),
+            (&[2], Verdict::Failed, 2),
+            // One that sends nothing, one of which nothing is heard.
+            (&[1, 3], Verdict::Inconclusive, 1),
+            (&[1, 9], Verdict::Inconclusive, 1),
+            (&[9], Verdict::Inconclusive, 0),
+        ] {
+            let judged = judged(&trace, None, (named, Span::ZERO)).expect("drives");
+            let found = (judged.verdict, judged.compared, judged.replies);
+            assert_eq!(found, (verdict, compared, compared), "{named:?} {judged:?}");
+        }
+        let setup = Source::from_bytes(
+            "setup.scn".to_owned(),
+            b"title t\nbus unitek\ndrive 1\ndrive 9\n".to_vec(),
+        );
+        let setup = setup.expect("a text");
+        for (named, verdict) in [
+            (&[1][..], Verdict::Passed),
+            (&[1, 9], Verdict::Inconclusive),
+        ] {
+            let judged = judged(&trace, Some(&setup), (named, Span::ZERO)).expect("drives");
+            assert_eq!(judged.verdict, verdict, "{judged:?}");
+        }
+    }
+
+    /// A verdict says how many frames of drives could be compared, and nothing has passed where some were not.
+    #[test]
+    fn frames_that_are_not_compared_are_counted() {
+        let setup = Source::from_bytes(
+            "setup.scn".to_owned(),
+            b"title t\nbus unitek\ndrive 1\ndrive 2 rx 202 tx 190\ndrive 3 rx 203 tx 190\n"
+                .to_vec(),
+        );
+        let setup = setup.expect("a text");
+        let frames = ["201#3DE200", "181#E2010000", "202#3DE200", "190#E2010000"];
+        let judged = judged(&[trace(&frames)], Some(&setup), (&[], Span::ZERO)).expect("drives");
+        let found = (judged.verdict, judged.compared, judged.replies);
+        assert_eq!(found, (Verdict::Inconclusive, 1, 2), "{judged:?}");
+    }
 
     /// A request that an error frame has ended, and its repetition: it is sent once, when it was first sent.
     #[test]

@@ -286,7 +286,7 @@ fn frames_are_judged() {
         let judge = ["import", plain(&capture), "--setup", plain(&scenario)];
         let said = ended(&drivebench(&judge), 0);
         assert!(
-            said.starts_with("passed judged.") && said.contains("8 of drives compared"),
+            said.starts_with("passed judged.") && said.contains("8 of 8 replies compared"),
             "{said}"
         );
     }

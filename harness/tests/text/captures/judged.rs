@@ -130,6 +130,56 @@ fn a_wrong_drive_is_found() {
     assert!(first.link.starts_with("1->0"), "{first:?}");
 }
 
+/// A gap of the log, in which a clock was set or telegrams are missing, accuses no drives that monitor time-outs (ND21 9.9); a wrong one is found
+/// on either side.
+#[test]
+fn a_gap_accuses_no_right_drive() {
+    let on = "> 88 (1-N) A5 04 57 01\n> 88 (0-N) A5 04 57 01\n";
+    let ask = "+8ms > 88 (1-N) C0 13 FE D1\n+8ms > 8A (1-N) 82 55 13 FE E8\n+8ms > 88 (1-N) C0 13 FE D1\n";
+    let off = "+8ms > 88 (1-N) A4 FB 57 F6\n> 88 (0-N) A4 FB 57 F6\nwait 5ms\n";
+    let gap = |capture: &Capture, number: usize, is_lost: bool| {
+        let links = capture.traces[0].channels.iter();
+        let mut ends: Vec<_> = links
+            .flat_map(|own| own.octets().iter().map(|own| own.at))
+            .collect();
+        ends.sort_unstable();
+        let silent = ends
+            .windows(2)
+            .filter(|two| two[1].since(two[0]) > Span::from_millis(3));
+        let begins: Vec<_> = silent.map(|two| two[1]).collect();
+        let (begin, end) = (begins[number], begins[number + usize::from(is_lost)]);
+        let mut all = capture.clone();
+        for own in all.traces[0]
+            .channels
+            .iter_mut()
+            .filter_map(|own| own.octets_mut())
+        {
+            own.retain(|own| own.at < begin || own.at >= end);
+            let later = own.iter_mut().filter(|own| own.at >= end);
+            later.for_each(|own| own.at += Span::from_millis(3_600_000));
+        }
+        all
+    };
+    for (deviates, expected) in [
+        ("", Verdict::Passed),
+        ("drive 1 deviates checksum-not-negated\n", Verdict::Failed),
+    ] {
+        let text = format!("title gap\nring 2\ndrive 1 memory FE13 = 88\n{deviates}{on}{ask}{off}");
+        let capture = imported(&run(&text));
+        for number in 0..4 {
+            let judged = judge(&gap(&capture, number, false), &options(None)).expect("judged");
+            assert_eq!(judged.verdict, expected, "{number} {deviates}");
+            let note = |own: &String| own.starts_with("the log has a gap of 3600");
+            assert!(judged.remarks.iter().any(note), "{:?}", judged.remarks);
+        }
+        for number in 0..3 {
+            let judged = judge(&gap(&capture, number, true), &options(None)).expect("judged");
+            let right = judged.verdict != Verdict::Failed;
+            assert_eq!(right, expected == Verdict::Passed, "{number} {deviates}");
+        }
+    }
+}
+
 /// What only one end saw is judged too; without the master's incoming link nothing can be.
 #[test]
 fn a_capture_of_some_links() {

@@ -1,5 +1,6 @@
 //! What a run leaves for other tools, and captures that are read back.
 
+mod empty;
 mod forms;
 mod frames;
 mod hostile;
@@ -7,6 +8,7 @@ mod judged;
 mod portions;
 mod program;
 mod round_trip;
+mod routes;
 mod telegrams;
 mod tools;
 

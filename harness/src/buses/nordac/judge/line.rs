@@ -7,6 +7,7 @@ use super::standing::{Standing, standings};
 use super::symptom::ReplySubject;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
 use crate::buses::nordac::report::{Said, TelegramRun, runs};
+use crate::capture::gap;
 use crate::counted::counted;
 use harness_proto::decode::Decoded;
 use harness_proto::profibus::Telegram;
@@ -87,6 +88,9 @@ pub fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
         standings: standings(&runs, named),
         ..Judge::default()
     };
+    let gaps = gap::gaps(runs.iter().map(|own| (own.begin(), own.at())));
+    judge.judged.remarks.extend(gap::note(&gaps, "telegram"));
+    judge.gaps = gaps.iter().map(|own| own.piece + 1).collect();
     if cut.is_some() {
         let about = "the capture ends in the middle of a reply, which was not compared";
         judge.judged.remarks.push(about.to_owned());
@@ -146,6 +150,8 @@ struct Judge {
     midway: bool,
     /// Of telegrams of a capture, which does not show a supply and says of a telegram no more than its octets: how far times may be off.
     recorded: Option<Span>,
+    /// The telegrams in front of which the log has gaps.
+    gaps: BTreeSet<usize>,
     /// Whether the station that a telegram seems to be of has sent it.
     sender: Sender,
     followers: BTreeMap<u8, Follower>,
@@ -168,6 +174,9 @@ impl Judge {
     fn all_of(mut self, runs: impl IntoIterator<Item = (TelegramRun, Sender)>) -> JudgedSlaves {
         for (number, (run, sender)) in (1..).zip(runs) {
             self.sender = sender;
+            if self.gaps.contains(&number) {
+                self.begins_again();
+            }
             match run.from {
                 None => self.asks(number, &run),
                 Some(_) => self.replies(number, &run),
@@ -176,6 +185,15 @@ impl Judge {
         }
         self.finished();
         self.judged
+    }
+
+    /// Behind a gap of the log nothing is known of what was said in it: replies, and requests that set a slave up, may be missing.
+    fn begins_again(&mut self) {
+        (self.midway, self.asked) = (true, None);
+        self.restarted.clear();
+        for (address, own) in &mut self.followers {
+            *own = Follower::new(*address);
+        }
     }
 
     fn standing(&self, slave: u8) -> Standing {

@@ -1,7 +1,7 @@
 //! Right slaves are never accused, whatever the value of an open point; wrong ones are.
 
 use super::judge;
-use crate::buses::nordac::report::{octet_time, octets};
+use crate::buses::nordac::report::{octet_time, octets, runs};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
@@ -149,6 +149,71 @@ fn right_slaves(share: usize) -> usize {
         }
     }
     compared
+}
+
+/// The same with a gap in front of a telegram, and with this number of telegrams lost in it.
+fn with_gap(trace: &Trace, place: usize, lost: usize) -> Trace {
+    let runs = runs(trace);
+    let at = |place: usize| {
+        runs.get(place)
+            .map_or(Instant::NEVER, |own| own.octets[0].at)
+    };
+    let (begin, end) = (at(place), at(place + lost));
+    let mut trace = trace.clone();
+    for channel in &mut trace.channels {
+        let octets = channel.octets_mut().expect("a line of octets");
+        octets.retain(|own| own.at < begin || own.at >= end);
+        let later = octets.iter_mut().filter(|own| own.at >= end);
+        later.for_each(|own| own.at += Span::from_millis(3_600_000));
+    }
+    trace
+}
+
+/// Judges captures of right slaves that have a gap in front of each telegram: in one scenario of `share`.
+fn slaves_across_gaps(share: usize) {
+    for source in scenarios().iter().step_by(share) {
+        let trace = behind_a_token(trace(source, ""));
+        for place in 2..runs(&trace).len() {
+            for lost in [0, 1, 3] {
+                let judged = judge(&with_gap(&trace, place, lost), &[], Span::ZERO);
+                assert_eq!(
+                    judged.breaches,
+                    [],
+                    "{} at {place}, {lost} lost",
+                    source.name
+                );
+            }
+        }
+    }
+}
+
+/// A clock that was set forward, a log that was paused, frames that the logger lost.
+#[test]
+fn no_right_slave_is_accused_across_a_gap() {
+    slaves_across_gaps(150);
+}
+
+#[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
+fn no_right_slave_is_accused_across_any_gap() {
+    slaves_across_gaps(1);
+}
+
+/// A wrong slave is found on either side of a gap.
+#[test]
+fn a_wrong_slave_is_accused_beside_a_gap() {
+    let scenarios = scenarios();
+    let found = |from_end: bool| {
+        scenarios.iter().any(|source| {
+            let trace = trace(source, &of_all(source, "deviates directions-exchanged"));
+            let last = runs(&trace).len().saturating_sub(3);
+            let place = if from_end { last } else { 3 };
+            let judged = judge(&with_gap(&trace, place, 0), &[], Span::ZERO);
+            let gap = |own: &String| own.starts_with("the log has a gap");
+            last > 3 && !judged.breaches.is_empty() && judged.remarks.iter().any(gap)
+        })
+    };
+    assert!(found(true) && found(false));
 }
 
 #[test]

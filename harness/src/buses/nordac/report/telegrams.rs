@@ -58,6 +58,11 @@ impl TelegramRun {
         self.octets.last().map_or(Instant::START, |own| own.at)
     }
 
+    /// When the stop bit of its first octet had passed.
+    pub(in crate::buses::nordac) fn begin(&self) -> Instant {
+        self.octets.first().map_or(Instant::START, |own| own.at)
+    }
+
     /// What the other stations read; `None` where nothing arrived.
     pub(in crate::buses::nordac) fn said(&self) -> Option<Said> {
         let arrived = self

@@ -13,6 +13,7 @@
 //! | time-out monitoring (14.10.2), whole drives | it explains each byte (`open`) |
 
 use crate::capture::Capture;
+use crate::capture::gap::{self, Gap};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::role::{Role, roles};
@@ -99,6 +100,66 @@ pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
     });
     let answered = begins.filter(|at| heard.is_some_and(|heard| *at < heard));
     answered.map(|at| at - octet).collect()
+}
+
+/// The gaps of a capture, counted in the bytes of all links in order of time.
+pub(super) fn gaps(capture: &Capture) -> Vec<Gap> {
+    let octet = capture.rate.byte_time();
+    gap::gaps(ends(capture).into_iter().map(|at| (at - octet, at)))
+}
+
+/// When the bytes of all links had passed, in order.
+fn ends(capture: &Capture) -> Vec<Instant> {
+    let links = capture.traces.iter().flat_map(|ring| &ring.channels);
+    let ends = links.flat_map(|link| link.octets().iter().map(|own| own.at));
+    let mut ends: Vec<_> = ends.collect();
+    ends.sort_unstable();
+    ends
+}
+
+/// A capture at times that do not count its gaps.
+pub(super) fn without(capture: &Capture, gaps: &[Gap]) -> Capture {
+    let ends = ends(capture);
+    let mut short = capture.clone();
+    // Each byte has left the ring before the next one is sent.
+    let pause = flight(capture);
+    let gaps = gaps.iter().filter(|own| own.silence > pause);
+    let gaps: Vec<_> = gaps
+        .map(|own| (ends[own.piece], own.silence.saturating_sub(pause)))
+        .collect();
+    let earlier = |at: Instant| {
+        let before = gaps.iter().filter(|own| own.0 <= at);
+        before.fold(at, |at, own| at - own.1)
+    };
+    for link in short.traces.iter_mut().flat_map(|ring| &mut ring.channels) {
+        for own in link.octets_mut().into_iter().flatten() {
+            own.at = earlier(own.at);
+        }
+    }
+    if let Some(listened) = &mut short.listened {
+        listened.until = earlier(listened.until);
+    }
+    short
+}
+
+/// The parts of a capture between its gaps.
+pub(super) fn parts(capture: &Capture, gaps: &[Gap]) -> Vec<Capture> {
+    let ends = ends(capture);
+    let octet = capture.rate.byte_time();
+    let mut begins = vec![Instant::START];
+    begins.extend(gaps.iter().map(|own| ends[own.piece] - octet));
+    let part = |place: usize| {
+        let mut part = from(capture, begins[place]);
+        part.listened = None;
+        let end = begins.get(place + 1).copied().unwrap_or(Instant::NEVER);
+        for link in part.traces.iter_mut().flat_map(|ring| &mut ring.channels) {
+            if let Some(octets) = link.octets_mut() {
+                octets.retain(|own| own.at <= end);
+            }
+        }
+        part
+    };
+    (0..begins.len()).map(part).collect()
 }
 
 /// The same from a time on.

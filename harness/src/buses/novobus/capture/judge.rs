@@ -1,6 +1,8 @@
 //! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
-use super::begin::{Shown, after_silences, from, is_midway, is_one_telegram, shown};
+use super::begin::{
+    Shown, after_silences, from, gaps, is_midway, is_one_telegram, parts, shown, without,
+};
 use super::open::explanations;
 use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
@@ -8,6 +10,7 @@ use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::locate::locate;
 use crate::capture::Capture;
 use crate::capture::diff::{ComparedRun, Summary, compare};
+use crate::capture::gap;
 use crate::library::Entry;
 use crate::link::{Link, link_name};
 use crate::scenario::problem::Problems;
@@ -61,6 +64,9 @@ const BEFORE: &str = "what differs lies in front of the first telegram that the 
 const NEVER_SILENT: &str = "the capture begins in mid-conversation, and its rings are never silent: what differs may come of bytes in front of it; begin it \
      before the master sends";
 
+/// Why what differs across a gap accuses no drive.
+const OF_A_GAP: &str = "what differs shows in none of the parts between gaps: bytes that are not in the capture may have been sent in them";
+
 impl Judged {
     /// What differs does not accuse a drive, for this reason.
     fn in_doubt(mut self, why: &str) -> Self {
@@ -108,6 +114,29 @@ fn first(problems: &Problems) -> String {
 /// # Errors
 /// [`JudgeError`].
 pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
+    let judged = judge_part(capture, options);
+    let differs = judged
+        .as_ref()
+        .map_or(true, |own| own.verdict == Verdict::Failed);
+    let gaps = if differs { gaps(capture) } else { Vec::new() };
+    if gaps.is_empty() {
+        return judged;
+    }
+    // The clock may have been set; or other bytes were sent and are not in the capture, after which each part is judged for itself.
+    let mut judged = judge_part(&without(capture, &gaps), options)?;
+    if judged.verdict == Verdict::Failed {
+        let parts = parts(capture, &gaps).into_iter();
+        let mut parts = parts.filter_map(|part| judge_part(&part, options).ok());
+        judged = match parts.find(|own| own.verdict == Verdict::Failed) {
+            Some(failed) => failed,
+            None => judged.in_doubt(OF_A_GAP),
+        };
+    }
+    judged.remarks.extend(gap::note(&gaps, "byte"));
+    Ok(judged)
+}
+
+fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let judged = judge_whole(capture, options)?;
     if judged.verdict != Verdict::Failed {
         return Ok(judged);

@@ -1,5 +1,5 @@
-//! What may have been set before the first frame of a log: each of it explains frames of a right drive, and excuses no wrong one. Times that go
-//! back, and times that are off.
+//! What may have been set before the first frame of a log or in a gap of it: each of it explains frames of a right drive, and excuses no wrong
+//! one. Times that go back or leap forward, and times that are off.
 
 use super::{FrameSymptom, HeardFrames, JudgedDrives, judge, judge_guessed};
 use crate::buses::unitek::report::sender_of;
@@ -199,6 +199,119 @@ fn identifiers() {
     assert!(!judged.doubts.is_empty(), "{judged:#?}");
     let set_up = judge(HeardFrames::exact(&frames), &[(1, (0x201, 0x185))]);
     assert_eq!((set_up.breaches, set_up.doubts), (Vec::new(), Vec::new()));
+}
+
+/// How many differences and how many doubts there are.
+fn counts(frames: &[(u64, &str)]) -> (usize, usize) {
+    let judged = judged(frames);
+    (judged.breaches.len(), judged.doubts.len())
+}
+
+/// These frames at a later time, in tenths of a millisecond.
+fn at<'t>(later: u64, frames: &[(u64, &'t str)]) -> Vec<(u64, &'t str)> {
+    frames.iter().map(|own| (own.0 + later, own.1)).collect()
+}
+
+/// UNITEK ex 12: homing that was asked for before sets the destination at its end; a lock ends it.
+#[test]
+fn homing() {
+    let reads = |at: u64, reply| [(at, "201#3D6E00"), (at + 4, reply)];
+    let moves = reads(1_000, "181#6E0010000000");
+    let home = reads(2_000, "181#6E0000000000");
+    assert_eq!(counts(&[moves, home].concat()), (0, 1));
+    let lock = [(500, "201#510400")];
+    assert_eq!(counts(&[&lock[..], &moves, &home].concat()), (1, 0));
+}
+
+/// A second pair of identifiers (88, 89): what a host sends there may be for the drive, unless another one receives it (`second-identifiers`).
+#[test]
+fn second_identifiers() {
+    let asks = [(9_000, "207#3D3000"), (9_003, "181#30010200")];
+    let writes = [
+        (9_100, "201#D101000000"),
+        (9_200, "207#D102000000"),
+        (9_300, "201#3DD100"),
+        (9_304, "181#D10200000000"),
+    ];
+    let other = (7, (0x207, 0x187));
+    let lock = [(9_400, "201#510400"), (9_500, "207#510000")];
+    let enabled = [(9_600, "201#3D4000"), (9_604, "181#40010100")];
+    for frames in [&asks[..], &writes, &[lock, enabled].concat()] {
+        let polls = at(8_700, &READ);
+        let frames = [&READ[..], &polls, frames].concat();
+        assert_eq!(counts(&frames), (0, 1), "{frames:?}");
+        let frames = log(&frames);
+        let judged = judge(HeardFrames::exact(&frames), &[DRIVE[0], other]);
+        assert_eq!(judged.breaches.len(), 1, "{judged:#?}");
+    }
+}
+
+/// UNITEK ex 9: a cycle that goes on behind a gap of an hour, and one that does not.
+#[test]
+fn a_gap_in_a_cycle() {
+    const HOUR: u64 = 36_000_000;
+    let asks = at(4_000, &[(0, "201#3D3064")]);
+    let polls = cycle("201#3DE200", 1_000, 10);
+    let polls: Vec<_> = polls
+        .iter()
+        .flat_map(|own| [*own, (own.0 + 4, "181#E2010000")])
+        .collect();
+    let frames = at(5_000, &cycle("181#30010200", 1_000, 10));
+    let before = [&polls[..], &asks, &at(4_000, &READ), &frames].concat();
+    let gap = |own: &String| own.starts_with("the log has a gap of 3600");
+    for gone_on in [true, false] {
+        let goes_on = cycle("181#30010200", 1_000, if gone_on { 10 } else { 0 });
+        let behind = at(HOUR, &[goes_on, at(400, &polls)].concat());
+        let all = [before.clone(), at(16_000, &behind)].concat();
+        let judged = judged(&all);
+        let found = (judged.breaches.len(), judged.doubts.len());
+        assert_eq!(found, (0, usize::from(!gone_on)), "{judged:#?}");
+        assert!(judged.remarks.iter().any(gap), "{judged:#?}");
+    }
+    // It was stopped behind the gap, before a frame was due.
+    let stop = [(HOUR + 15_000, "201#3D30FF")];
+    assert_eq!(counts(&[&before[..], &stop].concat()), (0, 1));
+    // The host goes on, however slowly.
+    for every in [1_000, 20_000, 100_000] {
+        let on = at(16_000, &cycle("201#3DE200", every, 8));
+        let replies = at(4, &on).into_iter().map(|own| (own.0, "181#E2010000"));
+        let replies: Vec<_> = replies.collect();
+        wrong(
+            &[&before[..], &on, &replies].concat(),
+            FrameSymptom::Missing,
+            "ex 9",
+        );
+    }
+}
+
+/// Requests, and what was written: a gap may hide a reply and another write, and accuses no drive of it.
+#[test]
+fn a_gap_hides_a_reply_and_a_write() {
+    const HOUR: u64 = 36_000_000;
+    let polls = [READ.to_vec(), at(500, &READ), at(1_000, &READ)].concat();
+    let request = [(2_000, "201#3DE200")];
+    let late = [(HOUR, "181#E2010000")];
+    let again = at(HOUR + 500, &polls);
+    assert_eq!(
+        counts(&[&polls[..], &request, &late, &again].concat()),
+        (0, 0)
+    );
+    assert_eq!(counts(&[&polls[..], &request, &again].concat()), (0, 1));
+    let write = [(2_000, "201#D101000000")];
+    let reads = |later: u64| [(later, "201#3DD100"), (later + 4, "181#D10000000000")];
+    let across = [&polls[..], &write, &again, &reads(HOUR + 3_000)].concat();
+    assert_eq!(counts(&across), (0, 1));
+    let behind = [&polls[..], &again, &at(HOUR, &write), &reads(HOUR + 3_000)].concat();
+    wrong(&behind, FrameSymptom::Value, "App 6");
+    // A cycle that began in the gap, or ended in it.
+    let starts = at(HOUR, &cycle("181#30010200", 1_000, 8));
+    let off = [(1_500, "201#3D30FF")];
+    assert_eq!(counts(&[&polls[..], &off, &starts].concat()), (0, 0));
+    // Half the requests are not answered, with an hour between: that is no gap of the log.
+    let unanswered =
+        (0..12).flat_map(|place| at(HOUR * place, &[&READ[..], &at(200, &READ[..1])].concat()));
+    let unanswered: Vec<_> = unanswered.collect();
+    wrong(&unanswered, FrameSymptom::Missing, "5.2");
 }
 
 /// A clock that was set back hides no difference, and makes none of times.

@@ -1,6 +1,6 @@
 //! What the frames of a drive hold: how long they must be, and what a register can read.
 
-use super::follower::{Asked, Follower};
+use super::follower::{Asked, Follower, Homing};
 use super::held::{Held, is_live, takes_writes};
 use super::symptom::FrameSymptom::{Length, Value};
 use harness_proto::time::Instant;
@@ -58,7 +58,8 @@ impl Follower {
             && raw & status::ENABLED != 0
         {
             let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();
-            self.breach((number, reply.register), (Value, "ex 2"), about);
+            let why = self.written_elsewhere(0x51);
+            self.differs((number, reply.register), (Value, "ex 2"), (about, why));
         }
         if is_live(reply.register) {
             return;
@@ -80,7 +81,7 @@ impl Follower {
             self.refused.remove(&reply.register);
             self.breach((number, reply.register), (Value, "dump"), about);
         }
-        let homes = self.homes && reply.register == 0x6E;
+        let homes = self.homes == Homing::AskedFor && reply.register == 0x6E;
         if register.access == Access::FN || homes {
             return;
         }
@@ -99,7 +100,17 @@ impl Follower {
                     raw & mask,
                     held.words(register.width)
                 );
-                self.breach((number, reply.register), (Value, register.origin), about);
+                let homes = reply.register == 0x6E && self.homes == Homing::Perhaps;
+                let homes = homes.then(|| {
+                    "homing that was asked for where the log has no frames sets it at its end (ex 12)"
+                        .to_owned()
+                });
+                let why = self.written_elsewhere(reply.register).or(homes);
+                self.differs(
+                    (number, reply.register),
+                    (Value, register.origin),
+                    (about, why),
+                );
             }
         }
         if reply.register == 0xDC && asked.held == held {

@@ -1,6 +1,7 @@
 //! What is known of the cycle of one register.
 
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::Register;
 
 /// How far a single gap may be off: the drive's scan is 1 ms, and so is the clock of many adapters (UNITEK 5.2).
 const GAP: Span = Span::from_millis(2);
@@ -32,6 +33,8 @@ pub(super) struct Running {
     series: Option<(Instant, Instant, u64)>,
     /// How long the bus was used when the last frame came.
     used: Span,
+    /// In how many gaps of the log a frame was due, since the last one came.
+    pub(super) owed: usize,
 }
 
 /// How a frame of a cycle is wrong.
@@ -52,12 +55,21 @@ impl Running {
             sure,
             series: None,
             used: Span::ZERO,
+            owed: 0,
         }
     }
 
     /// The interval.
     pub(super) const fn every(&self) -> Span {
         self.every
+    }
+
+    /// What differs where its frames do not come.
+    pub(super) fn not_there(&self, register: u8) -> String {
+        let (name, every) = (Register::of(register).name, self.every);
+        format!(
+            "no frame of register {register:02X} ({name}) comes, which is asked for every {every}"
+        )
     }
 
     /// A frame that may belong to the cycle or not has begun at `at`: the series begins again.
@@ -71,6 +83,7 @@ impl Running {
         let permitted = GAP + tolerance;
         self.sure = true;
         self.alive = at;
+        self.owed = 0;
         // Behind a busy bus a frame waits, and one that waits is replaced by its successor.
         let busy = |since: Instant, before: Span| {
             let gap = at.since(since).units();

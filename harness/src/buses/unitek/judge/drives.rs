@@ -3,6 +3,7 @@
 use super::follower::Follower;
 use super::symptom::FrameSymptom;
 use crate::buses::unitek::language::identifier;
+use crate::capture::gap::{self, Gap};
 use crate::counted::counted;
 use harness_proto::time::Span;
 use harness_sim::record::{LineFrame, Seam, SeamKind};
@@ -35,6 +36,10 @@ pub struct JudgedDrives {
     pub breaches: Vec<Breach>,
     /// Frames of drives that were compared.
     pub compared: usize,
+    /// Those that could be: the same, and frames that may be of another station.
+    pub replies: usize,
+    /// The drives of which a frame was compared.
+    pub heard: BTreeSet<u8>,
     /// Values that were compared with what had been written.
     pub values: usize,
     /// What was not compared, in sentences.
@@ -74,8 +79,7 @@ impl<'f> HeardFrames<'f> {
         }
     }
 
-    /// The frames of each recording, with the number of frames in front of it.
-    fn recordings(&self) -> impl Iterator<Item = (usize, &'f [LineFrame])> {
+    fn recordings(&self) -> impl Iterator<Item = Recording> {
         let begins = self.seams.iter();
         let begins = begins.filter(|own| own.kind == SeamKind::Recording);
         let mut places = vec![0];
@@ -84,7 +88,7 @@ impl<'f> HeardFrames<'f> {
         let frames = self.frames;
         (1..places.len()).filter_map(move |end| {
             let part = frames.get(places[end - 1]..places[end])?;
-            Some((places[end - 1], part))
+            Some(Recording::of(places[end - 1], part))
         })
     }
 
@@ -92,6 +96,33 @@ impl<'f> HeardFrames<'f> {
     fn clock_set(&self, piece: usize) -> bool {
         let here = self.seams.binary_search_by_key(&piece, |own| own.piece);
         here.is_ok_and(|place| self.seams[place].kind == SeamKind::ClockSet)
+    }
+}
+
+/// A part of a log in which times go on.
+struct Recording {
+    /// The number of frames in front of it.
+    before: usize,
+    /// Its frames, at times that do not count the gaps.
+    frames: Vec<LineFrame>,
+    gaps: Vec<Gap>,
+}
+
+impl Recording {
+    fn of(before: usize, frames: &[LineFrame]) -> Self {
+        let mut gaps = gap::gaps(frames.iter().map(|own| (own.start, own.at)));
+        let mut frames = frames.to_vec();
+        for gap in &mut gaps {
+            for own in frames.iter_mut().skip(gap.piece) {
+                (own.start, own.at) = (own.start - gap.silence, own.at - gap.silence);
+            }
+            gap.piece += before;
+        }
+        Self {
+            before,
+            frames,
+            gaps,
+        }
     }
 }
 
@@ -113,7 +144,8 @@ fn judge_with(
     of: fn(u8, (u16, u16)) -> Follower,
 ) -> JudgedDrives {
     let mut all = JudgedDrives::default();
-    let mut used = BTreeSet::new();
+    let (mut used, mut shared_by_two) = (BTreeSet::new(), BTreeSet::new());
+    let recordings: Vec<Recording> = heard.recordings().collect();
     for &(drive, identifiers) in drives {
         let shared = |other: &&(u8, (u16, u16))| {
             let (rx, tx) = other.1;
@@ -122,21 +154,32 @@ fn judge_with(
         if let Some((other, _)) = drives.iter().find(shared) {
             let remark = format!("drives {drive} and {other} share an identifier: not compared");
             all.remarks.push(remark);
+            shared_by_two.insert(u32::from(identifiers.1));
             continue;
         }
-        for (before, frames) in heard.recordings() {
+        for recording in &recordings {
             let mut follower = of(drive, identifiers).with_tolerance(heard.tolerance);
             follower.others = drives.iter().map(|own| own.0).collect();
-            for (index, frame) in (before..).zip(frames) {
+            if !follower.guessed {
+                let others = drives.iter().map(|own| own.1.0);
+                follower.elsewhere.declared = others.collect();
+            }
+            let (frames, mut gaps) = (&recording.frames, recording.gaps.iter().peekable());
+            for (index, frame) in (recording.before..).zip(frames) {
                 if heard.clock_set(index) {
                     follower.clock_set(frame.start);
+                }
+                if let Some(gap) = gaps.next_if(|own| own.piece == index) {
+                    follower.gap(index + 1, frame.start, gap.silence);
                 }
                 follower.hear(index + 1, frame);
             }
             used.extend(follower.identifiers().map(u32::from));
-            let own = follower.end(before + frames.len(), frames);
+            let own = follower.end(recording.before + frames.len(), frames);
             all.breaches.extend(own.breaches);
             all.compared += own.compared;
+            all.replies += own.replies;
+            all.heard.extend((own.compared > 0).then_some(drive));
             all.values += own.values;
             all.doubts.extend(own.doubts);
             let new = own.remarks.into_iter();
@@ -145,7 +188,12 @@ fn judge_with(
             all.remarks.extend(new);
         }
     }
+    let not_compared = |own: &&LineFrame| shared_by_two.contains(&own.frame.id().number());
+    all.replies += heard.frames.iter().filter(not_compared).count();
     let numbers: Vec<u8> = drives.iter().map(|own| own.0).collect();
+    let gaps = recordings.iter().flat_map(|own| &own.gaps);
+    let gaps: Vec<Gap> = gaps.copied().collect();
+    all.remarks.extend(gap::note(&gaps, "frame"));
     all.remarks.extend(others(heard.frames, &numbers, &used));
     all.breaches.sort_by_key(|own| own.frame);
     all

@@ -1,17 +1,18 @@
 //! Follows the frames of a bus, drive by drive.
 
-use super::cycle::{Cycle, Running, Untimely};
+use super::cycle::{Cycle, Running};
 use super::drives::{Breach, JudgedDrives, MOST_BREACHES};
+use super::elsewhere::Elsewhere;
 use super::held::{Held, is_live, takes_writes};
 use super::supply::Supply;
-use super::symptom::FrameSymptom::{self, Length, Missing, Name, Time, Unasked};
+use super::symptom::FrameSymptom::{self, Length, Missing, Name};
 use crate::buses::unitek::language::{identifier, written};
 use crate::buses::unitek::report::sender_of;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{CYCLES, Reply};
 use harness_proto::unitek::properties::Dlc4;
-use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
+use harness_proto::unitek::words::MODE_LOCK;
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request};
 use harness_sim::record::{FrameEnd, LineFrame};
 use std::collections::{BTreeMap, VecDeque};
@@ -26,18 +27,32 @@ const LONG_PATIENCE: Span = Span::from_millis(1_000);
 const MOST_ASKED: usize = 1_000;
 
 /// The longest interval of a cycle, and some more.
-const LONGEST_CYCLE: Span = Span::from_millis(300);
+pub(super) const LONGEST_CYCLE: Span = Span::from_millis(300);
 
 /// A request that waits for its reply.
 #[derive(Clone, Debug)]
 pub(super) struct Asked {
     pub(super) register: u8,
     pub(super) at: Instant,
-    frame: usize,
+    pub(super) frame: usize,
     /// Whether the drive has certainly heard it and answers it.
     pub(super) sure: bool,
+    /// The same, and a gap of the log followed it.
+    pub(super) excused: bool,
     /// What the register could hold at the request: a drive may read it then, or when it replies.
     pub(super) held: Held,
+}
+
+/// Whether homing may run (ex 12).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Homing {
+    /// Since before the first frame, or since a gap of the log.
+    #[default]
+    Perhaps,
+    /// A frame asks for it.
+    AskedFor,
+    /// A lock has ended it.
+    Ended,
 }
 
 /// What the frames show of one drive.
@@ -61,14 +76,20 @@ pub struct Follower {
     /// Whether all replies have 6 bytes, where it is known (bit 8 of DC), and when that may have changed.
     pub(super) wide: Option<bool>,
     pub(super) wide_at: Instant,
+    /// It has sent with an identifier of its own.
+    pub(super) named: bool,
     /// When MODE was last written, or may have been.
     pub(super) mode_at: Instant,
     /// Homing may run, which sets the destination at its end.
-    pub(super) homes: bool,
+    pub(super) homes: Homing,
+    /// What hosts have sent on other identifiers.
+    pub(super) elsewhere: Elsewhere,
     /// When the first frame began.
-    begin: Option<Instant>,
+    pub(super) begin: Option<Instant>,
+    /// When the first frame behind the last gap of the log began.
+    pub(super) gap: Option<Instant>,
     /// Registers of which a frame came that nothing here asks for, and when last: their cycles run since before the first frame.
-    unsolicited: BTreeMap<u8, Instant>,
+    pub(super) unsolicited: BTreeMap<u8, Instant>,
     /// What was written to registers that cannot be written, and held something else.
     pub(super) refused: BTreeMap<u8, u32>,
     /// The numbers of the other drives.
@@ -76,13 +97,15 @@ pub struct Follower {
     /// Whether its identifiers are guessed from what it sends: it may receive on another one, and change both at its next start (`id-change`).
     pub(super) guessed: bool,
     /// Whether the times of frames are those of the bus.
-    timed: bool,
+    pub(super) timed: bool,
     /// How late a frame may be.
     pub(super) patience: Span,
     /// How far the time of a frame may be off.
     pub(super) tolerance: Span,
     /// The time that frames have used.
     pub(super) used: Span,
+    /// Requests that were not answered and accuse no drive, since a gap of the log followed them.
+    pub(super) excused: usize,
     /// Whether the supply may have been switched off and on, and what the frames show if so.
     pub(super) supply: Supply,
     pub(super) judged: JudgedDrives,
@@ -108,17 +131,21 @@ impl Follower {
             short_map: None,
             wide: None,
             wide_at: Instant::START,
-            homes: false,
+            homes: Homing::default(),
+            elsewhere: Elsewhere::default(),
             begin: None,
+            gap: None,
             unsolicited: BTreeMap::new(),
             refused: BTreeMap::new(),
             others: Vec::new(),
+            named: false,
             mode_at: Instant::START,
             guessed: false,
             timed: true,
             patience: PATIENCE,
             tolerance: Span::ZERO,
             used: Span::ZERO,
+            excused: 0,
             supply: Supply::default(),
             judged: JudgedDrives::default(),
         }
@@ -140,6 +167,7 @@ impl Follower {
         Self {
             cycles: [Cycle::Off(Instant::START); 256],
             timed: false,
+            homes: Homing::Ended,
             supply: Supply::always_on(),
             patience: LONG_PATIENCE,
             ..Self::new(drive, identifiers)
@@ -184,14 +212,15 @@ impl Follower {
     pub fn hear(&mut self, number: usize, own: &LineFrame) {
         let sends = self.sent_it(own) && !matches!(own.ended, FrameEnd::Error(_));
         if sends && self.supply.may_have_failed(own.start + self.tolerance) {
-            self.supply.breaches = self.judged.breaches.len();
-            self.supply.restarted = Some(Box::new(self.restarted(own.start)));
+            let restarted = self.restarted(own.start);
+            self.supply
+                .may_be(restarted, self.judged.breaches.len(), number);
         }
         if let Some(restarted) = &mut self.supply.restarted {
             restarted.hear(number, own);
         }
         self.hear_one(number, own);
-        self.explain_by_restart(number);
+        self.explain_by_silence(number);
         if sends {
             self.supply.sent = Some(own.at);
         }
@@ -208,6 +237,8 @@ impl Follower {
             }
         } else if among(&self.rx, &own.frame) || among(&self.second[0], &own.frame) {
             self.hears(number, own);
+        } else {
+            self.elsewhere.hear(&own.frame, own.at);
         }
     }
 
@@ -226,6 +257,7 @@ impl Follower {
     pub fn end(mut self, number: usize, frames: &[LineFrame]) -> JudgedDrives {
         if let Some(last) = frames.last() {
             self.missing(number, last.at);
+            self.owes_at_the_end(number);
         }
         // The reply to the last request may be what a log does not have any more.
         let waits = self.asked.front().zip(frames.last());
@@ -262,6 +294,22 @@ impl Follower {
         }
     }
 
+    /// The same where there may be another cause than a wrong drive: then it is in doubt.
+    pub(super) fn differs(
+        &mut self,
+        (frame, register): (usize, u8),
+        what: (FrameSymptom, &'static str),
+        (about, why): (String, Option<String>),
+    ) {
+        match why {
+            None => self.breach((frame, register), what, about),
+            Some(why) => self.judged.doubt(format!(
+                "frame {frame}, drive {}: {about}; {why}",
+                self.drive
+            )),
+        }
+    }
+
     /// What the drive may read out of a frame.
     fn hears(&mut self, number: usize, own: &LineFrame) {
         let id = own.frame.id().number();
@@ -282,8 +330,12 @@ impl Follower {
                 let silent = Register::of(register).dump == 0xFACE;
                 self.ask(register, own.at, number, sure && !silent);
             }
-            Request::Cycle { register, every } => self.starts(register, every, own.at, sure),
+            Request::Cycle { register, every } => {
+                self.owes(number, register);
+                self.starts(register, every, own.at, sure);
+            }
             Request::Stop { register } => {
+                self.owes(number, register);
                 let cycle = &mut self.cycles[usize::from(register)];
                 match (sure, &mut *cycle) {
                     (true, Cycle::Off(_)) => {}
@@ -306,6 +358,7 @@ impl Follower {
             at,
             frame,
             sure,
+            excused: false,
             held: self.held[usize::from(place)].clone(),
         });
     }
@@ -325,9 +378,8 @@ impl Follower {
         }
         let silent = Register::of(register).dump == 0xFACE;
         // Cycles from before the first frame may fill the table; each shows itself within 254 ms.
-        let old = self
-            .begin
-            .is_some_and(|begin| at.since(begin) > LONGEST_CYCLE + self.tolerance);
+        let begin = self.gap.or(self.begin);
+        let old = begin.is_some_and(|begin| at.since(begin) > LONGEST_CYCLE + self.tolerance);
         let unknown =
             self.cycles.contains(&Cycle::Unknown) && !(old && self.unsolicited.is_empty());
         let certain = sure && !full && !silent && !unknown;
@@ -350,7 +402,7 @@ impl Follower {
                 }
                 (self.wide, self.wide_at) = (None, at);
             }
-            0x78 => self.homes = true,
+            0x78 => self.homes = Homing::AskedFor,
             0x73 => self.other_rate |= self.held[place].sure() != Some(data.bits() & 0xFFFF),
             0xDC => {
                 let wide = data.bits() & 0x0100 != 0;
@@ -369,6 +421,9 @@ impl Follower {
         self.supply
             .wrote(number, before.sure().filter(|_| takes), at);
         if number == 0x51 && data.bits() & u32::from(MODE_LOCK) != 0 {
+            if sure {
+                self.homes = Homing::Ended;
+            }
             // `lock-clears-command`.
             for command in [0x31, 0x90] {
                 self.held[command] = self.held[command].may_be(0);
@@ -418,17 +473,7 @@ impl Follower {
             && now.since(first.at) > patience
         {
             self.asked.pop_front();
-            if first.sure {
-                let name = Register::of(first.register).name;
-                self.breach(
-                    (first.frame, first.register),
-                    (Missing, "5.2"),
-                    format!(
-                        "the request for register {:02X} ({name}) is not answered",
-                        first.register
-                    ),
-                );
-            }
+            self.unanswered(&first);
         }
         for register in 0..=u8::MAX {
             if let Cycle::On(running) = &mut self.cycles[usize::from(register)]
@@ -436,27 +481,28 @@ impl Follower {
             {
                 running.sure = false;
                 running.blur(now);
-                let every = running.every();
-                let name = Register::of(register).name;
-                let about = format!(
-                    "no frame of register {register:02X} ({name}) comes, which is asked for every {every}"
-                );
-                self.breach((number, register), (Missing, "ex 9"), about);
+                match running.owed {
+                    0 => {
+                        let about = running.not_there(register);
+                        self.breach((number, register), (Missing, "ex 9"), about);
+                    }
+                    _ => self.owes(number, register),
+                }
             }
         }
     }
 
     /// A frame of the drive.
     fn sends(&mut self, number: usize, own: &LineFrame) {
-        self.judged.compared += 1;
+        self.judged.replies += 1;
         let tx = u16::try_from(own.frame.id().number()).unwrap_or(0);
         let first = own.frame.data().first().copied().unwrap_or(0);
         let may_use = self.tx.contains(&tx) || self.second[1].contains(&tx);
         if !may_use || own.frame.id().is_extended() {
-            let id = identifier(own.frame.id());
-            let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
-            return self.breach((number, first), (Name, "3.1"), about);
+            self.judged.compared += 1;
+            return self.named_otherwise(number, own, first);
         }
+        self.named = true;
         let reply = match Reply::decode(&own.frame, tx) {
             Ok(reply) => reply,
             Err(_) if self.timed && !self.is_asked() => {
@@ -467,111 +513,30 @@ impl Follower {
                 ));
             }
             Err(why) => {
+                self.judged.compared += 1;
                 let about = format!("{} is no reply: {why}", written(&own.frame));
                 return self.breach((number, first), (Length, "4.5"), about);
             }
         };
+        self.judged.compared += 1;
         let asked = self.why(number, own, &reply);
         self.length(number, own.start, &reply);
         self.value(number, &reply, asked.as_ref());
     }
 
-    /// Why the drive sends it: the request that it answers, if it is one. What nothing asks for differs.
-    fn why(&mut self, number: usize, own: &LineFrame, reply: &Reply) -> Option<Asked> {
-        let register = reply.register;
-        let used = self.used;
-        let place = self.asked.iter().position(|own| own.register == register);
-        let cycle = &mut self.cycles[usize::from(register)];
-        if let Some(asked) = place.and_then(|place| self.asked.remove(place)) {
-            // A frame of a cycle or an event would not show how long a reply takes.
-            let may_be_other = match cycle {
-                Cycle::On(running) => {
-                    running.blur(own.start);
-                    true
-                }
-                Cycle::Unknown => self.unsolicited.contains_key(&register),
-                Cycle::Off(_) => false,
-            };
-            if !may_be_other && register != 0x40 {
-                let late = own.start.since(asked.at);
-                self.slowest = Some(self.slowest.map_or(late, |slowest| slowest.max(late)));
-            }
-            return Some(asked);
-        }
-        if self.may_be_event(register, own.start) {
-            match &mut self.cycles[usize::from(register)] {
-                Cycle::On(running) => running.blur(own.start),
-                // A cycle from before the first frame may send it, and goes on when events are switched off (5.2).
-                Cycle::Unknown => drop(self.unsolicited.insert(register, own.start)),
-                Cycle::Off(_) => {}
-            }
-            return None;
-        }
-        let cycle = &mut self.cycles[usize::from(register)];
-        let untimely = match cycle {
-            Cycle::On(running) => {
-                let why = running.comes(own.start, used, self.tolerance);
-                why.filter(|_| self.timed).map(|why| (why, running.every()))
-            }
-            Cycle::Unknown => {
-                self.older_cycle(number, own);
-                None
-            }
-            Cycle::Off(_) => {
-                let patience = self.patience;
-                if !self.cycles[usize::from(register)].in_flight(own.start, patience, !self.timed) {
-                    let name = Register::of(register).name;
-                    let about = format!(
-                        "{} comes, and nothing asks for register {register:02X} ({name})",
-                        written(&own.frame)
-                    );
-                    self.breach((number, register), (Unasked, "5.2"), about);
-                }
-                None
-            }
-        };
-        if let Some((untimely, every)) = untimely {
-            let name = Register::of(register).name;
-            let (what, gap) = match untimely {
-                Untimely::Gap(gap) => ("it comes".to_owned(), gap),
-                Untimely::Mean(gap, count) => (format!("{count} intervals last on average"), gap),
-            };
-            let about = format!(
-                "register {register:02X} ({name}) is asked for every {every}: {what} {gap} behind the one before"
-            );
-            self.breach((number, register), (Time, "ex 9"), about);
-        }
-        None
-    }
-
-    /// A frame that no request of these frames asks for: of a cycle that runs since before the first of them. Such a cycle shows itself
-    /// within 254 ms, again and again.
-    fn older_cycle(&mut self, number: usize, own: &LineFrame) {
-        let register = own.frame.data().first().copied().unwrap_or(0);
-        let before = self.unsolicited.get(&register).copied().or(self.begin);
-        let longest = LONGEST_CYCLE + self.tolerance;
-        if before.is_some_and(|before| own.start.since(before) > longest) {
-            let name = Register::of(register).name;
-            let about = format!(
-                "{} comes, and nothing asks for register {register:02X} ({name}): no cycle is as long",
-                written(&own.frame)
-            );
-            match self.guessed && self.slowest.is_none() {
-                false => self.breach((number, register), (Unasked, "5.2"), about),
-                true => self.judged.doubt(format!(
-                    "frame {number}, drive {}: {about}; it has answered no request on {:03X}, and may receive on another identifier",
-                    self.drive, self.rx[0]
-                )),
-            }
-        }
-        self.unsolicited.insert(register, own.start);
-    }
-
-    /// Whether a frame can have been sent by event (ex 10).
-    fn may_be_event(&self, register: u8, at: Instant) -> bool {
-        let off = self.held[0x51].sure();
-        let off = off.is_some_and(|mode| mode & u32::from(MODE_EVENT) == 0);
-        register == 0x40 && (!off || at.since(self.mode_at) <= self.patience)
+    /// A frame of the drive has another identifier. It may have been set before the first frame (ex 1), or in a gap of the log.
+    fn named_otherwise(&mut self, number: usize, own: &LineFrame, register: u8) {
+        let id = identifier(own.frame.id());
+        let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
+        let sure = self.named || !self.timed || own.frame.id().is_extended();
+        let why = (!sure).then(|| {
+            format!(
+                "it may have been set where the log has no frames, as a setup with `drive {} tx {id}` says",
+                self.drive
+            )
+        });
+        self.differs((number, register), (Name, "3.1"), (about, why));
+        self.may_use(0x69, own.frame.id().number());
     }
 }
 

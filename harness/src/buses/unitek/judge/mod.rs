@@ -9,8 +9,11 @@ mod begun_tests;
 mod contents;
 mod cycle;
 mod drives;
+mod elsewhere;
 mod follower;
+mod gaps;
 mod held;
+mod reasons;
 mod supply;
 mod symptom;
 #[cfg(test)]

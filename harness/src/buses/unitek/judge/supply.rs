@@ -1,4 +1,5 @@
-//! A supply that may have been switched off and on, which no frame shows: a drive then loses what was written and not stored, and its cycles.
+//! What may have happened in a silence, which no frame shows. A supply may have been switched off and on: a drive then loses what was written and
+//! not stored, and its cycles. In a gap of the log anything may have been written.
 
 use super::cycle::Cycle;
 use super::follower::Follower;
@@ -24,10 +25,15 @@ pub(super) struct Supply {
     pub(super) breaches: usize,
     /// Registers that were written and not stored: what each held before, where that is known, and when it was last written.
     written: BTreeMap<u8, (Option<u32>, Instant)>,
-    /// When the last silence began.
+    /// When the last silence began, and the frame that ended it.
     silent: Instant,
-    /// What the frames since the last silence show of a drive that was switched off and on in it.
+    ended: usize,
+    /// What the frames since the last silence show of a drive that was switched off and on in it, or was written to in a gap of the log.
     pub(super) restarted: Option<Box<Follower>>,
+    /// The last silence is a gap of the log.
+    is_gap: bool,
+    /// The log has gaps, in which what reads as before may have been written, so that it refutes nothing.
+    has_gaps: bool,
 }
 
 impl Supply {
@@ -48,6 +54,23 @@ impl Supply {
         silent.is_some()
     }
 
+    /// Since the silence that frame `ended` has ended, a drive may be this one; there were `breaches` before.
+    pub(super) fn may_be(&mut self, other: Follower, breaches: usize, ended: usize) {
+        (self.breaches, self.ended, self.is_gap) = (breaches, ended, false);
+        self.restarted = Some(Box::new(other));
+    }
+
+    /// The same behind a gap of the log, which ends at `at`.
+    pub(super) fn has_gap(
+        &mut self,
+        other: Follower,
+        breaches: usize,
+        (ended, at): (usize, Instant),
+    ) {
+        self.may_be(other, breaches, ended);
+        (self.is_gap, self.has_gaps, self.sent) = (true, true, Some(at));
+    }
+
     /// A register was written at `at`, and certainly held `before` until then, if that is known.
     pub(super) fn wrote(&mut self, register: u8, before: Option<u32>, at: Instant) {
         self.written.entry(register).or_insert((before, at)).1 = at;
@@ -65,7 +88,7 @@ impl Supply {
         let differs = |own: &(Option<u32>, Instant)| {
             own.0.is_some_and(|before| before != value) && own.1 <= self.silent
         };
-        if written.is_some_and(differs) {
+        if written.is_some_and(differs) && !self.has_gaps {
             self.restarted = None;
         }
     }
@@ -97,7 +120,7 @@ impl Follower {
         (own.second, own.other_rate) = (self.second.clone(), self.other_rate);
         own.asked = self.asked.clone();
         for asked in &mut own.asked {
-            asked.sure = false;
+            (asked.sure, asked.excused) = (false, false);
             let written = kept.get(&asked.register);
             if written.is_none_or(|written| *written > asked.at) {
                 asked.held = Held::any();
@@ -105,6 +128,7 @@ impl Follower {
         }
         (own.slowest, own.short_map) = (self.slowest, self.short_map);
         (own.others, own.used) = (self.others.clone(), self.used);
+        own.elsewhere = self.elsewhere.clone();
         // A restart makes no register writable.
         own.refused = self.refused.clone();
         own.guessed = self.guessed;
@@ -113,8 +137,8 @@ impl Follower {
         own
     }
 
-    /// What differs since the last silence, and does not where the supply was switched off and on in it, accuses no drive.
-    pub(super) fn explain_by_restart(&mut self, number: usize) {
+    /// What differs since the last silence, and does not where the supply was switched off and on in it or the log has a gap, accuses no drive.
+    pub(super) fn explain_by_silence(&mut self, number: usize) {
         let Some(restarted) = &self.supply.restarted else {
             return;
         };
@@ -122,27 +146,33 @@ impl Follower {
         let Some(first) = since.first() else {
             return;
         };
-        let shown = since.len() >= OFF || since.iter().any(|own| own.what != Missing);
+        let is_gap = self.supply.is_gap;
+        let shown = is_gap || since.len() >= OFF || since.iter().any(|own| own.what != Missing);
         if !shown || !restarted.judged.breaches.is_empty() {
             return;
         }
         let doubt = format!(
-            "frame {number}, drive {}: {}; its supply may have been switched off and on in the silence from {} on, which explains it",
+            "frame {number}, drive {}: {}; {} in the silence in front of frame {}, which explains it",
             self.drive,
             first.about,
-            self.supply.silent.since_start()
+            match is_gap {
+                true => "the log has a gap, and what it does not have may have come",
+                false => "its supply may have been switched off and on",
+            },
+            self.supply.ended
         );
         let Some(restarted) = self.supply.restarted.take() else {
             return;
         };
         let mut judged = std::mem::take(&mut self.judged);
-        let sent = self.supply.sent;
+        let Supply { sent, has_gaps, .. } = self.supply;
         judged.breaches.truncate(self.supply.breaches);
         judged.doubt(doubt);
         *self = *restarted;
         self.judged = judged;
         self.supply = Supply {
             sent,
+            has_gaps,
             ..Supply::default()
         };
     }
