@@ -323,8 +323,11 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
+/// The format of a file. A compressed one may hold its lines as they are, so that it looks like a log.
 fn format(bytes: &[u8]) -> Option<&'static Format> {
-    FORMATS.iter().find(|own| (own.recognised)(bytes))
+    let foreign = FOREIGN.iter().any(|own| bytes.starts_with(own.0));
+    let mut formats = FORMATS.iter().filter(|_| !foreign);
+    formats.find(|own| (own.recognised)(bytes))
 }
 
 /// Whether a file that begins so is to be read as a capture: it is of a format, or it is no text of a scenario either.

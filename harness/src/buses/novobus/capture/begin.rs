@@ -105,8 +105,13 @@ pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
 /// The gaps of a capture, counted in the bytes of all links in order of time.
 pub(super) fn gaps(capture: &Capture) -> Vec<Gap> {
     let octet = capture.rate.byte_time();
-    gap::gaps(ends(capture).into_iter().map(|at| (at - octet, at)))
+    let mut gaps = gap::gaps(ends(capture).into_iter().map(|at| (at - octet, at)));
+    gaps.retain(|own| own.silence >= PAUSE);
+    gaps
 }
+
+/// A ring may be silent for as long: no drive sends anything by itself.
+const PAUSE: Span = Span::from_millis(1_000);
 
 /// When the bytes of all links had passed, in order.
 fn ends(capture: &Capture) -> Vec<Instant> {
