@@ -106,12 +106,12 @@ pub(super) fn after_silences(capture: &Capture) -> Vec<Instant> {
 pub(super) fn gaps(capture: &Capture) -> Vec<Gap> {
     let octet = capture.rate.byte_time();
     let mut gaps = gap::gaps(ends(capture).into_iter().map(|at| (at - octet, at)));
-    gaps.retain(|own| own.silence >= PAUSE);
+    gaps.retain(|own| own.silence >= MASTER_PAUSE);
     gaps
 }
 
 /// A ring may be silent for as long: no drive sends anything by itself.
-const PAUSE: Span = Span::from_millis(1_000);
+const MASTER_PAUSE: Span = Span::from_millis(1_000);
 
 /// When the bytes of all links had passed, in order.
 fn ends(capture: &Capture) -> Vec<Instant> {
