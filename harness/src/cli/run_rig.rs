@@ -212,7 +212,7 @@ fn all(
     };
     if session.opening().is_some() && (job.qualify || entries.iter().any(needs)) {
         for why in wrong_parity::obstacles(session)? {
-            output.complain(&why);
+            output.say(&format!("{why}\n"));
         }
     }
     let mut run = match Run::new(session) {

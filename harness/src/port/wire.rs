@@ -329,12 +329,26 @@ impl Wire {
     fn lost(&self, error: impl Into<std::io::Error>) -> Trouble {
         let error = error.into();
         match error.kind() {
+            _ if self.has_no_adapter(Some(&error)) => self.closed(),
             ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => self.closed(),
             _ => Trouble::Lost(format!("{}: the port is lost: {error}", self.name)),
         }
     }
 
+    /// What a serial port shows when its adapter is gone: an end, or one of these errors.
+    fn has_no_adapter(&self, error: Option<&std::io::Error>) -> bool {
+        let gone = [Errno::IO, Errno::NODEV, Errno::NXIO].map(|own| Some(own.raw_os_error()));
+        let is_port = self.is_uart() || self.plain_serial.is_some();
+        is_port && error.is_none_or(|own| gone.contains(&own.raw_os_error()))
+    }
+
     fn closed(&self) -> Trouble {
+        if self.has_no_adapter(None) {
+            return Trouble::Lost(format!(
+                "{}: the port is lost: its adapter was pulled out or has no power",
+                self.name
+            ));
+        }
         let when = match self.read {
             0 => "before it sent a byte".to_owned(),
             read => format!("after it sent {}", counted(read, "byte")),

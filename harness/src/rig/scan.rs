@@ -102,12 +102,17 @@ pub fn resolve(
 /// read is not there.
 #[must_use]
 pub fn scan(root: &Path) -> Vec<FoundPort> {
+    let consoles = std::fs::read_to_string(root.join("sys/class/tty/console/active"));
+    let consoles = consoles.unwrap_or_default();
     let entries = std::fs::read_dir(root.join("sys/class/tty"))
         .into_iter()
         .flatten();
+    // The kernel writes its messages to a console.
+    let is_console = |name: &str| consoles.split_whitespace().any(|own| own == name);
     let mut ports: Vec<_> = entries
         .take(MAX_PORTS)
         .filter_map(Result::ok)
+        .filter(|entry| !entry.file_name().to_str().is_some_and(is_console))
         .filter_map(|entry| port(root, &entry.path()))
         .collect();
     ports.sort_by_key(|port| natural(&port.device));

@@ -45,7 +45,7 @@ pub(crate) fn on_ports(
         }
     };
     match wrong_parity::obstacles(&mut session) {
-        Ok(all) => all.iter().for_each(|why| output.complain(why)),
+        Ok(all) => all.iter().for_each(|why| output.say(&format!("{why}\n"))),
         Err(error) => {
             output.complain(&error.to_string());
             let exit = exit_of(&error);

@@ -431,6 +431,9 @@ fn tree() -> tempfile::TempDir {
     put("sys/class/tty/ttyS0/type", "0\n");
     tty("ttyS1", "4:65");
     put("sys/class/tty/ttyS1/type", "4\n");
+    put("sys/class/tty/console/active", "tty0 ttyS2\n");
+    tty("ttyS2", "4:66");
+    put("sys/class/tty/ttyS2/type", "4\n");
     for (name, dev, serial) in [("ttyUSB10", "188:10", "B2"), ("ttyUSB2", "188:2", "A1")] {
         tty(name, dev);
         let text = format!(

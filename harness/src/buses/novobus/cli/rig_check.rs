@@ -96,13 +96,6 @@ pub(crate) fn check(
         ));
         exit = Exit::RigError;
     }
-    for (found, (_, ring)) in figures.rings.iter().zip(rig.rings()) {
-        let port = ring.endpoint.port.as_deref().unwrap_or("the port");
-        if let Some(why) = found.wrong_parity.and_then(|own| own.obstacle(port)) {
-            output.complain(&why);
-            exit = Exit::RigError;
-        }
-    }
     for drive in &figures.drives {
         if let Some(contradiction) = &drive.contradiction {
             output.complain(&format!("drive {}: {contradiction}", drive.axis));
@@ -137,8 +130,11 @@ fn text(rig: &Rig, figures: &Figures) -> String {
             found.rate.bits_per_second(),
             late_of(found)
         );
-        if found.wrong_parity == Some(WrongParity::Noticed) {
-            text += "  a byte sent with a wrong parity bit was noticed\n";
+        if let Some(own) = found.wrong_parity {
+            let port = ring.endpoint.port.as_deref().unwrap_or("the port");
+            let noticed = "a byte sent with a wrong parity bit was noticed".to_owned();
+            let line = own.obstacle(port).unwrap_or(noticed);
+            let _infallible = writeln!(text, "  {line}");
         }
     }
     for (ring, SpelledOut { drive, why }) in &figures.reported {

@@ -9,6 +9,7 @@ use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::watch::{HEX, WatchBench, WatchedCell, watch as show};
+use crate::counted::counted;
 use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::{Instant, Span};
@@ -29,7 +30,15 @@ pub(crate) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<E
                 drives: &drives,
                 cells: &cells,
             };
-            readings.show(&mut watched, output)
+            let ended = readings.show(&mut watched, output);
+            match bench.bus.corrected_errors() {
+                0 => {}
+                errors => output.say(&format!(
+                    "{} on the bus corrected (ND21 11.5)\n",
+                    counted(errors, "error")
+                )),
+            }
+            ended
         })
     })
 }

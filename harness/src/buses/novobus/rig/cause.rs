@@ -70,9 +70,17 @@ pub enum LikelyCause {
     HeldUp,
     /// The bytes are damaged in the same way each time.
     #[error(
-        "the drives run at another rate or with another parity. Next: try `line = \"19200 8O1\"` and `line = \"9600 8O1\"` in the rig's file (ND21 8.3)"
+        "the drives run at another rate or with another parity. Next: try {} in the rig's file (ND21 8.3)", other_lines(*stated)
     )]
-    RateOrParity,
+    RateOrParity {
+        /// The rate in the rig's file.
+        stated: Rate,
+    },
+    /// As many bytes come back as were sent, and each is damaged.
+    #[error(
+        "every byte has a parity error: the other end may have another parity. Next: set the device server or the converter at the other end to 8 data bits, odd parity, 1 stop bit, which the drives have (ND21 8.3)"
+    )]
+    Parity,
     /// The rig's file is wrong about in-band marks.
     #[error(
         "the other end of the port {}. Next: set `marks = \"{}\"` for this ring in the rig's file",
@@ -159,11 +167,22 @@ pub(crate) fn cause(
         }
         return LikelyCause::NoCommands;
     }
-    if first == second || mostly_damaged == [true, true] {
-        LikelyCause::RateOrParity
+    let all_damaged = |bytes: &[Received]| bytes.len() == SENT && damaged(bytes) == SENT;
+    if all_damaged(&first) && all_damaged(&second) {
+        LikelyCause::Parity
+    } else if first == second || mostly_damaged == [true, true] {
+        LikelyCause::RateOrParity { stated }
     } else {
         LikelyCause::Noise
     }
+}
+
+/// The lines of the other rates, as a rig's file has them.
+fn other_lines(stated: Rate) -> String {
+    let rates = [Rate::Baud38400, Rate::Baud19200, Rate::Baud9600];
+    let others = rates.iter().filter(|own| **own != stated);
+    let lines = others.map(|own| format!("`line = \"{} 8O1\"`", own.bits_per_second()));
+    lines.collect::<Vec<_>>().join(" and ")
 }
 
 /// What a ring says that gives the same good byte for each SYNCO: it spells out a drive, or the drives that are in the error mode add 1 each
@@ -370,13 +389,26 @@ mod tests {
         };
         assert_eq!(named(&FOREIGN(), &held), LikelyCause::HeldLine);
 
+        let stated = Rate::Baud38400;
+        let even = || vec![Received::bad(0, LineError::Break); SENT];
+        assert_eq!(
+            named(&FOREIGN(), &heard(even(), even())),
+            LikelyCause::Parity
+        );
+
         let damaged = |byte: u8| vec![Received::bad(byte, LineError::Framing); SENT / 2];
         let other_rate = heard(damaged(0x78), damaged(0x78));
-        assert_eq!(named(&FOREIGN(), &other_rate), LikelyCause::RateOrParity);
+        assert_eq!(
+            named(&FOREIGN(), &other_rate),
+            LikelyCause::RateOrParity { stated }
+        );
         // Without marks the same bytes come back each time, and they are not SYNCO.
         let wrong = |byte: u8| vec![Received::good(byte); SENT / 2];
         let unmarked = heard(wrong(0xE6), wrong(0xE6));
-        assert_eq!(named(&FOREIGN(), &unmarked), LikelyCause::RateOrParity);
+        assert_eq!(
+            named(&FOREIGN(), &unmarked),
+            LikelyCause::RateOrParity { stated }
+        );
 
         let noise = |seed: u8| -> Vec<Received> {
             (0..200u8)
@@ -400,9 +432,9 @@ mod tests {
         };
         assert_eq!(same(0x81), LikelyCause::StaysInErrorMode(0));
         assert_eq!(same(0x83), LikelyCause::StaysInErrorMode(2));
-        assert_eq!(same(0x84), LikelyCause::RateOrParity);
+        assert_eq!(same(0x84), LikelyCause::RateOrParity { stated });
         assert_eq!(same(0x02), LikelyCause::LinkInFront(2));
-        assert_eq!(same(0x03), LikelyCause::RateOrParity);
+        assert_eq!(same(0x03), LikelyCause::RateOrParity { stated });
 
         let address = |k: u8| {
             let zeros = std::iter::repeat_n(Received::good(0), 20);
