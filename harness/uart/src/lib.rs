@@ -23,8 +23,12 @@ const TIOCGICOUNT: Opcode = 0x545D;
 /// ASYNC_LOW_LATENCY of `linux/tty_flags.h`.
 const LOW_LATENCY: c_int = 1 << 13;
 
-/// PORT_16550A and the other types of 8250 chips that have no rates but those of a divisor of 16 bits (`linux/serial_core.h`).
-const DIVIDED: [c_int; 5] = [1, 2, 3, 4, 13];
+/// PORT_8250, PORT_16450, PORT_16550A, PORT_16750 and PORT_NS16550A: the chips that have no rates but those of a divisor of 16 bits
+/// (`linux/serial_core.h`).
+const DIVIDED: [c_int; 5] = [1, 2, 4, 8, 14];
+
+/// The major number of the ports of the driver for 8250 chips. Drivers of USB adapters name such a chip too, with any base rate.
+const TTY_MAJOR: u32 = 4;
 
 /// `struct serial_icounter_struct`.
 #[repr(C)]
@@ -133,7 +137,9 @@ pub fn counts(port: impl AsFd) -> Option<Counts> {
 /// The rate that a port makes in place of the one that is asked for, in bit/s; `None` where its driver does not say from what it divides.
 /// The driver for 8250 chips (16550) takes every rate, says that it has it, and makes the nearest whole fraction of its base rate.
 pub fn real_rate(port: impl AsFd, asked: u32) -> Option<u32> {
+    let device = rustix::fs::fstat(&port).ok()?.st_rdev;
     let own: SerialStruct = get::<TIOCGSERIAL, _>(port.as_fd()).ok()?;
+    let own = Some(own).filter(|_| rustix::fs::major(device) == TTY_MAJOR)?;
     let base = u32::try_from(own.baud_base).ok().filter(|base| *base > 0)?;
     DIVIDED.contains(&own.kind).then(|| divided(base, asked))
 }

@@ -6,6 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
 use crate::link::Line as _;
+use crate::port::UNPROVEN_RATE;
 use crate::rig::{Rig, UseOptions};
 use harness_proto::profibus::dp::Diagnosis;
 use serde_json::json;
@@ -69,7 +70,7 @@ pub(crate) fn check(
         .ports_mut()
         .is_some_and(|own| own.has_unproven_rate(0))
     {
-        text += "the driver of the port does not say whether its chip makes this rate: the guide's page on wiring tells which do\n";
+        let _infallible = writeln!(text, "{UNPROVEN_RATE}");
     }
     session.look_at_interlocks();
     let exit = exit_of_end(session.link().trouble(), exit, output);

@@ -11,6 +11,7 @@ use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
 use crate::counted::counted;
 use crate::guard::{Guarded, Safe, Standstill, Watch};
 use crate::medium::{ErrorMarks, Pieces};
+use crate::port::UNPROVEN_RATE;
 use crate::port::{PortAddress, PortSettings};
 use crate::rig::lock::PortLock;
 use crate::rig::port_file::Port;
@@ -173,7 +174,13 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
     session.drives_mut().slaves = found;
     session.sound()?;
     match silent {
-        Err(why) if !ill_as_well => Err(session.failed(&why)),
+        Err(mut why) if !ill_as_well => {
+            let ports = session.link().inner_mut().ports_mut();
+            if ports.is_some_and(|own| own.has_unproven_rate(0)) {
+                why = format!("{why}; {UNPROVEN_RATE}");
+            }
+            Err(session.failed(&why))
+        }
         _ => Ok(()),
     }
 }
