@@ -208,6 +208,8 @@ fn rooms_import_from_rooms_in_front_of_them() {
         }
         seen.insert(room);
     }
+    // Its file is one of harness-proto.
+    seen.insert("counted".to_owned());
     let missing: Vec<_> = ROOMS.iter().filter(|room| !seen.contains(**room)).collect();
     assert!(missing.is_empty(), "no such room: {missing:?}");
 }
