@@ -14,6 +14,7 @@ pub mod file;
 pub mod find;
 pub mod hook;
 mod in_use;
+pub(crate) mod left;
 pub mod lock;
 pub(crate) mod open;
 mod permitted;

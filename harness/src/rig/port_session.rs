@@ -1,5 +1,6 @@
 //! A rig with a port in use, whatever its bus: locked, opened, guarded, and taken to its safe state on every way out.
 
+use super::left::NotPutBack;
 use super::lock::{PortLock, PortLockError};
 use super::port_file::Port;
 use super::segment::observed::Beats;
@@ -12,6 +13,7 @@ use crate::medium::{Heard, Pieces};
 use crate::port::OpenError;
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
+use std::io::Write as _;
 use std::os::fd::AsFd;
 use std::time::Instant;
 
@@ -82,6 +84,7 @@ pub struct PortSession<D: PortDrives> {
     listen_only: bool,
     /// The drives are as they are to be left.
     ended: bool,
+    left: NotPutBack,
     // Given back in this order.
     watchdog: Option<Watchdog>,
     _locks: Vec<PortLock>,
@@ -109,6 +112,7 @@ impl<D: PortDrives> PortSession<D> {
             // Nothing has been moved: there is nothing to make safe while the drives have not been found ready.
             ended: true,
             watchdog: None,
+            left: NotPutBack::of(rig),
             _locks: locks,
             taken,
         };
@@ -275,6 +279,11 @@ impl<D: PortDrives> PortSession<D> {
         self.link.reset_after_denial();
     }
 
+    /// What a scenario has changed and is not put back yet.
+    pub(crate) const fn left(&self) -> &NotPutBack {
+        &self.left
+    }
+
     /// What shows the watchdog that the program works.
     pub(crate) fn beats(&mut self) -> Beats {
         let ports = self.link.inner_mut().ports_mut();
@@ -292,6 +301,7 @@ impl<D: PortDrives> PortSession<D> {
         };
         let words = |_| pieces.clone();
         let words = ports.last_words(&words).map_err(SessionError::Watchdog)?;
+        let alarm = alarm.telling(self.left.clone());
         watch_over(&self.rig, ports.beats(), words, alarm).map(Some)
     }
 
@@ -338,7 +348,12 @@ impl<D: PortDrives> Drop for PortSession<D> {
     /// A panic unwinds through here.
     fn drop(&mut self) {
         if !self.ended {
-            let _told_by_nobody = self.end(true);
+            let end = self.end(true);
+            let mut words: Vec<_> = end.safe.iter().map(ToString::to_string).collect();
+            words.extend(self.left.all());
+            if std::thread::panicking() {
+                let _nobody_reads = writeln!(std::io::stderr(), "{}", words.join("\n"));
+            }
         }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! The folder is `$DRIVEBENCH_STATE`, else `/run/lock/drivebench`, which all users of a machine share, else
 //! `$XDG_RUNTIME_DIR/drivebench`, else `drivebench-UID` in the folder for temporary files. Of each rig it has
-//! `ID.lock`, which is never removed, `ID.quarantine` while the rig must not be used, and `ID.rest` where it was left at rest.
+//! `ID.lock`, which is never removed, `ID.quarantine` while the rig must not be used, `ID.rest` where it was left at rest,
+//! and `ID.left` while a scenario has changed what is not put back yet.
 
 use super::check::Rig;
 use super::file::Quarantine;
@@ -176,11 +177,15 @@ fn rest_file(folder: &Path, id: &str) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn left_at_rest(folder: &Path, id: &str) -> io::Result<()> {
+    create(&rest_file(folder, id))?.write_all(boot().as_bytes())
+}
+
+/// Makes one of these files anew.
+pub(crate) fn create(path: &Path) -> io::Result<File> {
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create(true).truncate(true);
     options.custom_flags(Links::Refuse.flags());
-    let mut file = options.open(rest_file(folder, id))?;
-    file.write_all(boot().as_bytes())
+    options.open(path)
 }
 
 /// Whether a rig was left at rest since the last boot. Asking removes the note, because the caller is about to send something.

@@ -4,6 +4,7 @@
 use super::Rig;
 use super::around::power_off;
 use super::file::SafeStep;
+use super::left::NotPutBack;
 use super::session_error::SessionError;
 use crate::port::LastWords;
 use std::fmt;
@@ -26,6 +27,15 @@ impl Alarm {
     /// An alarm that does this.
     pub fn new(act: impl Fn(&str) + Send + Sync + 'static) -> Self {
         Self(Some(Arc::new(act)))
+    }
+
+    /// The same, which also says what is left changed in the drives.
+    pub(crate) fn telling(self, left: NotPutBack) -> Self {
+        Self::new(move |why| {
+            let mut all = vec![why.to_owned()];
+            all.extend(left.all());
+            self.sound(&all.join("\n"));
+        })
     }
 
     fn sound(&self, why: &str) {
@@ -154,6 +164,21 @@ mod tests {
         let said = bitten.recv().expect("it bites");
         assert!(said.contains("no sign of life") && said.ends_with("the power is off"));
         assert!(bitten.recv().is_err(), "it bites once");
+    }
+
+    /// What was not put back is said with it, also behind the begin of the watch.
+    #[test]
+    fn it_says_what_is_left_changed() {
+        let left = NotPutBack::default();
+        let (bite, bitten) = channel();
+        let alarm = Alarm::new(move |why| bite.send(why.to_owned()).expect("the test waits"));
+        let alarm = alarm.telling(left.clone());
+        left.set(vec!["slave 8: `drivebench write 8`".to_owned()]);
+        alarm.sound("it hangs");
+        assert_eq!(
+            bitten.recv().expect("it bites"),
+            "it hangs\nslave 8: `drivebench write 8`"
+        );
     }
 
     #[test]

@@ -307,9 +307,15 @@ fn a_served_inverter_is_qualified() {
     ended(&desk.run("verify kept"), 0, " 0 things wrong");
 }
 
-/// Settings of the bus that were switched for a scenario are set back, also after a signal.
+/// Settings of the bus that were switched for a scenario are set back, also after a signal. Behind a run that was killed, the next one says
+/// which command does it.
 #[test]
 fn switched_settings_are_set_back_after_a_signal() {
+    switched_settings_are_set_back("-INT");
+    switched_settings_are_set_back("-KILL");
+}
+
+fn switched_settings_are_set_back(signal: &str) {
     let desk = Desk::of("tcp", "", "slave 8\nslave 8 parameter 1621 = 2\n");
     desk.permit(&["eeprom", "bus_settings"]);
     let local =
@@ -329,9 +335,10 @@ fn switched_settings_are_set_back_after_a_signal() {
         .spawn()
         .expect("the program");
     let end = Instant::now() + Duration::from_secs(60);
-    // The wait has begun when the record has the reply of the scenario.
-    while !std::fs::read_to_string(desk.path("kept/run.jsonl"))
-        .is_ok_and(|own| own.contains("0970"))
+    // The wait has begun when the record has the reply of the scenario, behind what switches the settings.
+    while !desk.path("state/desk.left").exists()
+        || !std::fs::read_to_string(desk.path("kept/run.jsonl"))
+            .is_ok_and(|own| own.contains("0970"))
     {
         assert!(Instant::now() < end, "the scenario does not begin");
         std::thread::sleep(Duration::from_millis(50));
@@ -339,12 +346,32 @@ fn switched_settings_are_set_back_after_a_signal() {
     let id = child.id().to_string();
     assert!(
         Command::new("kill")
-            .args(["-INT", &id])
+            .args([signal, &id])
             .status()
             .expect("kill")
             .success()
     );
     let output = child.wait_with_output().expect("its end");
+    if signal == "-KILL" {
+        let next = said(&desk.run("run nordac-en-1-start --rig desk.toml"));
+        assert!(
+            next.contains("the run before ended without putting back"),
+            "{next}"
+        );
+        let command = next
+            .split('`')
+            .find(|own| own.starts_with("drivebench write 8 "));
+        let command = command.expect("what puts it back");
+        let program = env!("CARGO_BIN_EXE_drivebench");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &command.replacen("drivebench", program, 1)]);
+        let shell = shell
+            .current_dir(desk.folder.path())
+            .env("DRIVEBENCH_STATE", desk.path("state"));
+        ended(&shell.output().expect("sh"), 0, "");
+        desk.shows("read 8 1621 --rig desk.toml", "  2 ");
+        return;
+    }
     assert_eq!(output.status.code(), Some(130), "{}", said(&output));
     assert!(said(&output).contains(SAFE), "{}", said(&output));
     desk.shows("read 8 1621 --rig desk.toml", "  2 ");

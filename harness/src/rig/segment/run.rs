@@ -4,6 +4,7 @@ use super::observed::Beats;
 use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
+use crate::rig::left::NotPutBack;
 use crate::rig::port_session::{PortDrives, PortSession, failed};
 use crate::rig::{
     Again, Attempt, End, Keeper, PlayedScenario, Rig, SessionError, UseOptions, attempts_of,
@@ -35,6 +36,9 @@ pub(crate) trait PortPlayer: Sized {
 
     /// Judging may take long: the count that shows that the program works meanwhile.
     fn shows_life(&mut self, beats: Beats);
+
+    /// Where it says what a scenario changes, before it does: for a program that ends before that is put back.
+    fn tells(&mut self, _left: NotPutBack) {}
 
     /// What a record says of a rig on which motors may turn or not.
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
@@ -110,12 +114,13 @@ impl<P: PortPlayer> PortRun<P> {
     pub(crate) fn on(mut session: PortSession<P::Drives>, options: &UseOptions) -> Self {
         let mut player = P::new(session.rig(), options.allow_motion, options.ill_as_well);
         player.shows_life(session.beats());
+        player.tells(session.left().clone());
         Self {
             again: Again::new(!session.rig().is_simulated()),
+            notes: session.left().before().into_iter().collect(),
             session,
             player,
             options: options.clone(),
-            notes: Vec::new(),
             over: None,
             unfinished: None,
         }
@@ -136,6 +141,7 @@ impl<P: PortPlayer> PortRun<P> {
         let player = &mut self.player;
         let set_back = |session: &mut _| player.set_back(own, session);
         let notes = self.session.without_deadline(set_back);
+        self.session.left().set(notes.clone());
         self.notes.extend(notes);
     }
 
@@ -159,6 +165,7 @@ impl<P: PortPlayer> PortRun<P> {
         let (rig, options) = (self.session.rig(), &self.options);
         self.player = P::new(rig, options.allow_motion, options.ill_as_well);
         self.player.shows_life(self.session.beats());
+        self.player.tells(self.session.left().clone());
         self.again = Again::new(!self.session.rig().is_simulated());
         self.over = None;
     }

@@ -18,11 +18,14 @@ const MOST_KEPT: usize = 1_000_000;
 /// A link to inverters, observed.
 pub(super) type Observed<'l> = crate::rig::segment::observed::Observed<'l, TelegramNotes>;
 
+/// A parameter that may have been written: station, number and IND.
+pub(super) type Written = (u8, u16, u16);
+
 /// What was noted.
 #[derive(Default)]
 pub(super) struct TelegramNotes {
-    /// The parameters that telegrams may have written: station, number and IND.
-    pub(super) written: BTreeSet<(u8, u16, u16)>,
+    /// The parameters that telegrams may have written.
+    pub(super) written: BTreeSet<Written>,
     /// The addresses that telegrams may have given to stations: the station, and its new one.
     pub(super) moved: BTreeSet<(u8, u8)>,
     /// When the last telegram had left.

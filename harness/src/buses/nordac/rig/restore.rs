@@ -5,7 +5,8 @@
 
 use super::RigSlave;
 use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
-use super::player::{Player, idle};
+use super::observed::Written;
+use super::player::{Begun, Player, idle};
 use super::talk::{Talk, TalkError};
 use crate::buses::nordac::safe_state::found;
 use crate::buses::nordac::value::shown;
@@ -17,6 +18,7 @@ use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::SubindexBits;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, Parameter, ParameterRef, Pkw, Task};
+use std::collections::BTreeSet;
 
 #[cfg(test)]
 mod tests;
@@ -52,7 +54,7 @@ impl Player {
                 Some(gate) => gate.places(own.address).collect(),
                 None => vec![own.address],
             };
-            let changed = self.changed(known, &places);
+            let changed = changed(known, &places, self.written());
             let mut talk = Talk::new(Box::new(&mut *line), self.patience());
             let slave = match found(&mut talk, &places) {
                 Ok((address, _)) => RigSlave { address, ..own },
@@ -82,10 +84,10 @@ impl Player {
     }
 
     /// What the last attempt may have changed, and what puts it back, where the slaves were not seen in their safe state.
-    pub(super) fn commands(&self, origin: &str) -> Vec<String> {
+    pub(super) fn commands(&self, written: &BTreeSet<Written>, origin: &str) -> Vec<String> {
         let all = self.known().iter().map(|known| {
             let slave = known.slave;
-            let changed = self.changed(known, &[slave.address]);
+            let changed = changed(known, &[slave.address], written);
             (slave, commands(known, slave, &changed, origin))
         });
         let all = all.filter(|(_, commands)| !commands.is_empty());
@@ -95,21 +97,33 @@ impl Player {
         .collect()
     }
 
-    /// What the last attempt may have changed in a slave that was at these addresses, in the order in which it is put back.
-    fn changed(&self, known: &Known, places: &[u8]) -> Vec<Place> {
-        let written = self.written().iter();
-        let written: Vec<_> = written.filter(|own| places.contains(&own.0)).collect();
-        let wiped = written.iter().any(|(_, number, _)| WIPES.contains(number));
-        let all = known.values.keys().copied();
-        let mut all: Vec<_> = all
-            .filter(|(number, ind)| {
-                let tells = written.iter().any(|own| (own.1, own.2) == (*number, *ind));
-                !WIPES.contains(number) && (wiped || tells)
-            })
-            .collect();
-        all.sort_by_key(|(number, ind)| (rank(*number), *number, *ind));
+    /// The same of what a scenario is about to write, and of the addresses that it gives to slaves.
+    pub(super) fn foretold(&self, begun: &Begun) -> Vec<String> {
+        let mut all = self.commands(&begun.written, self.left.origin());
+        let moved = begun.moved.iter().filter(|(slave, to)| slave != to);
+        all.extend(moved.map(|(slave, to)| {
+            format!("slave {slave} may be at address {to} (1624): with `address = {to}` in the rig's file it is found there")
+        }));
         all
     }
+}
+
+/// What may have been `written` to a slave that was at these addresses, in the order in which it is put back.
+fn changed(known: &Known, places: &[u8], written: &BTreeSet<Written>) -> Vec<Place> {
+    let written: Vec<_> = written
+        .iter()
+        .filter(|own| places.contains(&own.0))
+        .collect();
+    let wiped = written.iter().any(|(_, number, _)| WIPES.contains(number));
+    let all = known.values.keys().copied();
+    let mut all: Vec<_> = all
+        .filter(|(number, ind)| {
+            let tells = written.iter().any(|own| (own.1, own.2) == (*number, *ind));
+            !WIPES.contains(number) && (wiped || tells)
+        })
+        .collect();
+    all.sort_by_key(|(number, ind)| (rank(*number), *number, *ind));
+    all
 }
 
 /// The end of a sentence: the commands that put parameters back; nothing for none.

@@ -10,6 +10,7 @@ use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::TOLERANCE;
 use crate::link::{Link, LinkEvent, Replay};
 use crate::rig::Rig;
+use crate::rig::left::NotPutBack;
 use crate::rig::segment::observed::Beats;
 use crate::rig::segment::run::PortPlayer;
 use crate::rig::segment::{OnSegment, Qualified};
@@ -49,6 +50,10 @@ impl PortPlayer for Player {
         self.beats = beats;
     }
 
+    fn tells(&mut self, left: NotPutBack) {
+        self.left = left;
+    }
+
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {
         let limits = limits(rig, allow_motion);
         let rate = rig.port().map_or(0, |port| rate(port).bits_per_second());
@@ -78,7 +83,7 @@ impl PortPlayer for Player {
     }
 
     fn left_changed(&self, rig: &Rig) -> Vec<String> {
-        self.commands(&rig.origin)
+        self.commands(self.written(), &rig.origin)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

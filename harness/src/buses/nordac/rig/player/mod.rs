@@ -13,10 +13,11 @@ mod unlock;
 
 pub(in crate::buses::nordac) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
 pub(super) use ready::idle;
+pub(super) use rehearse::Begun;
 
 use super::RigSlave;
 use super::known::{INTERFACE, Known};
-use super::observed::{Came, Observed};
+use super::observed::{Came, Observed, Written};
 use super::profile::Profiled;
 use super::settle;
 use super::talk::{Talk, TalkError};
@@ -26,6 +27,7 @@ use crate::buses::nordac::simulate::{self, Bench};
 use crate::guard::Guarded;
 use crate::link::{Capability, Line, Link, LinkEvent, Replay};
 use crate::medium::Medium;
+use crate::rig::left::NotPutBack;
 use crate::rig::segment::observed::{Beats, LinkTimes};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::{Plan, plan};
@@ -42,7 +44,6 @@ use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use harness_sim::nordac::History;
-use rehearse::Begun;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -104,7 +105,9 @@ pub(crate) struct Player {
     /// Known from the first attempt on.
     known: Option<Vec<Known>>,
     /// What the last attempt may have written: station, number and IND.
-    written: BTreeSet<(u8, u16, u16)>,
+    written: BTreeSet<Written>,
+    /// Where it says what a scenario changes, before it does.
+    pub(super) left: NotPutBack,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
     /// What the profile of the rig's file says.
@@ -142,6 +145,7 @@ impl Player {
             restarts,
             known: None,
             written: BTreeSet::new(),
+            left: NotPutBack::default(),
             before: None,
             profile: Profiled::default(),
             partly: Vec::new(),
@@ -180,7 +184,7 @@ impl Player {
     }
 
     /// What the last attempt may have written.
-    pub(super) const fn written(&self) -> &BTreeSet<(u8, u16, u16)> {
+    pub(super) const fn written(&self) -> &BTreeSet<Written> {
         &self.written
     }
 
@@ -274,12 +278,18 @@ impl Player {
             Some(switches) => Ok(Begun {
                 switches,
                 moved: BTreeSet::new(),
+                written: BTreeSet::new(),
             }),
             None => self.rehearsed(own),
         };
         let switches = match begun {
             Ok(begun) => match self.other_station(&begun.moved, link) {
-                Ok(None) => begun.switches,
+                Ok(None) => {
+                    if again.is_none() {
+                        self.left.set(self.foretold(&begun));
+                    }
+                    begun.switches
+                }
                 Ok(Some(why)) => return (AttemptCourse::Skipped(why.into()), false),
                 Err(error) => return (AttemptCourse::Unanswered(error), false),
             },

@@ -5,7 +5,7 @@ use super::{Own, Player};
 use crate::buses::nordac::language::syntax;
 use crate::buses::nordac::rig::MASTER;
 use crate::buses::nordac::rig::known::value_of;
-use crate::buses::nordac::rig::observed::{Came, Observed};
+use crate::buses::nordac::rig::observed::{Came, Observed, Written};
 use crate::buses::nordac::rig::settle::Assumed;
 use crate::buses::nordac::rig::talk::TalkError;
 use crate::buses::nordac::simulate::Bench;
@@ -53,11 +53,13 @@ const PAST_FAULTS: [&[u8]; 2] = [
 ];
 
 /// A scenario that the rig plays.
-pub(super) struct Begun {
+pub(in crate::buses::nordac::rig) struct Begun {
     /// Whether the settings of the bus are switched to those of the scenario.
     pub(super) switches: bool,
     /// The addresses that it gives to slaves: the slave, and its new one.
-    pub(super) moved: BTreeSet<(u8, u8)>,
+    pub(in crate::buses::nordac::rig) moved: BTreeSet<(u8, u8)>,
+    /// What it writes.
+    pub(in crate::buses::nordac::rig) written: BTreeSet<Written>,
 }
 
 /// A scenario played on the model.
@@ -70,6 +72,8 @@ pub(super) struct Rehearsal {
     lost: Option<String>,
     /// The addresses that it gives to slaves.
     moved: BTreeSet<(u8, u8)>,
+    /// What it writes.
+    written: BTreeSet<Written>,
     /// What came from the first telegram on that makes the slaves ready.
     pub(super) came: Came,
 }
@@ -142,6 +146,7 @@ impl Player {
             None => Ok(Begun {
                 switches,
                 moved: played.moved,
+                written: played.written,
             }),
         }
     }
@@ -313,6 +318,7 @@ impl Player {
         };
         let came = observed.noted.came();
         let moved = std::mem::take(&mut observed.noted.moved);
+        let written = std::mem::take(&mut observed.noted.written);
         let faulted = self.known().iter().map(|own| own.slave.address);
         let faulted = faulted.into_iter().find(|slave| {
             let drive = link.inner().drive(*slave);
@@ -331,6 +337,7 @@ impl Player {
             faulted,
             lost,
             moved,
+            written,
             came,
         }
     }
