@@ -151,6 +151,16 @@ fn on_and_the_ways_to_stop() {
         assert!(shown.contains(&format!("STW {word} -> ")), "{shown}");
         assert!(shown.contains(&format!("({state}")), "{shown}");
     }
+    // A word that stops and is not obeyed: only a motor that is not blocked is no safe state.
+    let wrong = file(
+        "nordac-on.scn",
+        "slave 8 parameter 1621 = 2\nslave 8 deviates always-enabled-shown\n",
+    );
+    for (command, expected) in [("off", 1), ("quick-stop", 1), ("block", 7)] {
+        let (code, complaint) = fails(&[command, "8", "--setup", &wrong]);
+        assert_eq!(code, expected, "{complaint}");
+        assert!(complaint.contains("use the emergency stop"), "{complaint}");
+    }
     let shown = done(&["acknowledge", "8"]);
     assert!(
         shown.starts_with("slave 8: it had no fault; STW 047D"),

@@ -78,6 +78,7 @@ impl From<driver::Error> for Failure {
         use driver::Error;
         let exit = match &error {
             Error::Link(trouble) => exit_of_trouble(trouble),
+            error if error.is_not_blocked() => Exit::NotSafe,
             Error::Taken { .. } | Error::OtherMaster { .. } | Error::NotSent => Exit::RigError,
             Error::NotRunning(_) | Error::NoChannel { .. } | Error::Setpoint { .. } => Exit::Usage,
             _ => Exit::Failed,

@@ -2,7 +2,7 @@
 
 use crate::link::Trouble;
 use harness_proto::nordac::parameter::Limit;
-use harness_proto::nordac::words::State;
+use harness_proto::nordac::words::{State, stw};
 use harness_proto::nordac::{IDENT, Parameter, ParameterRef, PkwError, PpoType};
 use harness_proto::profibus::dp::{Diagnosis, Service};
 use std::fmt;
@@ -132,7 +132,7 @@ pub enum Error {
         reads: i64,
     },
     /// The status word does not show what a control word leads to (NORDAC 3.3).
-    #[error("slave {slave}: {expected} expected after STW {stw:04X}, and its status word is {zsw:04X} ({}){}", state(*.zsw), remedy(*.zsw, *.stw))]
+    #[error("slave {slave}: {expected} expected after STW {stw:04X}, and its status word is {zsw:04X} ({}){}{}", state(*.zsw), remedy(*.zsw, *.stw), stop(expected))]
     NotReached {
         /// Its address.
         slave: u8,
@@ -268,6 +268,23 @@ fn remedy(zsw: u16, stw: u16) -> &'static str {
         "; it is under local control: set its interface (1621) to 2"
     } else {
         ""
+    }
+}
+
+impl Error {
+    /// Whether a motor that was to be blocked (OFF2) is not.
+    pub(in crate::buses::nordac) fn is_not_blocked(&self) -> bool {
+        matches!(self, Self::NotReached { expected, stw: word, .. } if *expected == OUTPUT_OFF && word & stw::NO_OFF2 == 0)
+    }
+}
+
+/// What is expected behind a word that stops.
+pub(super) const OUTPUT_OFF: &str = "output off";
+
+fn stop(expected: &str) -> &'static str {
+    match expected {
+        OUTPUT_OFF => "; use the emergency stop",
+        _ => "",
     }
 }
 

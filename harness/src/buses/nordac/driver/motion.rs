@@ -1,5 +1,6 @@
 //! Motors: setpoints, and the state machine step by step (NORDAC 3.2, 3.3).
 
+use super::error::OUTPUT_OFF;
 use super::{Driver, Error};
 use harness_proto::nordac::words::{FULL, State, stw, zsw};
 use harness_proto::nordac::{Image, ParameterRef};
@@ -166,7 +167,7 @@ impl Driver<'_> {
                 changed = (self.now(), seen.main());
             }
             if self.now() >= changed.0 + STANDS {
-                return Err(not_reached(slave, "output off", word, &seen));
+                return Err(not_reached(slave, OUTPUT_OFF, word, &seen));
             }
             seen = self.cycle(slave)?;
         }
