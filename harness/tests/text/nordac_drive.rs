@@ -339,7 +339,7 @@ fn params() {
         "sim:nordac",
     ]);
     assert!(
-        code == 1 && complaint.contains("2 parameters were written"),
+        code == 1 && complaint.contains("2 parameters written"),
         "{complaint}"
     );
     assert!(

@@ -15,6 +15,8 @@ pub(super) enum Way {
     Unknown,
     /// It was switched on, and Set_Prm has not come since then.
     Waits,
+    /// Set_Prm of this master with Unlock was confirmed.
+    Freed(u8),
     /// Set_Prm of this master was confirmed; whether the slave must take it, and whether it has the watchdog on.
     Parametrised {
         master: u8,
@@ -263,6 +265,7 @@ impl Follower {
                     && own.user.is_empty(),
                 watchdog: own.has(SetPrm::WATCHDOG),
             },
+            (Some(own), true) if own.has(SetPrm::UNLOCK) => Way::Freed(request.sa()),
             // Too short.
             (None, true) => Way::Parametrised {
                 master: request.sa(),
@@ -322,7 +325,7 @@ impl Follower {
         if self.way == Way::Waits {
             return Some((Form, "EN 2", "RS is expected before Set_Prm".to_owned()));
         }
-        let early = matches!(self.way, Way::Parametrised { master, .. } if master == request.sa() && self.fresh);
+        let early = matches!(self.way, Way::Parametrised { master, .. } | Way::Freed(master) if master == request.sa() && self.fresh);
         if early {
             return Some((Form, "EN 2", "RS is expected before Chk_Cfg".to_owned()));
         }
@@ -380,6 +383,18 @@ impl Follower {
         let of = |master: u8| own.master == Some(master);
         match self.way {
             Way::Waits if !waits => value("Prm_Req is expected before Set_Prm".to_owned()),
+            // One that another master has locked takes none of it.
+            Way::Freed(master)
+            | Way::Parametrised {
+                right: false,
+                master,
+                ..
+            }
+            | Way::Configured {
+                ppo: None, master, ..
+            } if self.fresh && !waits && of(master) => {
+                value("Prm_Req is expected behind what the slave must refuse, or Unlock".to_owned())
+            }
             Way::Parametrised { right: false, .. }
                 if self.fresh && waits && !own.has(Diagnosis::PRM_FAULT) =>
             {
