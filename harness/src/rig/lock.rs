@@ -386,3 +386,23 @@ impl Drop for PortLock {
         let _gone = flock(&self.port, FlockOperation::Unlock);
     }
 }
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interface_has_one_program_at_a_time() {
+        let me = std::process::id().to_string();
+        let name = format!("can-{me}");
+        let first = PortLock::of_interface(&name).expect("a free interface");
+        let busy = PortLock::of_interface(&name).expect_err("in use");
+        let busy = busy.to_string();
+        assert!(
+            busy.contains("in use by another program") && busy.contains(&me),
+            "{busy}"
+        );
+        drop(first);
+        assert!(PortLock::of_interface(&name).is_ok());
+    }
+}

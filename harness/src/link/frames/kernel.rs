@@ -281,10 +281,10 @@ mod tests {
         };
         let may = Ok(Listening::MayAcknowledge);
         for (state, settings, expected) in [
-            (good.clone(), &sends, may.clone()),
-            (of_nothing.clone(), &sends, may.clone()),
+            (good.clone(), &sends, may),
+            (of_nothing.clone(), &sends, may),
             (silent.clone(), &listens, Ok(Listening::Only("LISTEN-ONLY"))),
-            (good.clone(), &permitted, may.clone()),
+            (good.clone(), &permitted, may),
             (
                 of_nothing,
                 &listens,

@@ -172,8 +172,12 @@ fn ask(session: &mut Session, ill_as_well: bool) -> Result<(), SessionError> {
         }
     }
     session.sound()?;
+    let lost = match session.take_doubtful() {
+        0 => "",
+        _ => "; frames were lost on the way to the bench, so it may have answered",
+    };
     match silent {
-        Err(error) if !ill_as_well => Err(session.failed(&error.to_string())),
+        Err(error) if !ill_as_well => Err(session.failed(&format!("{error}{lost}"))),
         _ => Ok(()),
     }
 }
