@@ -180,7 +180,7 @@ pub fn left_at_rest(folder: &Path, id: &str) -> io::Result<()> {
     create(&rest_file(folder, id))?.write_all(boot().as_bytes())
 }
 
-/// Makes one of these files anew.
+/// Makes one of these files, empty.
 pub(crate) fn create(path: &Path) -> io::Result<File> {
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create(true).truncate(true);
