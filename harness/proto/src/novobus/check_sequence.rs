@@ -18,6 +18,14 @@ pub const CHECK_SEQUENCE: [u8; ZEROS as usize + SEQUENCE.len()] = {
     bytes
 };
 
+/// As many check sequences as a sound ring of this many drives needs at the most.
+///
+/// A check sequence brings back each drive that has noticed the one before it, and one that has not: that one hears its seventeen zeros. In a
+/// silence drives time out one byte apart, and every second one may not notice the one before it (9.9).
+pub fn enough(drives: u16) -> impl Iterator<Item = u8> {
+    (0..drives.max(2)).flat_map(|_| CHECK_SEQUENCE)
+}
+
 /// Watches a stream of bytes for [`SEQUENCE`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SequenceWatch {

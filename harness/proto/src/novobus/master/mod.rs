@@ -91,7 +91,7 @@ use cycle::Cycle;
 use diagnosis::Cause;
 use event::Events;
 use in_flight::{BytePlace, Composed, InFlight, Sent};
-use recovery::{Episode, State};
+use recovery::{Episode, LastSequence, State};
 use store::Store;
 
 /// The master's end of one ring.
@@ -164,7 +164,7 @@ impl Master {
             byte_time,
             patience: byte_time * round + options.slack,
             state: if options.check_first {
-                State::resetting()
+                State::resetting(1)
             } else {
                 State::counting()
             },
@@ -285,7 +285,9 @@ impl Master {
             State::Running | State::Counting { .. } => true,
             State::Verifying { .. } => return self.transmit(Composed::SYNCO, true, now),
             State::Locating { .. } => false,
-            State::Resetting { next, watch } => return self.reset_byte(next, watch, now),
+            State::Resetting { next, bytes, watch } => {
+                return self.reset_byte((next, bytes), watch, now);
+            }
             State::Draining { .. } | State::Stopped(_) => return None,
         };
         if watched && self.in_flight.is_full() {
@@ -334,20 +336,26 @@ impl Master {
         Some(composed.byte)
     }
 
-    /// Lets out the next byte of the check sequence.
-    fn reset_byte(&mut self, next: u8, watch: SequenceWatch, now: Instant) -> Option<u8> {
-        let next = usize::from(next);
-        let byte = *CHECK_SEQUENCE.get(next)?;
+    /// Lets out the next byte of the check sequences.
+    fn reset_byte(
+        &mut self,
+        (next, bytes): (u16, u16),
+        watch: SequenceWatch,
+        now: Instant,
+    ) -> Option<u8> {
+        let byte = CHECK_SEQUENCE[usize::from(next) % CHECK_SEQUENCE.len()];
         self.counters.sent += 1;
-        self.state = if next + 1 < CHECK_SEQUENCE.len() {
-            State::Resetting {
-                next: u8::try_from(next + 1).unwrap_or(u8::MAX),
-                watch,
-            }
+        let next = next + 1;
+        self.state = if next < bytes {
+            State::Resetting { next, bytes, watch }
         } else {
             State::Verifying {
                 watch,
                 heard: false,
+                last: match usize::from(bytes) > CHECK_SEQUENCE.len() {
+                    true => LastSequence::Awaited,
+                    false => LastSequence::Only,
+                },
                 until: now + self.patience,
             }
         };
@@ -425,7 +433,9 @@ impl Master {
                 let spelled = evidence.spelled(self.ring);
                 self.located(spelled, now);
             }
-            State::Draining { .. } => self.state = State::resetting(),
+            State::Draining { .. } => {
+                self.state = State::resetting(self.episode.sequences(self.ring));
+            }
             State::Verifying { .. } => self.disturb(Cause::NotBack, now),
             State::Resetting { .. } | State::Stopped(_) => {}
         }

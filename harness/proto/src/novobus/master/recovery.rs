@@ -1,7 +1,8 @@
 //! Recovery: from the first wrong byte back to normal operation, or to a stopped bus (ND21 9.7-9.9, 11.5).
 
 use super::super::address::RingSize;
-use super::super::check_sequence::{SequenceProgress, SequenceWatch};
+use super::super::check_sequence::{CHECK_SEQUENCE, SequenceProgress, SequenceWatch};
+use super::super::sync::SYNCO;
 use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
 use super::fault::{BusStop, Fault, RingLink};
@@ -29,12 +30,16 @@ pub(super) enum State {
     },
     /// The sequence begins to come back before all of it is sent: in a small ring two bytes later.
     Resetting {
-        next: u8,
+        /// Bytes that were sent, and how many there are.
+        next: u16,
+        bytes: u16,
         watch: SequenceWatch,
     },
     Verifying {
         watch: SequenceWatch,
         heard: bool,
+        /// Of several sequences, SYNCO comes back behind the last one only.
+        last: LastSequence,
         until: Instant,
     },
     /// Nothing is sent, so that late bytes can catch up: on a line without a gap a delay never shrinks.
@@ -49,9 +54,11 @@ impl State {
         Self::Counting { composed: false }
     }
 
-    pub(super) fn resetting() -> Self {
+    /// This number of check sequences.
+    pub(super) fn resetting(sequences: u16) -> Self {
         Self::Resetting {
             next: 0,
+            bytes: sequences * CHECK_SEQUENCE.len() as u16,
             watch: SequenceWatch::default(),
         }
     }
@@ -67,6 +74,17 @@ impl State {
             Self::Stopped(_) => Phase::Stopped,
         }
     }
+}
+
+/// Which of the check sequences has come back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LastSequence {
+    /// There is one alone.
+    Only,
+    /// There are several, and another one may come.
+    Awaited,
+    /// There are several, and one has just come back.
+    Perhaps,
 }
 
 /// The work at which a disturbance began. Recoveries are counted until it is done, so that a ring that recovers
@@ -105,6 +123,14 @@ pub(super) struct Episode {
 }
 
 impl Episode {
+    /// How many check sequences the next recovery sends: one, and where two recoveries did not help, as many as a sound ring needs (9.9).
+    pub(super) fn sequences(&self, ring: RingSize) -> u16 {
+        match self.failures {
+            0..=2 => 1,
+            _ => ring.drives().into(),
+        }
+    }
+
     /// Whether the ring has not run yet.
     pub(super) fn is_first(&self) -> bool {
         !self.ran
@@ -240,8 +266,8 @@ impl Master {
             self.report(Event::Disturbed { fault, attempt });
             // Sent long ago, unless the caller stopped polling.
             self.outgoing.clear();
-            self.state = if attempt == 1 {
-                State::resetting()
+            self.state = if failures == 1 {
+                State::resetting(1)
             } else {
                 State::Draining {
                     until: now + DRAINING,
@@ -252,24 +278,43 @@ impl Master {
 
     /// Looks for the check sequence in the bytes that come back.
     pub(super) fn verify(&mut self, received: Received) {
-        let watch = match &mut self.state {
+        let (watch, last) = match &mut self.state {
             State::Resetting { watch, .. } => {
                 watch.see(received.byte, received.error.is_none());
                 return;
             }
-            State::Verifying { watch, heard, .. } => {
+            State::Verifying {
+                watch, heard, last, ..
+            } => {
                 *heard = true;
-                watch
+                if *last == LastSequence::Perhaps && received.is(SYNCO) {
+                    self.in_flight.pop();
+                    return self.came_back();
+                }
+                (watch, last)
             }
             _ => return,
         };
-        if watch.see(received.byte, received.error.is_none()) == SequenceProgress::Complete {
-            // All drives are back in normal mode; the bytes sent behind the sequence come next.
-            if self.episode.count || !self.episode.ran {
-                self.state = State::counting();
-            } else {
-                self.resume();
+        let progress = watch.see(received.byte, received.error.is_none());
+        let complete = progress == SequenceProgress::Complete;
+        if *last == LastSequence::Only {
+            if complete {
+                self.came_back();
             }
+        } else {
+            *last = match complete {
+                true => LastSequence::Perhaps,
+                false => LastSequence::Awaited,
+            };
+        }
+    }
+
+    /// All drives are back in normal mode; the bytes sent behind the sequence come next.
+    fn came_back(&mut self) {
+        if self.episode.count || !self.episode.ran {
+            self.state = State::counting();
+        } else {
+            self.resume();
         }
     }
 

@@ -169,7 +169,7 @@ fn a_hostile_ring_does_no_harm() {
             assert!(open.len() <= usize::from(options.capacity), "{}", place());
         }
         // Nothing more is ever heard: it ends, with every job accounted for.
-        for _ in 0..100_000 {
+        for _ in 0..250_000 {
             if master.phase() == Phase::Stopped {
                 break;
             }

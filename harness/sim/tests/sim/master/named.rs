@@ -149,7 +149,7 @@ fn another_number_of_drives_is_counted_before_any_job() {
         let ids: Vec<_> = (0..thought)
             .map(|k| couple.submit(Job::new(k, WRITE)))
             .collect();
-        couple.steps(4_000);
+        couple.steps(20_000);
         let fault = Fault::WrongRingSize {
             counted: there,
             ring: size(thought),

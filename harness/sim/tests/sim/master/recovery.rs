@@ -2,6 +2,8 @@
 
 use super::common::Couple;
 use harness_proto::line::Received;
+use harness_proto::nd21::bits::flags2;
+use harness_proto::nd21::ram;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
@@ -316,6 +318,28 @@ fn a_second_fault_during_the_recovery_does_no_harm() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// ND21 9.8, 9.9: a sound ring whose drives monitor time-outs runs again after silences of any length between telegrams.
+#[test]
+fn a_sound_ring_runs_again_after_silences() {
+    for drives in [1, 2, 5, 12, 250] {
+        let mut couple = Couple::plain(drives, MasterOptions::default()).ready();
+        (0..drives).for_each(|drive| couple.poke(drive, ram::FLAGS2, flags2::MONITORING));
+        for millis in [500, 23, 500, 41] {
+            couple.steps(usize::from(drives) + 10);
+            let silent = couple.ring.now() + Span::from_millis(millis);
+            couple.ring.run_until(silent);
+            let id = couple.submit(Job::new(0, Command::ReadByte { address: 0xFE13 }));
+            couple.finish(40_000);
+            let outcome = couple.outcome(id);
+            let events = &couple.events;
+            assert!(
+                matches!(outcome, Some(Outcome::Read(_))),
+                "{drives}, {millis} ms: {outcome:?} {events:?}"
+            );
         }
     }
 }

@@ -13,7 +13,7 @@ use harness_proto::nd21::units::{
 };
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
-use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, enough};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
@@ -32,16 +32,16 @@ pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error>
         .ok_or_else(|| link.trouble().cloned().map_or_else(no_answer, Error::Link))
 }
 
-/// Brings a ring back and counts its drives.
-///
-/// A check sequence brings back each drive that has noticed the one before it, and one that has not: that one hears its seventeen zeros. In a
-/// silence drives time out one byte apart, and every second one may not notice the one before it (9.9): a sound ring needs as many check
-/// sequences as it has drives at the most. This number is sent where something comes back behind the first two.
+/// Brings a ring back and counts its drives. As many check sequences as the largest ring needs are sent where something comes back behind the
+/// first two.
 fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
     let (first, heard) = counted(link, ring, &repair());
     let more = first.is_none() && !heard.is_empty() && link.trouble().is_none();
     match more {
-        true => count_behind(link, ring, &CHECK_SEQUENCE.repeat(MAX_DRIVES.into())),
+        true => {
+            let enough: Vec<_> = enough(MAX_DRIVES).collect();
+            count_behind(link, ring, &enough)
+        }
         false => first,
     }
 }
