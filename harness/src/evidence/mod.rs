@@ -55,6 +55,7 @@ pub use merge::{MERGE, Merged, merge, verify_merged};
 pub use part::SplitRun;
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};
 pub use record::{PartItem, RecordLine, RunPart, Writer, schema};
-pub use sealed::{can_sign, seal, sealed};
+pub(crate) use sealed::unsigned;
+pub use sealed::{can_sign, seal, sealed, unseal};
 pub use signature::Signer;
 pub use verify::{Beside, Rejudged, Verified, judge_record, verify};

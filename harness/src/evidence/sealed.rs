@@ -15,23 +15,46 @@ pub fn can_sign(key: &Path) -> Result<(), EvidenceError> {
     signature::ready(key)
 }
 
-/// Writes the sums of a folder's files and signs them with a key of `ssh-keygen`; an earlier signature is replaced.
+/// Writes the sums of a folder's files, and signs them where there is a key of `ssh-keygen`.
 ///
 /// # Errors
 /// [`EvidenceError`].
-pub fn seal(path: &Path, key: &Path) -> Result<(), EvidenceError> {
-    let failed = |file: &Path, error| EvidenceError::File {
-        path: file.display().to_string(),
-        error,
-    };
-    let earlier = path.join(SIGNATURE);
-    match fs::remove_file(&earlier) {
-        Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&earlier, error)),
-        _ => {}
-    }
+pub fn seal(path: &Path, key: Option<&Path>) -> Result<(), EvidenceError> {
+    unseal(path)?;
     let file = path.join(SUMS);
     fs::write(&file, sums(path)?).map_err(|error| failed(&file, error))?;
-    signature::sign(path, key)
+    key.map_or(Ok(()), |key| signature::sign(path, key))
+}
+
+/// Removes the sums and the signature of a folder: without them the run in it has not ended.
+///
+/// # Errors
+/// [`EvidenceError`].
+pub fn unseal(path: &Path) -> Result<(), EvidenceError> {
+    for file in [SIGNATURE, SUMS].map(|name| path.join(name)) {
+        match fs::remove_file(&file) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&file, error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn failed(file: &Path, error: std::io::Error) -> EvidenceError {
+    EvidenceError::File {
+        path: file.display().to_string(),
+        error,
+    }
+}
+
+/// What a folder does not prove whose signature is not checked.
+pub(crate) fn unsigned(path: &Path) -> &'static str {
+    match path.join(SIGNATURE).exists() {
+        true => "its signature: --allowed-signers FILE --identity ID checks it",
+        false => {
+            "who made this folder: it has no signature (`--sign` makes one), and anyone who can edit it can invent a run"
+        }
+    }
 }
 
 /// What is wrong with the files of a folder: sums that differ, files that are missing or were added, a signature that does not count. `None`

@@ -6,8 +6,8 @@ use super::attempt::{
 use super::cases;
 use super::derive::derived;
 use super::files::{
-    self, DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SIGNATURE, SUMS,
-    compare_sums, read_text, sum,
+    self, DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SUMS, compare_sums,
+    read_text, sum,
 };
 use super::folder::EvidenceError;
 use super::header::{Header, header};
@@ -17,6 +17,7 @@ use super::read::{RecordError, read, unlike_written};
 use super::record::RecordLine;
 use super::reports;
 use super::rerun::rerun;
+use super::sealed::unsigned;
 use super::selection;
 use super::signature::{self, Signer};
 use crate::buses::judge_of;
@@ -109,13 +110,7 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
     let mut verified = opened.verified(&judged, &scenario);
     verified.files.splice(0..0, files);
     if signer.is_none() {
-        let whose = match path.join(SIGNATURE).exists() {
-            true => "its signature: --allowed-signers FILE --identity ID checks it",
-            false => {
-                "who made this folder: it has no signature (`--sign` makes one), and anyone who can edit it can invent a run"
-            }
-        };
-        verified.unconfirmed.push(whose.to_owned());
+        verified.unconfirmed.push(unsigned(path).to_owned());
     }
     // The sums are written last.
     verified.complete &= path.join(SUMS).exists();

@@ -116,7 +116,7 @@ pub(crate) fn impossible<C: FuzzCase>(kept: &KeptRun<C>) -> Vec<String> {
     let first = rounds.saturating_sub(1).saturating_mul(ROUND);
     if !(first..=rounds.saturating_mul(ROUND)).contains(&cases) {
         wrong.push(format!(
-            "{} do not have {}",
+            "the record has {} and {}, which do not fit",
             counted(rounds, "round"),
             counted(cases, "case")
         ));

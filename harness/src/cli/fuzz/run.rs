@@ -10,7 +10,7 @@ use crate::cli::output::Output;
 use crate::cli::page::{writable, write};
 use crate::cli::rig_failure::find_any_rig;
 use crate::counted::counted;
-use crate::evidence::{can_sign, seal};
+use crate::evidence::{can_sign, seal, unseal};
 use crate::explore::{
     Bounds, CaseScope, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, KeptRun, OnRig,
     OnSim, Planted, RingSetup, RunEnd, Spiced as _, Target, page, read, rig_of,
@@ -351,6 +351,10 @@ pub(crate) fn explore<C: FuzzCase>(
         Err(error) => return Ok(tell(&error, output)),
     };
     let folder = record.folder().to_owned();
+    if let Err(error) = unseal(&folder) {
+        output.complain(&error.to_string());
+        return Ok(Exit::of_evidence(&error));
+    }
     let mut telling = Telling {
         output,
         folder: Some(folder.clone()),
@@ -381,8 +385,12 @@ pub(crate) fn explore<C: FuzzCase>(
         output.say(&beyond(&end, bounds));
     }
     output.say(&format!("the run is in {}\n", folder.display()));
-    if let Some(Err(error)) = arguments.sign.as_deref().map(|key| seal(&folder, key)) {
-        // That the key can sign was tried before anything was played.
+    // A run that could not go on has no sums, like one that was killed. That the key can sign was tried before anything was played.
+    let sealed = match end {
+        RunEnd::Over(_) if arguments.sign.is_none() => Ok(()),
+        _ => seal(&folder, arguments.sign.as_deref()),
+    };
+    if let Err(error) = sealed {
         output.complain(&error.to_string());
         return Ok(exit_of_cases(&campaign).with_rig_error());
     }

@@ -3,7 +3,7 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
-use crate::evidence::{SIGNATURE, SUMS, Signer, sealed};
+use crate::evidence::{SIGNATURE, SUMS, Signer, sealed, unsigned};
 use crate::explore::files::read_text;
 use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzCase, JudgedAgain, KeptRun, LogLine, RECORD,
@@ -33,8 +33,16 @@ pub(crate) fn verify<C: FuzzCase>(
         }
     };
     let has_sums = files.is_some();
-    let mut complete = has_sums;
-    let files = files.unwrap_or_default();
+    // A run that has sent nothing shows nothing.
+    let mut complete = has_sums && kept.progress.not_sent < kept.progress.cases;
+    let strange = strange(folder, kept);
+    // What `shrink` makes of a finding comes behind the sums.
+    let is_small = |wrong: &str| {
+        let file = wrong.strip_suffix(" was added");
+        matches!(file.and_then(|own| strange.get(own)), Some(Strange::Small))
+    };
+    let mut files = files.unwrap_or_default();
+    files.retain(|wrong| !is_small(wrong));
     let mut wrong = files.len();
     for file in &files {
         output.result(&format!("{file}\n"))?;
@@ -43,7 +51,7 @@ pub(crate) fn verify<C: FuzzCase>(
         wrong += 1;
         output.result(&format!("{RECORD}: {why}\n"))?;
     }
-    for (file, own) in strange(folder, kept) {
+    for (file, own) in strange {
         let text = match own {
             Strange::Added => {
                 wrong += 1;
@@ -106,12 +114,13 @@ pub(crate) fn verify<C: FuzzCase>(
         count_finding(&mut known, signature, *confirmed);
     }
     output.result(UNCONFIRMED)?;
-    match signer.filter(|_| wrong == 0) {
-        Some(signer) => output.result(&format!("signed by    {}\n", signer.identity))?,
-        None if !has_sums => output.result(
-            "unconfirmed  that no file was changed: the folder has no sums (`fuzz run --sign KEY` makes and signs them)\n",
+    match signer {
+        Some(signer) if wrong == 0 => output.result(&format!("signed by    {}\n", signer.identity))?,
+        None if has_sums => output.result(&format!("unconfirmed  {}\n", unsigned(folder)))?,
+        None => output.result(
+            "unconfirmed  that no file was changed: the folder has no sums, because the run did not end (`fuzz run --resume` ends it)\n",
         )?,
-        None => {}
+        Some(_) => {}
     }
     output.result(&format!(
         "{} judged again, {} wrong\n",

@@ -309,7 +309,7 @@ fn a_fuzz_run_on_a_ring_with_ports_is_verified() {
     let more = ["--behind-port", "--findings", "1", "--out", "kept"];
     ended(&desk.run(&[&fixed[..], &more].concat()), 1, "1 found");
     let verify = || desk.run(&["verify", "kept"]);
-    ended(&verify(), 5, "1 finding judged again, 0 things wrong");
+    ended(&verify(), 0, "1 finding judged again, 0 things wrong");
     let file = crate::program::findings(&desk.path("kept")).remove(0);
     let text = fs::read_to_string(&file).expect("a finding");
     let finding: Value = serde_json::from_str(&text).expect("JSON");
@@ -354,6 +354,7 @@ fn a_fuzz_run_on_a_ring_with_ports_is_verified() {
     let mut bare = finding.clone();
     bare.as_object_mut().expect("an object").remove("attempts");
     fs::write(&file, bare.to_string()).expect("room");
+    fit(&desk.path("kept"));
     ended(&verify(), 5, "unconfirmed  case ");
 }
 
@@ -384,7 +385,7 @@ fn a_fuzz_run_is_verified() {
     let run =
         |more: &[&str]| desk.run(&[&fixed[..], &["1=writes-ignored", "--out"], more].concat());
     ended(&run(&["bare"]), 1, "1 found");
-    ended(&desk.run(&["verify", "bare"]), 5, "the folder has no sums");
+    ended(&desk.run(&["verify", "bare"]), 0, "it has no signature");
     ended(&run(&["kept", "--sign", "key"]), 1, "1 found");
     let by = ["--allowed-signers", "signers", "--identity", "bench@lab"];
     let signed = || desk.run(&[&["verify", "kept"], &by[..]].concat());

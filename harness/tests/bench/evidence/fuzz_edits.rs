@@ -24,7 +24,6 @@ impl Run {
         let run = [&fixed[..], &planted, &["--out", "kept"]].concat();
         ended(&desk.run(&run), 1, "3 found");
         let own = Self { desk };
-        fit(&own.folder());
         own.is_right();
         own
     }
@@ -101,7 +100,7 @@ fn lines_of_a_fuzz_run() {
         0,
         "\"confirm\":2",
         "\"confirm\":1",
-        "seen again 1 of 1 times",
+        "seen again 1 of 1 time,",
     );
     let round = places(&lines, "swarm")[0];
     let spice = lines[round]
@@ -123,7 +122,7 @@ fn lines_of_a_fuzz_run() {
         last,
         &cases,
         "\"cases\":999999",
-        "rounds do not have 999999 cases",
+        "999999 cases, which do not fit",
     );
     let mut swapped = lines.clone();
     swapped.swap(found[0], found[1]);
@@ -171,7 +170,19 @@ fn files_of_a_fuzz_run() {
         run.refused(1, &format!("{name} is not a file of the run"));
         fs::remove_file(more).expect("a file");
     }
-    // A run that was killed leaves such a file.
+    // A file that does not fit the sums, what `shrink` makes behind them, and a run that was killed, which has none.
+    fs::write(one, text.clone() + "\n").expect("room");
+    ended(&run.desk.run(&["verify", "kept"]), 1, "was changed");
+    fs::write(one, &text).expect("room");
+    fit(&run.folder());
+    let small = one.with_extension("").to_string_lossy().into_owned() + "-small.scn";
+    fs::write(&small, "title x\n").expect("room");
+    ended(&run.desk.run(&["verify", "kept"]), 0, "`shrink` made it");
+    fs::remove_file(small).expect("a file");
+    let sums = run.folder().join("SHA256SUMS");
+    fs::remove_file(&sums).expect("a file");
+    ended(&run.desk.run(&["verify", "kept"]), 5, "the run did not end");
+    // It may leave such a file.
     let more = run.folder().join("finding-99999999.json");
     fs::write(&more, &text).expect("room");
     run.refused(5, "the record ends before its case");

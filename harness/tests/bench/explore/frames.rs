@@ -40,7 +40,7 @@ fn drives_on_can_are_explored() {
     let wrong = folder.path().join("wrong.scn");
     std::fs::write(&wrong, deviating).expect("room");
     ended(&drivebench(&["run", name(&wrong)]), 1, "failed");
-    ended(&drivebench(&["verify", name(&out)]), 5, "found again");
+    ended(&drivebench(&["verify", name(&out)]), 0, "found again");
     let edited = std::fs::read_to_string(&found).expect("a finding");
     let edited = edited.replacen("\"frame\": ", "\"frame\": 1", 1);
     std::fs::write(&found, edited).expect("room");

@@ -113,6 +113,8 @@ fn what_was_kept_on_shared_lines_is_replayed() {
         let replay = ["fuzz", "replay", name(&out), "--rig", drives.rig];
         ended(&drivebench(&replay), 0, "kept to be played");
         ended(&drivebench(&replay), 0, "0 found, 0 flaky");
+        let verify = ["verify", name(&out)];
+        ended(&drivebench(&verify), 0, "0 things wrong");
         out
     });
     let other = ["fuzz", "replay", name(&outs[0]), "--rig", ALL[1].rig];
