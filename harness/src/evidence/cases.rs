@@ -164,12 +164,15 @@ impl Settling<'_> {
                 self.verdicts.join(", ")
             ));
         }
-        if safe.is_some() == self.opened.header.simulated {
-            let kind = match self.opened.header.simulated {
-                true => "simulated rings have no safe state, and the last line tells of one",
-                false => "the last line does not tell of the safe state",
-            };
-            self.wrong.push(kind.to_owned());
+        let wrong = match (self.opened.header.simulated, safe) {
+            (true, Some(true)) => {
+                "of simulated drives only a safe state that is not reached is told, and the last line has one that is"
+            }
+            (false, None) => "the last line does not tell of the safe state",
+            _ => "",
+        };
+        if !wrong.is_empty() {
+            self.wrong.push(wrong.to_owned());
         }
     }
 }

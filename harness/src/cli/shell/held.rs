@@ -5,7 +5,7 @@ use crate::buses::commands::DriveCommand;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
-use crate::guard::Guarded;
+use crate::guard::{Guarded, Safe};
 use crate::library::Entry;
 use crate::link::{Line, Link, Trouble};
 use crate::medium::Medium;
@@ -225,13 +225,8 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         }
         session.link().reset_after_denial();
         session.drives().forget();
-        match self.0.clear_up() {
-            true => Ok(()),
-            false => Err(Failure::Said(
-                Exit::RigError,
-                "the drives were not seen in their safe state behind the scenario".to_owned(),
-            )),
-        }
+        let said = |safe: Safe| Failure::Said(Exit::NotSafe, safe.to_string());
+        self.0.clear_up().map_err(said)
     }
 
     fn end(self: Box<Self>, error: bool) -> End {

@@ -3,6 +3,7 @@
 use super::observed::Beats;
 use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::buses::Bus;
+use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
 use crate::rig::port_session::{PortDrives, PortSession, failed};
@@ -52,6 +53,11 @@ pub(crate) trait PortPlayer: Sized {
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
     fn not_begun(&self, own: &Self::Own) -> Option<Skip>;
 
+    /// Whether a scenario does something to the drives beside the bus.
+    fn disturbs(_own: &Self::Own) -> bool {
+        false
+    }
+
     /// What was recorded of the rig, as a link.
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay;
 
@@ -95,6 +101,8 @@ pub(crate) struct PortRun<P: PortPlayer> {
     over: Option<String>,
     /// A scenario behind which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
     unfinished: Option<Arc<P::Own>>,
+    /// How simulated drives that were restarted since were not brought to their safe state.
+    not_safe: Option<Safe>,
 }
 
 impl<P: PortPlayer> PortRun<P> {
@@ -123,6 +131,7 @@ impl<P: PortPlayer> PortRun<P> {
             options: options.clone(),
             over: None,
             unfinished: None,
+            not_safe: None,
         }
     }
 
@@ -145,19 +154,21 @@ impl<P: PortPlayer> PortRun<P> {
         self.notes.extend(notes);
     }
 
-    /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed. Returns whether that
-    /// was done, or nothing was to do.
-    pub(crate) fn clear_up(&mut self) -> bool {
+    /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed.
+    ///
+    /// # Errors
+    /// The safe state is not confirmed.
+    pub(crate) fn clear_up(&mut self) -> Result<(), Safe> {
         let Some(own) = self.unfinished.take() else {
-            return true;
+            return Ok(());
         };
-        let safe = self.session.make_safe().confirmed;
-        if safe {
-            self.set_back(&own);
-        } else {
+        let safe = self.session.make_safe();
+        if !safe.confirmed {
             self.unfinished = Some(own);
+            return Err(safe);
         }
-        safe
+        self.set_back(&own);
+        Ok(())
     }
 
     /// Forgets what is known of the drives: others have used them.
@@ -227,6 +238,11 @@ impl<P: PortPlayer> PortRun<P> {
         outcome.unplaced(unplaced);
         if unplaced > 0 {
             self.player.doubt();
+        }
+        // What a fault of the scenario has switched off is no drive that disobeys.
+        if anew && outcome.verdict == Verdict::Failed && !P::disturbs(own) {
+            let safe = self.session.make_safe();
+            self.not_safe = self.not_safe.take().or((!safe.confirmed).then_some(safe));
         }
         Attempt {
             opening: Some(before),
@@ -299,15 +315,19 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
     }
 
     fn close(mut self: Box<Self>, error: bool) -> End {
+        let mut not_safe = self.not_safe.take();
         if self.unfinished.is_some() {
             self.session.resume();
-            if !self.clear_up() {
+            if let Err(safe) = self.clear_up() {
+                not_safe = Some(safe);
                 let left = self.player.left_changed(self.session.rig());
                 self.notes.extend(left);
             }
         }
         let notes = self.notes();
         let mut end = self.session.close(error);
+        // Simulated drives are taken to their safe state behind scenarios alone.
+        end.safe = end.safe.or(not_safe);
         end.remarks.extend(notes);
         end
     }

@@ -8,7 +8,7 @@ use super::{Session, limits, rate, slaves};
 use crate::buses::Bus;
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::TOLERANCE;
-use crate::link::{Link, LinkEvent, Replay};
+use crate::link::{Capability, Link, LinkEvent, Replay};
 use crate::rig::Rig;
 use crate::rig::left::NotPutBack;
 use crate::rig::segment::observed::Beats;
@@ -67,6 +67,15 @@ impl PortPlayer for Player {
 
     fn not_begun(&self, own: &Own) -> Option<Skip> {
         Self::not_begun(self, own)
+    }
+
+    fn disturbs(own: &Own) -> bool {
+        let faults = [
+            Capability::Power,
+            Capability::Interposer,
+            Capability::LineErrors,
+        ];
+        own.plan.needs.iter().any(|need| faults.contains(need))
     }
 
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {

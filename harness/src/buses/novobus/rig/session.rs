@@ -5,8 +5,9 @@ use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
 use crate::buses::novobus::driver::{Axis, count_behind};
+use crate::buses::simulated;
 use crate::guard::Limits;
-use crate::guard::{Guarded, Watch, blind_stop, safe_state};
+use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::medium::{ErrorMarks, Pieces};
 use crate::rig::around::Around;
@@ -591,9 +592,25 @@ impl Session {
             if wanted.order.contains(&file::SafeStep::PowerOff) {
                 end.power = self.around.power_off();
             }
+        } else {
+            end.safe = self.disobeys();
         }
         end.remarks = self.around.end(error);
         end
+    }
+
+    /// How simulated drives with deviations are not brought to their safe state. They have just been switched on: a scenario may
+    /// have left the ring cut.
+    fn disobeys(&self) -> Option<Safe> {
+        let setup = &self.rig.setup;
+        if setup.without_deviations() == *setup {
+            return None;
+        }
+        let ends = Ends::Simulated(simulated(&self.rig.plan().ok()?));
+        let mut fresh = Guarded::new(ends, self.limits());
+        let standing = standing(&self.rig.file.safe_state);
+        let safe = Safe::from(safe_state(&mut fresh, &self.rings, &standing));
+        (!safe.confirmed).then_some(safe)
     }
 
     /// Waits until what was sent has come round. The lines are silent then.
