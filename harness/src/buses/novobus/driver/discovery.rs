@@ -49,7 +49,7 @@ fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
 /// The bytes that recover a ring: the check sequence behind its 17 zeros (9.8), twice. Drives behind a time-out pass on seven zeros and then
 /// an address (9.9), so that a drive behind them may not hear the eight zeros for which it waits (9.7). After the first check sequence
 /// they are drives that pass on 17.
-pub(crate) fn repair() -> Vec<u8> {
+fn repair() -> Vec<u8> {
     CHECK_SEQUENCE.repeat(2)
 }
 

@@ -22,7 +22,7 @@ mod scope;
 
 pub use access::Width;
 pub use axis::Axis;
-pub(crate) use discovery::{COUNT, count_behind, repair, unasked};
+pub(crate) use discovery::{COUNT, count_behind, unasked};
 pub use discovery::{Identity, Recovery, SpelledOut, SpellingCause, State, count_drives, recover};
 pub use error::Error;
 /// What a master may send, by the rules of the bus alone.

@@ -2,7 +2,6 @@
 //!
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
-use crate::buses::novobus::driver::repair;
 use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
@@ -21,7 +20,7 @@ use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::own::is_of_the_scope;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE, enough};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::at_rest;
 use harness_proto::novobus::sync::SYNCO;
@@ -365,7 +364,9 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
         .collect();
     let size = RingSize::new(u64::from(link.drives(ring))).ok();
     if heard.len() > MAX_ZEROS && sounds_timed_out(&heard, size) {
-        let left = link.send_octets(ring, &repair());
+        let drives = link.drives(ring).into();
+        let sequences: Vec<_> = enough(drives).collect();
+        let left = link.send_octets(ring, &sequences);
         settle(link, left);
     }
 }
@@ -374,7 +375,8 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
 /// time-outs miss their bytes meanwhile (9.9), so the check sequence comes first each time (9.8).
 fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     let end = link.now() + SELF_TEST;
-    let bytes = [&repair()[..], &[SYNCO]].concat();
+    let drives = link.drives(ring).into();
+    let bytes: Vec<_> = enough(drives).chain([SYNCO]).collect();
     while !comes_round(link, ring, &bytes, PATIENCE) {
         if link.now() >= end || link.trouble().is_some() {
             return false;
@@ -641,3 +643,7 @@ fn holds_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+#[path = "over_bus_tests.rs"]
+mod tests;
