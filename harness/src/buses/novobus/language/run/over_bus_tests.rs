@@ -1,12 +1,13 @@
+//! Rings whose drives have missed their master, brought back.
+
 use super::*;
-use crate::buses::novobus::link::SimulatedLink;
 use crate::library::Entry;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 
 /// A ring whose drives monitor time-outs and have missed their master.
-fn timed_out(drives: u8) -> SimulatedLink {
+fn timed_out(drives: u8) -> impl Link {
     let text = format!("title t\nring {drives}\ndrive 0..last eeprom 47 = 80\n> 80\n");
     let source = Source::from_bytes("ring.scn".to_owned(), text.into_bytes()).expect("a text");
     let entry = Entry::new(source, None).expect("a scenario");
