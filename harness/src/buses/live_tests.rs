@@ -421,9 +421,9 @@ fn a_silence_excuses_no_wrong_drive() {
     // Register 1C keeps what was written to it and not stored, so that the drive was not switched off.
     let kept = unitek(
         "cuts-writes-to-16-bits",
-        "> 201 1C 37 00\n> 201 6E 00 00 00 03\n> 201 3D 1C 00\n< 181 1C 37 00 xx\nwait 400ms\n\
+        "> 201 1C 37 00\n> 201 D1 00 00 00 03\n> 201 3D 1C 00\n< 181 1C 37 00 xx\nwait 400ms\n\
          > 201 3D 1C 00\n< 181 1C 37 00 xx\n\
-         > 201 3D 6E 00\n< 181 6E 00 00 00 03 xx\n",
+         > 201 3D D1 00\n< 181 D1 00 00 00 03 xx\n",
     );
     let nordac = |deviation: &str, steps: &str| {
         format!(

@@ -232,7 +232,7 @@ fn caps() {
                 most_bytes: 60,
                 ..Limits::default()
             },
-            "have been sent; the rig",
+            "60 bytes sent; the rig",
         ),
     ] {
         let mut line = guarded(1, limits);

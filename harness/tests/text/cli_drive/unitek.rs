@@ -187,7 +187,7 @@ fn parameters_are_saved_compared_and_loaded() {
     let (code, _, stderr) = run("params load 1 q.toml --yes --rig sim:unitek");
     assert_eq!(
         (code, stderr.as_str()),
-        (0, "1 parameters were written and read back\n")
+        (0, "1 parameter written and read back\n")
     );
     std::fs::write(folder.join("q.toml"), "[unitek]\n0x30 = \"0000\"\n").expect("room");
     let (code, _, stderr) = run("params diff 1 q.toml --rig sim:unitek");

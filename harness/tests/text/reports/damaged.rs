@@ -192,7 +192,7 @@ fn the_rigs_file_is_its_own() {
     let (code, said) = verify(&folder);
     assert_eq!(code, Some(2), "{said}");
     assert!(
-        said.contains("line 1") && said.contains("rings of 3 drives"),
+        said.contains("line 1") && said.contains("rings are 3"),
         "{said}"
     );
 }

@@ -12,6 +12,7 @@ pub(super) struct Tasks {
     before: Option<Pkw>,
     /// How many more of these may come.
     earlier: u8,
+    answered: Option<u16>,
 }
 
 impl Default for Tasks {
@@ -39,12 +40,18 @@ impl Tasks {
             sent: Vec::new(),
             before: None,
             earlier,
+            answered: None,
         }
     }
 
     /// Those of an exchange that begins: nothing is due.
     pub(super) const fn begun() -> Self {
         Self::after(1)
+    }
+
+    /// The number of the task that was answered last.
+    pub(super) const fn answered(&self) -> Option<u16> {
+        self.answered
     }
 
     /// A task goes out.
@@ -60,6 +67,7 @@ impl Tasks {
         let same = |own: Pkw| (own.pke, own.ind) == (answer.pke, answer.ind);
         if found.is_none() {
             (self.before, self.earlier) = (None, 0);
+            self.answered = Some(answer.number()).filter(|_| answer.ak() != 0);
         } else if !matches!(answer.ak(), 1 | 2 | 4..=7) {
             return found;
         } else if self.before.is_some_and(same) {

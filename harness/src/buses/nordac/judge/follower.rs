@@ -3,7 +3,7 @@
 use super::channel::Tasks;
 use super::diagnosis::{wrong, wrong_status};
 use super::symptom::Symptom::{self, Form, Value};
-use harness_proto::nordac::{IDENT, Image, PpoType};
+use harness_proto::nordac::{IDENT, Image, Pkw, PpoType};
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
 use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
@@ -48,6 +48,10 @@ pub(super) struct Follower {
     pub(super) way: Way,
     pub(super) record: Record,
     pub(super) tasks: Tasks,
+    /// The number of a task behind which the module may restart, until it is answered.
+    restarts: Option<u16>,
+    /// The configuration that the slave has shown since it was last set up.
+    shown: Option<PpoType>,
     /// A request without a reply: it is missing if the slave turns out to have gone on exchanging.
     pub(super) unanswered: Option<(usize, String)>,
     /// Whether the slave was exchanging when it last replied.
@@ -74,6 +78,8 @@ impl Follower {
             way: Way::Unknown,
             record: Record::Unknown,
             tasks: Tasks::default(),
+            restarts: None,
+            shown: None,
             unanswered: None,
             exchanging: false,
             fresh: false,
@@ -95,6 +101,7 @@ impl Follower {
     /// What sets the slave up may have been lost, or not.
     pub(super) fn may_be_set_up(&mut self) {
         self.way = Way::Unknown;
+        self.shown = None;
         self.unanswered = None;
         self.exchanging = false;
     }
@@ -132,8 +139,9 @@ impl Follower {
         }
         let found = self.service(request, reply);
         self.fresh = true;
-        if may_restart(request) {
+        if let Some(number) = may_restart(request) {
             self.may_be_set_up();
+            self.restarts = Some(number).filter(|own| self.tasks.answered() != Some(*own));
             if let Record::Counted(_, _, reply) = &mut self.record {
                 *reply = None;
             }
@@ -229,7 +237,9 @@ impl Follower {
             },
             Some(Service::GetCfg) => {
                 let cfg = data.and_then(PpoType::from_cfg);
-                let other = matches!(self.way, Way::Configured { ppo: Some(own), .. } if self.exchanging && cfg != Some(own));
+                let other = matches!(self.way, Way::Configured { ppo: Some(own), .. } if self.exchanging && cfg != Some(own))
+                    || self.shown.is_some_and(|own| cfg != Some(own));
+                self.shown = cfg.filter(|_| self.restarts.is_none());
                 (cfg.is_none() || other).then(|| {
                     (
                         Value,
@@ -252,7 +262,7 @@ impl Follower {
     }
 
     fn set_up(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
-        (self.exchanging, self.unanswered) = (false, None);
+        (self.exchanging, self.unanswered, self.shown) = (false, None, None);
         let prm = SetPrm::decode(request.data());
         let locks = prm
             .as_ref()
@@ -283,7 +293,7 @@ impl Follower {
 
     fn configured(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
         let was_exchanging = std::mem::replace(&mut self.exchanging, false);
-        self.unanswered = None;
+        (self.unanswered, self.shown) = (None, None);
         let ppo = PpoType::from_cfg(request.data());
         self.way = match self.way {
             Way::Parametrised {
@@ -316,7 +326,7 @@ impl Follower {
             return Some((Form, "EN 2", "RS or the inputs are expected".to_owned()));
         }
         let Some(data) = data else {
-            (self.exchanging, self.unanswered) = (false, None);
+            (self.exchanging, self.unanswered, self.shown) = (false, None, None);
             if matches!(self.way, Way::Configured { .. }) {
                 self.way = Way::Unknown;
             }
@@ -367,6 +377,9 @@ impl Follower {
             return Some((Value, "3.1", "PZD3, PZD5 and PZD6 are 0".to_owned()));
         }
         let wrong = tasks.then(|| self.tasks.wrong(image.pkw)).flatten();
+        self.restarts = self
+            .restarts
+            .filter(|own| self.tasks.answered() != Some(*own));
         wrong.map(|(section, why)| (Value, section, why))
     }
 
@@ -378,7 +391,7 @@ impl Follower {
         let own = Diagnosis::decode(data)?;
         let waits = own.has_mode(Diagnosis::PRM_REQ);
         if waits {
-            (self.exchanging, self.unanswered) = (false, None);
+            (self.exchanging, self.unanswered, self.shown) = (false, None, None);
         }
         let of = |master: u8| own.master == Some(master);
         match self.way {
@@ -427,14 +440,14 @@ impl Follower {
     }
 }
 
-/// Whether a request carries a task behind which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
-fn may_restart(request: &Pdu) -> bool {
+/// The number of a task behind which the module restarts (2.6): another bus mode, PPO type or address, or the factory settings.
+fn may_restart(request: &Pdu) -> Option<u16> {
     let exchanges = Service::of(request.dsap()) == Some(Service::DataExchange);
     let task = outputs(request.data()).map(|own| own.pkw);
-    exchanges
-        && task.is_some_and(|own| {
-            own.task().is_change() && [970, 1602, 1619, 1622, 1624].contains(&own.number())
-        })
+    let restarts =
+        |own: &Pkw| own.task().is_change() && [970, 1602, 1619, 1622, 1624].contains(&own.number());
+    task.filter(|own| exchanges && restarts(own))
+        .map(|own| own.number())
 }
 
 /// The outputs of a Data_Exchange as those of a PPO type that has a parameter channel.
