@@ -12,7 +12,7 @@ use harness_proto::novobus::output::OutputChange;
 use harness_proto::time::Instant;
 
 /// Silence behind the input, in byte times, in which everything comes to its end.
-const SILENCE: usize = 40_000;
+const SILENCE: usize = 250_000;
 
 /// The first byte is the size of the ring; of the others each is one byte time: FE and FF are silence, FD a
 /// byte with wrong parity, FC a job, F9 the cyclic exchange with all drives, FB the byte that was sent a ring's length ago, FA what sound drives would have answered
