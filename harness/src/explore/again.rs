@@ -51,10 +51,9 @@ pub(crate) fn played_again<C: FuzzCase>(
 fn told<C: FuzzCase>(finding: &Finding<C>) -> String {
     let Finding { seen_again, of, .. } = finding;
     format!(
-        "{}: {}; seen again {seen_again} of {},",
+        "{}: {}; seen again {seen_again} of {of} times",
         finding.difference.signature(),
-        finding.difference.about(),
-        counted(*of, "time")
+        finding.difference.about()
     )
 }
 
