@@ -100,7 +100,7 @@ fn lines_of_a_fuzz_run() {
         0,
         "\"confirm\":2",
         "\"confirm\":1",
-        "seen again 1 of 1 time,",
+        "seen again 1 of 1 times",
     );
     let round = places(&lines, "swarm")[0];
     let spice = lines[round]
