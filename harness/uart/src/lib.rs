@@ -1,6 +1,6 @@
 //! Calls of Linux's serial drivers for which there is no safe one: the counts of a port, its base rate, and low latency (`linux/serial.h`).
 //!
-//! The unsafe code is in [`get`] and [`set`]; no other crate than this one and harness-socketcan has any.
+//! The unsafe code is in `get` and `set`; no other crate than this one and harness-socketcan has any.
 
 use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::io::Errno;
