@@ -375,11 +375,12 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
 /// time-outs miss their bytes meanwhile (9.9), so the check sequence comes first each time (9.8).
 fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     let end = link.now() + SELF_TEST;
-    let drives = link.drives(ring).into();
-    let bytes: Vec<_> = enough(drives).chain([SYNCO]).collect();
-    while !comes_round(link, ring, &bytes, PATIENCE) {
+    let sequences = |drives| enough(drives).chain([SYNCO]).collect::<Vec<_>>();
+    // Two bring back most rings.
+    while !comes_round(link, ring, &sequences(2), PATIENCE) {
         if link.now() >= end || link.trouble().is_some() {
-            return false;
+            let all = sequences(link.drives(ring).into());
+            return comes_round(link, ring, &all, PATIENCE);
         }
         be_quiet(link);
     }
