@@ -429,11 +429,15 @@ fn a_drive_that_does_not_obey_has_failed() {
             _ => "",
         };
         let (code, _, stderr) = run(&format!("{command} 1{leave}"));
-        assert_eq!(code, 1, "{command}: {stderr}");
-        let remedy = match is {
-            "go" => "; use the emergency stop",
-            _ => "",
+        let (remedy, exit) = match (command, is) {
+            ("block", _) => (
+                ": the safe state is NOT confirmed; use the emergency stop",
+                7,
+            ),
+            (_, "go") => ("; use the emergency stop", 1),
+            _ => ("", 1),
         };
+        assert_eq!(code, exit, "{command}: {stderr}");
         let words =
             format!("drive 1: `{command}` was sent, and it is in {is} (ND21 11.8){remedy}\n");
         assert!(stderr.contains(&words), "{stderr}");

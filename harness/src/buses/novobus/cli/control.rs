@@ -225,14 +225,18 @@ fn each(
                 if !(order.reached)(&after) {
                     let what = order.what;
                     // A motor in "stop" or "go" has torque: one that was to be blocked is dangerous too.
-                    let remedy = match (what, mode) {
-                        (_, "go") | ("block", "stop") => "; use the emergency stop",
-                        _ => "",
+                    let (remedy, code) = match (what, mode) {
+                        ("block", _) => (
+                            ": the safe state is NOT confirmed; use the emergency stop",
+                            Exit::NotSafe,
+                        ),
+                        (_, "go") => ("; use the emergency stop", Exit::Failed),
+                        _ => ("", Exit::Failed),
                     };
                     output.complain(&format!(
                         "drive {axis}: `{what}` was sent, and it is in {mode} (ND21 11.8){remedy}"
                     ));
-                    exit = exit.max(Exit::Failed);
+                    exit = exit.max(code);
                 }
             }
         }
