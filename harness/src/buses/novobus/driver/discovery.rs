@@ -33,9 +33,10 @@ pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error>
 }
 
 /// Brings a ring back and counts its drives. As many check sequences as the largest ring needs are sent where something comes back behind the
-/// first two.
+/// first two (9.8). Drives behind a time-out pass on seven zeros and then an address (9.9), so that a drive behind them may not hear the eight
+/// zeros for which it waits (9.7). After the first check sequence they are drives that pass on 17.
 fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
-    let (first, heard) = counted(link, ring, &repair());
+    let (first, heard) = counted(link, ring, &CHECK_SEQUENCE.repeat(2));
     let more = first.is_none() && !heard.is_empty() && link.trouble().is_none();
     match more {
         true => {
@@ -44,13 +45,6 @@ fn count_repaired(link: &mut dyn Line, ring: usize) -> Option<RingSize> {
         }
         false => first,
     }
-}
-
-/// The bytes that recover a ring: the check sequence behind its 17 zeros (9.8), twice. Drives behind a time-out pass on seven zeros and then
-/// an address (9.9), so that a drive behind them may not hear the eight zeros for which it waits (9.7). After the first check sequence
-/// they are drives that pass on 17.
-fn repair() -> Vec<u8> {
-    CHECK_SEQUENCE.repeat(2)
 }
 
 fn no_answer() -> Error {
@@ -222,7 +216,8 @@ fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> SpellingC
         let flags2 = (0..TRIES).find_map(|_| {
             let read = read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
             if read.is_none() {
-                let _size = count_behind(link, ring, &repair());
+                let enough: Vec<_> = enough(size.drives().into()).collect();
+                let _size = count_behind(link, ring, &enough);
             }
             read
         });

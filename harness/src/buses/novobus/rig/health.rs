@@ -210,11 +210,13 @@ mod tests {
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
-    use crate::link::{Line as _, LinkFault, Moment, PlacedFault};
+    use crate::link::{Line, LinkFault, Moment, PlacedFault};
+    use crate::medium::{Heard, Medium, Out};
     use crate::scenario::simulate;
     use crate::scenario::source::Source;
     use harness_proto::line::Rate;
     use harness_proto::novobus::sync::SYNCO;
+    use harness_proto::time::Instant;
 
     /// A ring some of whose drives monitor time-outs from power-up (ND21 14.3.6). Its self-tests are over.
     fn monitoring(drives: u8, monitor: &str) -> SimulatedLink {
@@ -286,6 +288,51 @@ mod tests {
                 "{monitor}"
             );
             assert_eq!(recovery.drives, Some(size));
+        }
+    }
+
+    /// A computer that stands still in front of one of its sends.
+    struct Late {
+        link: SimulatedLink,
+        sends: usize,
+    }
+
+    impl Line for Late {
+        fn medium(&self, port: usize) -> Medium {
+            self.link.medium(port)
+        }
+
+        fn now(&self) -> Instant {
+            self.link.now()
+        }
+
+        fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+            if self.sends == 0 {
+                self.link
+                    .run_until(self.link.now() + Span::from_millis(300));
+            }
+            self.sends = self.sends.wrapping_sub(1);
+            self.link.send(ring, what)
+        }
+
+        fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+            self.link.receive(ring)
+        }
+
+        fn wait(&mut self, until: Instant) -> bool {
+            self.link.wait(until)
+        }
+    }
+
+    /// ND21 9.8, 9.9: drives that time out again while they are asked whether they monitor answer behind as many sequences as the ring needs.
+    #[test]
+    fn drives_that_time_out_again_have_missed_their_master() {
+        for drives in [5, 12, 30] {
+            let link = monitoring(drives, "0..last");
+            // In front of the first question.
+            let recovery = recover(&mut Late { link, sends: 2 }, 0);
+            let why = recovery.before.map(|spelled| spelled.why);
+            assert_eq!(why, Some(SpellingCause::MissedMaster), "{drives}");
         }
     }
 
