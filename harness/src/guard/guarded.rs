@@ -241,7 +241,7 @@ impl<L: Line> Guarded<L> {
         if self.trouble().is_some() {
             return;
         }
-        let before: Vec<_> = self.gates.iter().map(|gate| gate.addressed()).collect();
+        let before = self.addressed();
         let seen = look(watch, self);
         self.unasked.extend(watch.take_unasked());
         // A link that is in trouble itself has ended the look.
@@ -250,6 +250,23 @@ impl<L: Line> Guarded<L> {
         {
             self.trouble = Some(trouble);
         }
+        self.address_again(before);
+    }
+
+    /// Asks drives something that no conversation knows of: a short address goes on behind it as in front of it.
+    pub(crate) fn aside<T>(&mut self, ask: impl FnOnce(&mut Self) -> T) -> T {
+        let before = self.addressed();
+        let result = ask(self);
+        self.address_again(before);
+        result
+    }
+
+    /// What each gate addressed last.
+    fn addressed(&self) -> Vec<Option<u8>> {
+        self.gates.iter().map(|gate| gate.addressed()).collect()
+    }
+
+    fn address_again(&mut self, before: Vec<Option<u8>>) {
         for (port, before) in before.into_iter().enumerate() {
             let gate = self.gates.get(port);
             if let Some(restore) = gate.and_then(|gate| gate.restore(before)) {

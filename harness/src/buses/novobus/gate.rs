@@ -8,11 +8,11 @@ use crate::medium::{Heard, Out};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::guard::{Cause, Denial, Guard, Limits};
+use harness_proto::novobus::guard::{Cause, Denial, Guard, Limits, Touched};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
 use std::any::Any;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Why no frame leaves through this gate.
 const NO_FRAMES: &str = "frames are not sent: the guard judges the bytes of a ring only";
@@ -311,6 +311,21 @@ impl<L: Line> Guarded<L> {
     /// The rings.
     pub(crate) fn sizes(&self) -> Vec<RingSize> {
         self.rings().map(|gate| gate.size).collect()
+    }
+
+    /// What may have changed in drives since the last call.
+    pub(crate) fn take_touched(&mut self) -> BTreeSet<(Axis, Touched)> {
+        let mut all = BTreeSet::new();
+        for ring in 0..2 {
+            let Some(gate) = self.gate_mut::<RingGate>(ring) else {
+                continue;
+            };
+            for (address, touched) in gate.guard.take_touched() {
+                let axis = gate.drive_at(address).and_then(|own| Axis::new(ring, own));
+                all.extend(axis.map(|axis| (axis, touched)));
+            }
+        }
+        all
     }
 
     /// Learns what was read of a drive.

@@ -39,7 +39,7 @@ pub enum DriveAct {
 
 /// What becomes of a byte of a cell.
 #[derive(Clone, Copy)]
-enum Change {
+pub(super) enum Change {
     /// It is written whole.
     Set(u8),
     /// It keeps the bits of a mask.
@@ -268,7 +268,7 @@ impl DriveAct {
     }
 
     /// The bytes of cells that it changes.
-    fn changes(self) -> [Option<(u16, Change)>; 2] {
+    pub(super) fn changes(self) -> [Option<(u16, Change)>; 2] {
         match self {
             Self::WriteByte(address, data) => [Some((address, Change::Set(data))), None],
             Self::WriteWord(address, data) => {

@@ -12,6 +12,7 @@ use super::listener::Listener;
 use super::silence::Silence;
 use super::stage::Stage;
 use super::tail::Tail;
+use super::touched::Touched;
 use crate::line::Received;
 use crate::nd21::bits::flags2;
 use crate::novobus::address::RingSize;
@@ -21,6 +22,7 @@ use crate::novobus::error_mode::UPSTREAM_ZEROS;
 use crate::novobus::sync::{Addressing, PAUSE, SyncByte, TelegramHeader};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
+use alloc::collections::BTreeSet;
 
 /// Decides for each byte whether it may go onto one ring. See the module documentation.
 #[derive(Clone, Debug)]
@@ -41,6 +43,8 @@ pub struct Guard {
     tails: [Tail; 2],
     /// Zeros in a row.
     zeros: u8,
+    /// What may have changed in drives, by the address bytes that mean them.
+    touched: BTreeSet<(u8, Touched)>,
     passed: u64,
     /// The second that is counted: its begin, and bytes in it.
     second: (Instant, u32),
@@ -96,6 +100,7 @@ impl Guard {
             kept: None,
             tails: [Tail::default(); 2],
             zeros: 0,
+            touched: BTreeSet::new(),
             passed: 0,
             second: (Instant::START, 0),
             closed: false,
@@ -131,6 +136,9 @@ impl Guard {
     /// Notes a command that its drive executes, and will answer.
     fn note(&mut self, key: u8, act: DriveAct) {
         let known = &mut self.known[usize::from(key)];
+        act.touches(known, &mut |touched| {
+            self.touched.insert((key, touched));
+        });
         act.note(known);
         let is_there = key >= self.ring.lowest_address();
         if is_there && !self.asked.sent(key, act, known) {
@@ -165,6 +173,11 @@ impl Guard {
     /// Forgets everything about the drives: one may have been switched off and on.
     pub fn forget(&mut self) {
         self.known.iter_mut().for_each(Known::forget);
+    }
+
+    /// What may have changed in the drives with these address bytes since the last call.
+    pub fn take_touched(&mut self) -> BTreeSet<(u8, Touched)> {
+        core::mem::take(&mut self.touched)
     }
 
     /// Copies what another guard of the same ring knows of the drives.

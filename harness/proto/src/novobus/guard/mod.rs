@@ -67,6 +67,7 @@ mod table;
 mod tail;
 #[cfg(test)]
 mod tests;
+mod touched;
 
 /// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
 const FIRST_ADDRESS: u8 = 6;
@@ -77,3 +78,4 @@ pub use gate::Guard;
 pub use known::{Configuration, Facts, Found};
 pub use limits::{LimitSetting, Limits, Need};
 pub use stage::Stage;
+pub use touched::Touched;

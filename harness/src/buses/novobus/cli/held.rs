@@ -157,11 +157,16 @@ impl HeldBench for HeldRings {
                 entry.short_name()
             )));
         };
-        self.apart(|session| match Run::new(session) {
-            Ok(mut run) => run.play(&plan, None).map_err(|error| {
+        self.apart(|session| {
+            let played = Run::new(session)?.play(&plan, None);
+            // What is written between scenarios is meant to stay.
+            let ended = session.link().trouble().is_some_and(Trouble::ends_a_run);
+            let notes = session.put_back(!ended);
+            let mut played = played.map_err(|error| {
                 Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
-            }),
-            Err(problems) => Err(problems.into()),
+            })?;
+            played.outcome.remarks.extend(notes);
+            Ok(played)
         })?
     }
 

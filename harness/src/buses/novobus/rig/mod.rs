@@ -12,6 +12,7 @@ pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
 pub mod named;
+mod put_back;
 pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;

@@ -5,6 +5,7 @@ use super::driven::Driven;
 use super::health::{Unhealthy, examine};
 use super::judge::{AttemptFacts, judge, known};
 use super::session::Session;
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
 use crate::counted::counted;
@@ -21,9 +22,10 @@ use crate::scenario::run::{
 };
 use crate::scenario::simulate;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::guard::{LimitSetting, Limits};
+use harness_proto::novobus::guard::{LimitSetting, Limits, Touched};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -56,6 +58,8 @@ pub struct Run<'s> {
     rehearses: bool,
     /// Whether what does not pass is played once more at least.
     repeats: bool,
+    /// Whether a scenario was played.
+    played: bool,
     /// How the bench's own master breaks the manual on this rig, on purpose.
     master: Option<&'static MasterDeviation>,
 }
@@ -87,6 +91,7 @@ impl<'s> Run<'s> {
             byte_time,
             again: Again::new(tolerance > Span::ZERO),
             repeats: false,
+            played: false,
             as_they_are: false,
             rehearses: true,
         })
@@ -143,6 +148,7 @@ impl<'s> Run<'s> {
         if let Some(skip) = self.denied(plan, lacks) {
             return Ok(PlayedScenario::skipped(skip));
         }
+        self.remember(plan);
         let mut attempts = Vec::new();
         let real = self.exactness.tolerance > Span::ZERO;
         let most = attempts_of(self.session.rig(), real, self.repeats);
@@ -308,6 +314,44 @@ impl<'s> Run<'s> {
         if limits.allow_everything() && limits.bytes_per_second.is_none() {
             return None;
         }
+        let way = Way {
+            anew: self.resets(limits),
+            ..self.way()
+        };
+        let guarded = self.rehearsed(plan, limits, &way)?;
+        match guarded.trouble() {
+            Some(Trouble::Denied(why)) => Some((why.clone(), guarded.denying().to_vec())),
+            _ => None,
+        }
+    }
+
+    /// Lets the session read what a plan may change of the drives, by what it changes on the model.
+    fn remember(&mut self, plan: &Plan) {
+        if self.session.rig().is_simulated() {
+            return;
+        }
+        self.alive();
+        let mut own = plan.clone();
+        own.master = self.master.or(plan.master);
+        let limits = self.session.limits();
+        let resets = self.resets(limits);
+        // The model's drives are as new.
+        let way = Way {
+            attempts: self.way().attempts.filter(|_| !resets),
+            anew: false,
+            ..self.way()
+        };
+        let rehearsed = self.rehearsed(&own, limits, &way);
+        let mut touched = rehearsed.map_or_else(BTreeSet::new, |mut own| own.take_touched());
+        let axes = self.session.axes().into_iter().filter(|_| resets);
+        touched.extend(axes.map(|axis| (axis, Touched::Reset)));
+        // Drives that are reset, or have just been opened, and the twin know of no recovery before.
+        self.session.remember(&touched, resets || !self.played);
+        self.played = true;
+    }
+
+    /// A guarded model on which a plan was played.
+    fn rehearsed(&self, plan: &Plan, limits: Limits, way: &Way) -> Option<Guarded<SimulatedLink>> {
         let rig = self.session.rig();
         // A simulated drive that is wrong on purpose is rehearsed as a right one too.
         let model = twin(rig, &known(rig)).ok()?.into_link();
@@ -317,15 +361,8 @@ impl<'s> Run<'s> {
         guarded.know_as(self.session.guarded());
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut guarded, &mut forgotten);
-        let way = Way {
-            anew: self.resets(limits),
-            ..self.way()
-        };
-        let _outcome = play_one(&mut recording, plan, &way);
-        match guarded.trouble() {
-            Some(Trouble::Denied(why)) => Some((why.clone(), guarded.denying().to_vec())),
-            _ => None,
-        }
+        let _outcome = play_one(&mut recording, plan, way);
+        Some(guarded)
     }
 
     /// Resets no drive any more before a scenario: for a ring with a drive that does not answer `ResetH8` as it should.
@@ -537,57 +574,4 @@ pub(crate) fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::library::Entry;
-    use crate::link::Replay;
-    use crate::scenario::source::Source;
-    use harness_proto::line::Rate;
-
-    /// A UART has one parity setting for both directions. Two flipped bits keep the parity right.
-    #[test]
-    fn an_interposer_with_one_uart_takes_no_wrong_parity() {
-        let named = Capability::NAMES.iter().map(|(_, own)| *own).collect();
-        let link = Replay::new(Vec::new(), Rate::default(), Span::ZERO, vec![3], named);
-        let link = link.reaching([(0, 0), (0, 1)]).keeping_parity([(0, 1)]);
-        let rings = [RingSize::new(3).expect("a ring")];
-        let skip = |fault: &str| {
-            let text = format!("title t\nsource nd21 9.7\nring 3\n! {fault}\n> 80\n");
-            let source = Source::from_bytes("t.scn".to_owned(), text.into_bytes());
-            let entry = Entry::new(source.expect("a text"), None).expect("a scenario");
-            let skip = entry.plan.and_then(|plan| not_played(&plan, &link, &rings));
-            skip.map(|skip| (skip.why.to_string(), skip.unlocks.into_iter().collect()))
-        };
-        let (why, unlocks): (String, Vec<_>) = skip("2->1: flip 0").expect("a reason");
-        let sentence = "the interposer at 2->1 has one port: a UART has one parity setting for both directions, so wrong parity needs two ports, one for each direction";
-        assert_eq!(why, sentence);
-        assert_eq!(unlocks, [Unlock::TwoPorts("2->1".to_owned())]);
-        for played in [
-            "2->1: flip 0 1",
-            "2->1: drop",
-            "2->1: break 1ms",
-            "master->2: flip p",
-        ] {
-            assert_eq!(skip(played), None, "{played}");
-        }
-    }
-
-    /// No ring behind a port has what only the simulator has: the size is then no reason.
-    #[test]
-    fn what_needs_the_simulator_is_not_for_another_size() {
-        let link = Replay::new(Vec::new(), Rate::default(), Span::ZERO, vec![1], Vec::new());
-        let reason = |needs: &str| {
-            let text = format!("title t\nsource nd21 9.1\nring 3\n{needs}\n> 80\n");
-            let source = Source::from_bytes("t.scn".to_owned(), text.into_bytes());
-            let entry = Entry::new(source.expect("a text"), None).expect("a scenario");
-            let rings = [RingSize::new(1).expect("a ring")];
-            let skip = entry.plan.and_then(|plan| not_played(&plan, &link, &rings));
-            let skip = skip.expect("a reason");
-            (skip.why.group(), skip.unlocks.into_iter().collect())
-        };
-        let simulator = "the rig has no simulator".to_owned();
-        assert_eq!(reason("needs power"), (simulator, vec![Unlock::Simulated]));
-        let size = "it is for rings of another size".to_owned();
-        assert_eq!(reason(""), (size, vec![Unlock::Rings(vec![(3, 3)])]));
-    }
-}
+mod tests;

@@ -4,25 +4,26 @@ use super::cause::{self, LikelyCause};
 use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
 use super::line_test::{self, RingPace};
+use super::put_back::Before;
 use crate::buses::novobus::driver::{Axis, count_behind};
-use crate::buses::simulated;
 use crate::guard::Limits;
-use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
+use crate::guard::{Guarded, Watch, blind_stop};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::medium::{ErrorMarks, Pieces};
 use crate::rig::around::Around;
+use crate::rig::left::NotPutBack;
 use crate::rig::lock::{PortLock, RigLock};
 use crate::rig::open::{Opened, open};
 use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
-use crate::rig::{
-    Alarm, End, Ends, Rig, SessionError, UseOptions, file, limits, standing, state, stated_rate,
-};
+use crate::rig::{Alarm, Ends, Rig, SessionError, UseOptions, limits, state, stated_rate};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+
+pub(super) mod end;
 
 /// How often a port that the bench itself has just closed is tried again, and the pause in front of it.
 const PORT_TRIES: usize = 5;
@@ -49,6 +50,9 @@ pub struct Session {
     opening: Option<RingHealth>,
     /// A ring behind in-band marks answered as one that knows none.
     damages_ff: bool,
+    /// What scenarios may change of the drives, and the commands that put it back.
+    pub(super) before: Before,
+    pub(super) left: NotPutBack,
     // Given back in this order.
     around: Around,
     /// While drives may move.
@@ -167,6 +171,8 @@ impl Session {
             ended: true,
             opening: None,
             damages_ff: false,
+            before: Before::default(),
+            left: NotPutBack::of(rig),
             around: taken.around,
             watchdog: None,
             _ports: opened.locks,
@@ -220,7 +226,10 @@ impl Session {
             ends: Ends::Ports(port),
             locks: Vec::new(),
         };
-        Self::over(rig, options, taken, opened)
+        let mut session = Self::over(rig, options, taken, opened)?;
+        // Tests share the folder of the file.
+        session.left = NotPutBack::default();
+        Ok(session)
     }
 
     /// The rig.
@@ -455,6 +464,7 @@ impl Session {
         let stop = |ring: usize| Pieces::Octets(stop(ring));
         let beats = ports.beats();
         let words = ports.last_words(&stop).map_err(SessionError::Watchdog)?;
+        let alarm = alarm.telling(self.left.clone());
         watch_over(&self.rig, beats, words, alarm).map(Some)
     }
 
@@ -497,7 +507,7 @@ impl Session {
     }
 
     /// The same without learning anything of the drives.
-    fn examined(&mut self) -> Result<RingHealth, SessionError> {
+    pub(super) fn examined(&mut self) -> Result<RingHealth, SessionError> {
         self.link.reset_after_denial();
         let attempts = self.rig.file.health.attempts;
         examine(&mut self.link, &self.rings, attempts).map_err(|(ring, ill)| self.ill(ring, ill))
@@ -534,85 +544,6 @@ impl Session {
         }
     }
 
-    /// Takes the rig to its safe state and gives it back.
-    #[must_use]
-    pub fn close(mut self) -> End {
-        self.end(false)
-    }
-
-    /// The same after a rig error or an interlock.
-    #[must_use]
-    pub fn close_with_error(mut self) -> End {
-        self.end(true)
-    }
-
-    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn. Where trouble has ended
-    /// that, they are taken to their safe state all the same.
-    #[must_use]
-    pub fn release(mut self) -> End {
-        if let Some(trouble) = self.link.trouble().filter(|_| !self.ended) {
-            let error = trouble.is_of_the_bench();
-            return self.end(error);
-        }
-        self.ended = true;
-        let mut end = End {
-            safe: None,
-            power: Vec::new(),
-            remarks: Vec::new(),
-        };
-        self.come_home();
-        self.watchdog = None;
-        end.remarks = self.around.end(false);
-        end
-    }
-
-    fn end(&mut self, error: bool) -> End {
-        let mut end = End {
-            safe: None,
-            power: Vec::new(),
-            remarks: Vec::new(),
-        };
-        if std::mem::replace(&mut self.ended, true) && !self.rig.is_simulated() {
-            return end;
-        }
-        self.link.clear_the_way();
-        if !self.rig.is_simulated() {
-            if let Some(ports) = self.link.inner_mut().ports_mut() {
-                ports.resume();
-            }
-            self.link.begin();
-            self.link.reset_after_denial();
-            let wanted = self.rig.file.safe_state.clone();
-            let standing = standing(&wanted);
-            if !standing.order.is_empty() {
-                end.safe = Some(safe_state(&mut self.link, &self.rings, &standing).into());
-            }
-            self.come_home();
-            self.watchdog = None;
-            if wanted.order.contains(&file::SafeStep::PowerOff) {
-                end.power = self.around.power_off();
-            }
-        } else {
-            end.safe = self.disobeys();
-        }
-        end.remarks = self.around.end(error);
-        end
-    }
-
-    /// How simulated drives with deviations are not brought to their safe state. They have just been switched on: a scenario may
-    /// have left the ring cut.
-    fn disobeys(&self) -> Option<Safe> {
-        let setup = &self.rig.setup;
-        if setup.without_deviations() == *setup {
-            return None;
-        }
-        let ends = Ends::Simulated(simulated(&self.rig.plan().ok()?));
-        let mut fresh = Guarded::new(ends, self.limits());
-        let standing = standing(&self.rig.file.safe_state);
-        let safe = Safe::from(safe_state(&mut fresh, &self.rings, &standing));
-        (!safe.confirmed).then_some(safe)
-    }
-
     /// Waits until what was sent has come round. The lines are silent then.
     pub(crate) fn settle(&mut self) {
         self.come_round();
@@ -622,26 +553,5 @@ impl Session {
     fn come_round(&mut self) {
         let end = self.link.now() + LONGEST_ROUND;
         while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
-    }
-
-    /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
-    fn come_home(&mut self) {
-        self.come_round();
-        if self.lock.is_none() || !self.link.at_rest() || self.link.busy() {
-            return;
-        }
-        if let Ok(folder) = state::folder() {
-            // Where it cannot be kept, the next one sends the check sequence.
-            let _unkept = state::left_at_rest(&folder, self.rig.id());
-        }
-    }
-}
-
-impl Drop for Session {
-    /// A panic unwinds through here.
-    fn drop(&mut self) {
-        if !self.ended {
-            let _told_by_nobody = self.end(true);
-        }
     }
 }

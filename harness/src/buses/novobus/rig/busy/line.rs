@@ -20,19 +20,19 @@ use std::time::{self, Duration};
 
 /// When a computer stands still, and for how long.
 #[derive(Clone, Debug)]
-pub(super) struct Stalls {
+pub(in super::super) struct Stalls {
     /// State of the generator.
     seed: u64,
     /// One action of this number is late; 0 for none.
-    pub(super) one_in: u64,
+    pub(in super::super) one_in: u64,
     /// The longest stall, in microseconds.
-    pub(super) longest_us: u64,
+    pub(in super::super) longest_us: u64,
     /// How often it has stood still.
-    pub(super) count: u64,
+    pub(in super::super) count: u64,
 }
 
 impl Stalls {
-    pub(super) fn new(seed: u64, one_in: u64) -> Self {
+    pub(in super::super) fn new(seed: u64, one_in: u64) -> Self {
         Self {
             seed,
             one_in,
@@ -60,9 +60,9 @@ impl Stalls {
 }
 
 /// A ring behind a port of such a computer.
-pub(super) struct BusyLine {
-    pub(super) ring: SimulatedLink,
-    pub(super) stalls: Stalls,
+pub(in super::super) struct BusyLine {
+    pub(in super::super) ring: SimulatedLink,
+    pub(in super::super) stalls: Stalls,
     capabilities: Vec<Capability>,
     /// When the line is free for the next byte.
     free: Instant,
@@ -82,7 +82,7 @@ pub(super) struct BusyLine {
 const TOLERANCE: Span = Span::from_millis(20);
 
 impl BusyLine {
-    pub(super) fn new(ring: SimulatedLink, stalls: Stalls) -> Self {
+    pub(in super::super) fn new(ring: SimulatedLink, stalls: Stalls) -> Self {
         let clock = time::Instant::now();
         Self {
             ring,

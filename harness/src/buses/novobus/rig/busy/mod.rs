@@ -1,6 +1,6 @@
 //! Right drives on a computer that stands still between any two actions: whatever it does, no drive is accused (ND21 9.9, 10.5).
 
-mod line;
+pub(super) mod line;
 mod qualified;
 
 use super::run::Run;
@@ -18,7 +18,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use line::{BusyLine, Stalls};
 
-fn entry(name: &str, text: String) -> Entry {
+pub(super) fn entry(name: &str, text: String) -> Entry {
     let source = Source {
         name: name.to_owned(),
         text: text.into(),
@@ -27,7 +27,7 @@ fn entry(name: &str, text: String) -> Entry {
 }
 
 /// The rig's file: a ring of three behind a port.
-fn rig(more: &str) -> Rig {
+pub(super) fn rig(more: &str) -> Rig {
     let text = format!(
         "schema = 1\n[rig]\nid = \"busy\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\n\
          marks = \"in-band\"\ntime_tolerance = \"20ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\n\
@@ -41,7 +41,7 @@ fn rig(more: &str) -> Rig {
 }
 
 /// Three right drives, set up by these header lines, behind a computer that stands still like this.
-fn line(drives: &str, stalls: Stalls) -> BusyLine {
+pub(super) fn line(drives: &str, stalls: Stalls) -> BusyLine {
     let text = format!("title t\nring 3\ndrive 0..last model nd21\n{drives}\n> 80\n");
     let plan = entry("ring.scn", text).plan.expect("a plan");
     let mut ring = bench(&plan);
@@ -50,7 +50,7 @@ fn line(drives: &str, stalls: Stalls) -> BusyLine {
 }
 
 /// A rig with such drives.
-fn session(rig: &Rig, drives: &str, stalls: Stalls) -> Result<Session, SessionError> {
+pub(super) fn session(rig: &Rig, drives: &str, stalls: Stalls) -> Result<Session, SessionError> {
     let options = UseOptions {
         allow_motion: true,
         ill_as_well: true,
