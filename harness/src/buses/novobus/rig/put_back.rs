@@ -214,6 +214,11 @@ fn is_of_the_bus(code: u16) -> bool {
 }
 
 impl Session {
+    /// Scenarios are about to be played: says what a run before, which was killed, has left.
+    pub(super) fn begin(&mut self) {
+        self.before.notes.extend(self.left.before());
+    }
+
     /// Reads what a scenario may change of the drives, where it has not been read: nothing of it is recorded. Where drives may be in the middle
     /// of something, their rings are recovered first if that `may_recover`.
     pub(super) fn remember(&mut self, touched: &BTreeSet<(Axis, Touched)>, may_recover: bool) {
@@ -223,7 +228,6 @@ impl Session {
         let first = self.before.errors.is_none();
         if first {
             let _of_others = self.link().take_touched();
-            self.before.notes.extend(self.left.before());
         }
         let all = touched
             .iter()
@@ -262,11 +266,11 @@ impl Session {
     pub(crate) fn put_back(&mut self, safe: bool) -> Vec<String> {
         let Before {
             values,
-            errors: Some(before),
+            errors,
             mut notes,
-        } = std::mem::take(&mut self.before)
-        else {
-            return Vec::new();
+        } = std::mem::take(&mut self.before);
+        let Some(before) = errors else {
+            return notes;
         };
         let origin = self.rig().origin.clone();
         let touched = self.link().take_touched();

@@ -71,6 +71,7 @@ impl<'s> Run<'s> {
     /// Known deviations of the rig's file that make no ring.
     pub fn new(session: &'s mut Session) -> Result<Self, Problems> {
         let twin = twin(session.rig(), &known(session.rig()))?;
+        session.begin();
         let tolerance = session.link().time_tolerance();
         let simulated = session.rig().is_simulated();
         let abilities = session.link().capabilities();
