@@ -64,8 +64,8 @@ pub(super) struct Before {
     values: Values,
     /// The drives that were in an error which is not of the bus, with its code; `None` before the first scenario.
     errors: Option<BTreeMap<Axis, u16>>,
-    /// What is to be said at the end.
-    notes: Vec<String>,
+    /// What a run before has left, to be said at the end.
+    earlier: Option<String>,
 }
 
 /// Whether a cell holds what a master sets, and the drive leaves it so. The safe state sets the nominal speed.
@@ -216,7 +216,7 @@ fn is_of_the_bus(code: u16) -> bool {
 impl Session {
     /// Scenarios are about to be played: says what a run before, which was killed, has left.
     pub(super) fn begin(&mut self) {
-        self.before.notes.extend(self.left.before());
+        self.before.earlier = self.left.before();
     }
 
     /// Reads what a scenario may change of the drives, where it has not been read: nothing of it is recorded. Where drives may be in the middle
@@ -267,21 +267,42 @@ impl Session {
         let Before {
             values,
             errors,
-            mut notes,
+            earlier,
         } = std::mem::take(&mut self.before);
-        let Some(before) = errors else {
-            return notes;
-        };
+        let mut all: Vec<_> = earlier.into_iter().collect();
+        if let Some(errors) = errors {
+            let notes = self.all_back(safe, values, &errors);
+            self.left.set(notes.clone());
+            all.extend(notes);
+        }
+        all
+    }
+
+    fn all_back(
+        &mut self,
+        safe: bool,
+        values: Values,
+        errors: &BTreeMap<Axis, u16>,
+    ) -> Vec<String> {
         let origin = self.rig().origin.clone();
         let touched = self.link().take_touched();
-        let unread = touched
+        let unread: BTreeSet<_> = touched
             .into_iter()
             .flat_map(|(axis, touched)| places(touched).into_iter().map(move |own| (axis, own)))
-            .filter(|place| !values.contains_key(place));
-        let unread: BTreeSet<_> = unread.map(|own| own.0).collect();
-        notes.extend(unread.into_iter().map(|axis| {
-            format!("drive {axis}: it did not answer when what the scenarios change was to be read: not all of that is put back")
-        }));
+            .filter(|place| !values.contains_key(place))
+            .collect();
+        let mut by_drive: BTreeMap<Axis, String> = BTreeMap::new();
+        for (axis, place) in unread {
+            let name = place.assignment(0).map_or_else(
+                |_| " GPO1 or GPO2".to_owned(),
+                |own| format!(" {}", own.0.split('=').next().unwrap_or_default()),
+            );
+            by_drive.entry(axis).or_default().push_str(&name);
+        }
+        let unread = by_drive.into_iter().map(|(axis, names)| {
+            format!("drive {axis}: what was held before a scenario wrote it is not known, and not put back:{names}")
+        });
+        let mut notes: Vec<_> = unread.collect();
         if !safe {
             notes.extend(sentences(&values, "nothing was put back", &origin));
         } else {
@@ -295,10 +316,9 @@ impl Session {
                 notes.extend(sentences(left, why, &origin));
             }
             if left.is_empty() {
-                notes.extend(errors_back(link, &rings, &before, &origin));
+                notes.extend(errors_back(link, &rings, errors, &origin));
             }
         }
-        self.left.set(notes.clone());
         notes
     }
 }

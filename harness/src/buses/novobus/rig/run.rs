@@ -319,7 +319,9 @@ impl<'s> Run<'s> {
             anew: self.resets(limits),
             ..self.way()
         };
-        let guarded = self.rehearsed(plan, limits, &way)?;
+        let guarded = self.rehearsed(limits, |link| {
+            let _outcome = play_one(link, plan, &way);
+        })?;
         match guarded.trouble() {
             Some(Trouble::Denied(why)) => Some((why.clone(), guarded.denying().to_vec())),
             _ => None,
@@ -339,10 +341,13 @@ impl<'s> Run<'s> {
         // The model's drives are as new.
         let way = Way {
             attempts: self.way().attempts.filter(|_| !resets),
-            anew: false,
             ..self.way()
         };
-        let rehearsed = self.rehearsed(&own, limits, &way);
+        let rehearsed = self.rehearsed(limits, |link| {
+            let _examined = way.examine(link);
+            // Drives that differ from the model may be sent the rest too.
+            let _outcome = play_over_bus(&own, link, AtMismatch::GoOn);
+        });
         let mut touched = rehearsed.map_or_else(BTreeSet::new, |mut own| own.take_touched());
         let axes = self.session.axes().into_iter().filter(|_| resets);
         touched.extend(axes.map(|axis| (axis, Touched::Reset)));
@@ -351,8 +356,12 @@ impl<'s> Run<'s> {
         self.played = true;
     }
 
-    /// A guarded model on which a plan was played.
-    fn rehearsed(&self, plan: &Plan, limits: Limits, way: &Way) -> Option<Guarded<SimulatedLink>> {
+    /// A guarded model on which something was played.
+    fn rehearsed(
+        &self,
+        limits: Limits,
+        play: impl FnOnce(&mut dyn Link),
+    ) -> Option<Guarded<SimulatedLink>> {
         let rig = self.session.rig();
         // A simulated drive that is wrong on purpose is rehearsed as a right one too.
         let model = twin(rig, &known(rig)).ok()?.into_link();
@@ -361,8 +370,7 @@ impl<'s> Run<'s> {
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
         let mut forgotten: Vec<LinkEvent> = Vec::new();
-        let mut recording = Recording::new(&mut guarded, &mut forgotten);
-        let _outcome = play_one(&mut recording, plan, way);
+        play(&mut Recording::new(&mut guarded, &mut forgotten));
         Some(guarded)
     }
 

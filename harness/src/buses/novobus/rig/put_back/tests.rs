@@ -57,8 +57,9 @@ fn what_a_scenario_changes_is_put_back() {
     let left = session.left.all().join("\n");
     let write = "`drivebench write 2 ee:60=0x00 ";
     assert!(left.contains(write) && left.contains("FF71=0x21"), "{left}");
+    session.before.earlier = Some("left before".to_owned());
     let end = session.end(false);
-    assert_eq!(end.remarks, [""; 0]);
+    assert_eq!(end.remarks, ["left before"]);
     assert!(end.safe.is_some_and(|safe| safe.confirmed));
     assert_eq!(session.left.all(), [""; 0]);
     let (rings, axes) = (session.rings().to_vec(), session.axes());
