@@ -36,6 +36,7 @@ pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 use harness_proto::counted;
 pub use scenario::verdict::Verdict;
 
+mod command;
 mod embed;
 mod html;
 #[doc(hidden)]

@@ -1,10 +1,10 @@
 //! What the drives of a bus hold, for lists and completions, and how they can deviate.
 
 use super::{Bus, nordac, novobus, unitek};
-use crate::cli::args::CellsArguments;
-use crate::cli::deviations::DeviationRow;
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::args::CellsArguments;
+use crate::command::deviations::DeviationRow;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::rig::find::{find, folder};
 
 /// The names of what drives hold, for completions: of the drives of a rig, or of the default bus where there is no such rig.

@@ -1,6 +1,6 @@
 //! Scenarios that are broken off, in the words of each bus.
 
-use crate::cli::run::play_entry_until;
+use crate::command::play::play_entry_until;
 use crate::library::Entry;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;

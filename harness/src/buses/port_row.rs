@@ -2,11 +2,11 @@
 
 use super::commands::DriveCommand;
 use super::{Bus, PortBus};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::fuzz::LineFuzz;
-use crate::cli::output::Output;
-use crate::cli::shell::HeldBench;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::fuzz::LineFuzz;
+use crate::command::held::HeldBench;
+use crate::command::output::Output;
 use crate::rig::condition::Mistake;
 use crate::rig::file::Interlock;
 use crate::rig::port_file::{Node, Port};

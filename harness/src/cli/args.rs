@@ -2,21 +2,23 @@
 
 use super::campaign::ClassName;
 use super::capture::CaptureArguments;
-use super::exit::Exit;
 use super::extcap::ExtcapArguments;
 use super::fuzz::FuzzCommand;
 use super::merge::MergeArguments;
 use super::plot::PlotArguments;
-use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shell::ShellArguments;
-use super::shrink::ShrinkArguments;
 use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
 use crate::buses::rings::rig::named::ring_size;
 use crate::capture::{NamedLink, UartFormat};
+use crate::command::args::{
+    CellsArguments, ColourWhen, DeviationsArguments, ShowProgress, TableFormat, duration,
+};
+use crate::command::exit::Exit;
+use crate::command::fuzz::promote::PromoteArguments;
+use crate::command::fuzz::shrink::ShrinkArguments;
 use crate::evidence::Keep;
-use crate::file::values::{Time, ValueError};
 use crate::partition::Partition;
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
@@ -442,19 +444,6 @@ pub struct ManualArguments {
     pub filter: Option<String>,
 }
 
-/// For `cells`.
-#[derive(Clone, Debug, Args)]
-pub struct CellsArguments {
-    /// Only cells with this text in their name, address or meaning.
-    pub filter: Option<String>,
-    /// List the EEPROM instead of the RAM.
-    #[arg(long)]
-    pub eeprom: bool,
-    /// The bus: novobus for the cells of an ND21, unitek for the registers of a UNITEK drive.
-    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-    pub bus: Bus,
-}
-
 /// For `campaign`.
 #[derive(Clone, Debug, Args)]
 pub struct CampaignArguments {
@@ -495,19 +484,6 @@ pub struct CampaignArguments {
     pub threads: Option<usize>,
 }
 
-/// For `deviations`.
-#[derive(Clone, Debug, Args)]
-pub struct DeviationsArguments {
-    /// Only deviations with this text in their name, section or description.
-    pub filter: Option<String>,
-    /// The bus: novobus for ND21 drives, unitek for UNITEK drives.
-    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-    pub bus: Bus,
-    /// Output format.
-    #[arg(long, value_enum, default_value_t = TableFormat::Table)]
-    pub format: TableFormat,
-}
-
 /// Shells with a completion script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Shell {
@@ -528,15 +504,6 @@ pub enum SchemaName {
     Rig,
     /// A line of `shell --json`, in either direction.
     Session,
-}
-
-/// The forms of a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum TableFormat {
-    /// A table for people.
-    Table,
-    /// JSON for tools; the guide describes it.
-    Json,
 }
 
 /// The forms of a trace.
@@ -568,28 +535,6 @@ pub enum TraceLayout {
     True,
 }
 
-/// When to do something that suits a terminal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ColourWhen {
-    /// On a terminal, unless NO_COLOR is set or TERM is `dumb`.
-    Auto,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
-}
-
-/// When to show a progress bar.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ShowProgress {
-    /// On a terminal, unless TERM is `dumb`.
-    Auto,
-    /// Always.
-    Bar,
-    /// Never.
-    None,
-}
-
 /// Rows of a table, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
@@ -613,22 +558,6 @@ pub(crate) fn rate(text: &str) -> Result<Rate, String> {
     bits.and_then(Rate::from_bits_per_second)
         .ok_or_else(|| "38400, 19200 or 9600 is expected".to_owned())
 }
-/// What `--wire-time` of the commands of `fuzz` says of itself.
-pub(crate) const WIRE_TIME_HELP: &str =
-    "Maximum time on the line, such as 60s; by default one minute on a rig with ports";
-
-/// A time such as `30s`; at most a day.
-pub(crate) fn duration(text: &str) -> Result<Duration, String> {
-    const LONGEST: Duration = Duration::from_secs(24 * 3_600);
-    let time: Time = text
-        .parse()
-        .map_err(|error: ValueError| error.to_string())?;
-    if time.0 > LONGEST {
-        return Err("at most 24 hours (86400s)".to_owned());
-    }
-    Ok(time.0)
-}
-
 fn rows(text: &str) -> Result<Rows, String> {
     let wrong = || "rows are given as FIRST..LAST, counted from 1, such as 1..30".to_owned();
     let (first, last) = text.split_once("..").unwrap_or((text, text));

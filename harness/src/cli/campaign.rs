@@ -1,10 +1,6 @@
 //! `drivebench campaign`.
 
-use super::args::{CampaignArguments, TableFormat};
-use super::exit::Exit;
-use super::output::Output;
-use super::page::{save, writable, write};
-use super::run::progress_bar;
+use super::args::CampaignArguments;
 use crate::buses::{line_campaign, line_campaigns};
 use crate::campaign::find::{FindCampaignError, find, names};
 use crate::campaign::line::{self, LineCampaign, PlayedLine};
@@ -12,6 +8,11 @@ use crate::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line as case_line, table};
 use crate::campaign::{Campaign, CaseClass, CaseFaults, Contradiction, PlayedCampaign};
+use crate::command::args::TableFormat;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::{save, writable, write};
+use crate::command::play::progress_bar;
 use crate::partition::Partition;
 use clap::ValueEnum;
 use std::path::PathBuf;

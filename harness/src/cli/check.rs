@@ -1,8 +1,8 @@
 //! `drivebench check`.
 
 use super::args::CheckArguments;
-use super::exit::Exit;
-use super::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::scenario::settled::Settled;

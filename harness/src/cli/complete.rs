@@ -2,11 +2,11 @@
 //! at the cursor, so new rigs and commands show up without a new script.
 
 use super::args::Shell;
-use super::exit::Exit;
 use super::help::command;
-use super::output::Output;
 use crate::buses::{cell_names, commands::deviations};
 use crate::campaign::find as campaigns;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::library;
 use crate::rig::find;
 use clap::{Arg, Command};

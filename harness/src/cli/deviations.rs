@@ -1,21 +1,11 @@
 //! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
 
-use super::args::{DeviationsArguments, TableFormat};
-use super::exit::Exit;
-use super::output::Output;
+use crate::command::args::{DeviationsArguments, TableFormat};
+use crate::command::deviations::DeviationRow;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use serde::Serialize;
 use std::fmt::Write as _;
-
-/// A deviation of a drive or of the bench's own master.
-#[derive(Serialize)]
-pub(crate) struct DeviationRow {
-    pub(crate) name: &'static str,
-    pub(crate) section: &'static str,
-    pub(crate) about: &'static str,
-    /// Which models can deviate in this way, where a drive has several.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) models: Option<&'static [&'static str]>,
-}
 
 /// All of them, for tools.
 #[derive(Serialize)]

@@ -5,12 +5,12 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use super::exit::Exit;
-use super::output::Output;
-use super::run::play_entry;
 use crate::buses::rings::rig::named::ring_size;
 use crate::buses::{Bus, carries_frames, example, has_rings};
 use crate::capture::{LiveRecorder, Tape};
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::play::play_entry;
 use crate::library::{Entry, sources};
 use crate::report::pcapng::LINK_TYPE;
 use crate::report::pcapng_frames;

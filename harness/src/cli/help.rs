@@ -107,7 +107,7 @@ pub(crate) fn parse() -> Result<Arguments, clap::Error> {
     if name.is_some_and(|own| own == super::extcap::PROGRAM) {
         given.insert(1, "extcap".into());
     }
-    let command = command().color(super::output::colour_of_usage());
+    let command = command().color(crate::command::output::colour_of_usage());
     let matches = command.clone().try_get_matches_from(&given);
     matches
         .and_then(|matches| Arguments::from_arg_matches(&matches))

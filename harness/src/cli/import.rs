@@ -1,9 +1,6 @@
 //! `drivebench import`, `diff`, `dissector`, `dbc` and `gsd`: captures that are read, and what helps to read them elsewhere.
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
-use super::exit::Exit;
-use super::output::Output;
-use super::run::play_entry;
 use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
@@ -11,6 +8,9 @@ use crate::capture::{
     Capture, CaptureError, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings,
     diff as compare, is_capture, judge, read_files, scenario,
 };
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::play::play_entry;
 use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::regular;

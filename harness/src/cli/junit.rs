@@ -1,8 +1,8 @@
 //! `--junit FILE`: verdicts for continuous integration.
 
-use super::exit::Exit;
-use super::output::Output;
 use super::run::drives;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::evidence::{JunitCase, junit};
 use crate::library::Entry;
 use crate::regular;

@@ -1,9 +1,9 @@
 //! `drivebench list`.
 
 use super::args::Selection;
-use super::exit::Exit;
-use super::output::Output;
 use super::run::select;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use std::fmt::Write as _;
 
 /// Shows what scenarios there are.

@@ -1,8 +1,8 @@
 //! `drivebench man`.
 
-use super::exit::Exit;
 use super::help::command;
-use super::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use clap::Command;
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! `drivebench manual`: which tables are pinned, the errata ledgers, and what the manuals leave open.
 
 use super::args::{ManualArguments, Selection};
-use super::exit::Exit;
-use super::output::Output;
 use super::run::select;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::library::Entry;
 use crate::manual::{Erratum, Manual, ManualTable, NOT_YET, pinned_by};
 use std::fmt::Write as _;

@@ -1,10 +1,10 @@
 //! `drivebench merge`: one folder of evidence of the parts of a run. Parts that are files go to `merge_counts`.
 
-use super::exit::Exit;
 use super::merge_counts::merge_counts;
-use super::output::Output;
 use super::run_rig::worse;
 use super::tally::counts;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::evidence::{Merged, merge as join};
 use crate::scenario::verdict::Verdict;

@@ -1,11 +1,11 @@
 //! `drivebench merge` of files: the counts of parts of campaigns.
 
-use super::exit::Exit;
 use super::merge::MergeArguments;
-use super::output::Output;
-use super::page::save;
 use crate::campaign::part::{CampaignCounts, CountsError, MergedCounts, merge};
 use crate::campaign::report::share;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::save;
 use std::fmt::Write as _;
 
 /// Adds the counts of parts, and compares them with the pinned figures.

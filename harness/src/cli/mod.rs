@@ -1,54 +1,42 @@
 //! The command line of `drivebench`: standard output is for results, standard error for people.
 
-pub(crate) mod args;
+mod args;
 mod campaign;
 mod capture;
 mod check;
 mod complete;
-pub(crate) mod deviations;
-pub(crate) mod drawing;
-pub(crate) mod exit;
+mod deviations;
 mod extcap;
-pub(crate) mod failure;
-pub(crate) mod file;
-pub(crate) mod frames;
-pub(crate) mod fuzz;
+mod fuzz;
 mod help;
 mod import;
 mod junit;
-pub(crate) mod line_top;
 mod list;
 mod man;
 mod manual;
 mod merge;
 mod merge_counts;
-pub(crate) mod output;
-mod page;
-pub(crate) mod plot;
-pub(crate) mod port_bench;
+mod plot;
 mod promote;
 mod qualify;
 mod report;
-pub(crate) mod rig;
-pub(crate) mod rig_failure;
-pub(crate) mod run;
+mod rig;
+mod run;
 mod run_rig;
 mod run_segment;
 mod schema;
-pub(crate) mod shell;
-pub(crate) mod shrink;
+mod shell;
+mod shrink;
 mod tally;
-pub(crate) mod top;
-mod top_page;
 mod trace;
 mod verify;
-pub(crate) mod watch;
 
+pub use crate::command::exit::Exit;
 pub use args::Arguments;
-pub use exit::Exit;
 
-use args::{ColourWhen, ProgramCommand, RunArguments, ShowProgress};
-use output::Output;
+use crate::command::args::{ColourWhen, ShowProgress};
+use crate::command::output::{self, Output};
+use args::{ProgramCommand, RunArguments};
 use std::io::Write as _;
 use std::process::ExitCode;
 

@@ -2,16 +2,16 @@
 //! evidence.
 
 use super::args::QualifyArguments;
-use super::exit::Exit;
-use super::output::Output;
-use super::page::Page;
-use super::rig_failure::find_any_rig;
 use super::run::{of_rig, select};
 use super::run_rig::{EarlyEnd, PlayOrder, over, play, show, work};
 use super::run_segment;
 use super::tally::EarlierVerdicts;
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::Page;
+use crate::command::rig_failure::find_any_rig;
 use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualifiedBench};

@@ -1,9 +1,9 @@
 //! `drivebench report`.
 
 use super::args::ReportArguments;
-use super::exit::Exit;
-use super::output::Output;
-use super::page::{writable, write};
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::{writable, write};
 use crate::evidence::{RIG, derive};
 use crate::explore::{RECORD, page};
 

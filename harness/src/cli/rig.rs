@@ -1,15 +1,16 @@
 //! `drivebench rig`: benches, their files and their locks.
 
-use super::exit::Exit;
-use super::output::Output;
 use crate::buses::check_rig as check;
 use crate::buses::commands::rig_check::CheckRigArguments;
+use crate::command::args::ListFormat;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::rig::file::Quarantine;
 use crate::rig::find::{self, FindError, RigPlace};
 use crate::rig::lock::{self, LockError, Standing};
 use crate::rig::state::{self, Holder};
 use crate::rig::{Rig, scan, schema};
-use clap::{Subcommand, ValueEnum};
+use clap::Subcommand;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -64,15 +65,6 @@ pub enum RigCommand {
         #[arg(long, conflicts_with = "reason")]
         lift: bool,
     },
-}
-
-/// The forms of a list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ListFormat {
-    /// A line a bench.
-    Text,
-    /// A list for tools.
-    Json,
 }
 
 /// Why a command on a bench came to no good end.

@@ -1,15 +1,16 @@
 //! `drivebench run`.
 
 use super::args::{RunArguments, Selection};
-use super::exit::Exit;
 use super::junit::Cases;
-use super::output::Output;
-use super::page::Page;
-use super::rig_failure::find_any_rig;
 use super::run_rig::{PlayOrder, reports, state_size, work};
 use super::run_segment;
 use super::tally::{EarlierVerdicts, Tally};
 use crate::buses::Bus;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::Page;
+use crate::command::play::{PlayedOnce, play_entry, progress_bar};
+use crate::command::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_large};
 use crate::library::{Entry, LibraryError, is_named, sources};
@@ -19,12 +20,10 @@ use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::problem::Problems;
-use crate::scenario::run::{AtMismatch, Outcome, Skip};
+use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::source::Source;
 use harness_sim::record::Trace;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
-use std::sync::atomic::AtomicBool;
 
 /// Reads every scenario selected; the size of a rig's ring is taken where the scenario allows it.
 ///
@@ -365,37 +364,6 @@ fn keep(
     Ok(played)
 }
 
-/// A scenario that was played, with what it left.
-pub(crate) struct PlayedOnce {
-    pub(crate) outcome: Outcome,
-    pub(crate) traces: Vec<Trace>,
-}
-
-/// Plays a scenario on a simulated bench.
-pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> PlayedOnce {
-    play_entry_until(entry, at_mismatch, &AtomicBool::new(false))
-}
-
-/// The same, aborted once `interrupt` is set.
-pub(crate) fn play_entry_until(
-    entry: &Entry,
-    at_mismatch: AtMismatch,
-    interrupt: &AtomicBool,
-) -> PlayedOnce {
-    let Some(plan) = entry.settled() else {
-        return PlayedOnce {
-            outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
-            traces: Vec::new(),
-        };
-    };
-    let mut link = plan.simulate();
-    let outcome = plan.play_until(&mut *link, at_mismatch, interrupt);
-    PlayedOnce {
-        outcome,
-        traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
-    }
-}
-
 /// What a scenario recorded, indented below its line.
 fn records(outcome: &Outcome) -> String {
     let lines = outcome.records.iter().map(plot).collect::<String>();
@@ -431,17 +399,6 @@ pub(crate) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> Str
         let _infallible = writeln!(text, "\n{}", explain(entry, finding, traces));
     }
     text
-}
-
-pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
-    let target = if shown && length > 1 {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
 }
 
 #[cfg(test)]

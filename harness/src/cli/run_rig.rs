@@ -1,13 +1,14 @@
 //! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
-use super::exit::Exit;
 use super::junit::Cases;
-use super::output::Output;
-use super::page::{Page, write};
 use super::qualify::{Live, settle};
-use super::rig_failure::{alarm, exit_of, give_back};
-use super::run::{details, drives, line, progress_bar};
+use super::run::{details, drives, line};
 use super::tally::{EarlierVerdicts, Tally};
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::{Page, write};
+use crate::command::play::progress_bar;
+use crate::command::rig_failure::{alarm, exit_of, give_back};
 use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, Keep, PAGE, SplitRun, size};
 use crate::library::Entry;

@@ -1,11 +1,11 @@
 //! `run --rig` on a rig with a port, whose stations share one segment.
 
-use super::exit::Exit;
-use super::output::Output;
-use super::page::Page;
-use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use super::run_rig::{Course, EarlyEnd, PlayOrder, course_of, keep, reports, show, worse};
 use crate::buses::run_on;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::page::Page;
+use crate::command::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;

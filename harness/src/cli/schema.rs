@@ -1,8 +1,8 @@
 //! `drivebench schema`: the JSON schemas of what the program reads and writes.
 
 use super::args::SchemaName;
-use super::exit::Exit;
-use super::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::evidence;
 use crate::rig;
 

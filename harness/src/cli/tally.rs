@@ -1,7 +1,7 @@
 //! What a run comes to: how many scenarios of each verdict, which tables of the manual it covered, what was not played and why, and the
 //! exit code.
 
-use super::exit::Exit;
+use crate::command::exit::Exit;
 use crate::counted::counted;
 use crate::evidence::Earlier;
 use crate::library::{Entry, is_named};

@@ -1,10 +1,11 @@
 //! `drivebench trace`.
 
 use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
-use super::exit::Exit;
-use super::output::{Output, unless_closed};
-use super::run::{details, play_entry};
+use super::run::details;
 use crate::buses::{SharedForm, bits_per_second, carry_frames, rows, share_a_line, write_shared};
+use crate::command::exit::Exit;
+use crate::command::output::{Output, unless_closed};
+use crate::command::play::play_entry;
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;

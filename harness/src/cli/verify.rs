@@ -1,10 +1,10 @@
 //! `drivebench verify`: every verdict of a folder of evidence, judged again.
 
 use super::args::VerifyArguments;
-use super::exit::Exit;
-use super::fuzz;
-use super::output::Output;
 use crate::buses::verify_shared;
+use crate::command::exit::Exit;
+use crate::command::fuzz;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::evidence::{MERGE, Signer, verify as judge_again, verify_merged};
 use crate::explore::read as read_run;

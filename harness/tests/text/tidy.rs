@@ -137,9 +137,9 @@ fn imports_go_one_way() {
     }
 }
 
-/// The rooms of `harness/src`: each imports from those in front of it only, so there is no circle. The buses are not in the list: a bus
-/// imports what the rooms give it, and a room imports what `buses/mod.rs` or its own `mod.rs` takes from a bus.
-const ROOMS: [&str; 31] = [
+/// The rooms of `harness/src`: each imports from those in front of it only. The buses are not in the list: a bus imports from all rooms in
+/// front of the command line, and a room imports what `buses/mod.rs` or its own `mod.rs` takes from a bus.
+const ROOMS: [&str; 32] = [
     "counted",
     "regular",
     "partition",
@@ -169,6 +169,7 @@ const ROOMS: [&str; 31] = [
     "serve",
     "embed",
     "top",
+    "command",
     "cli",
     "main",
 ];
@@ -184,11 +185,13 @@ fn rooms_import_from_rooms_in_front_of_them() {
             .display()
             .to_string();
         let room = inner.split(['/', '.']).next().expect("a name").to_owned();
-        if room == "lib" || room == "buses" {
+        if room == "lib" {
             continue;
         }
         let place = |name: &str| ROOMS.iter().position(|room| *room == name);
-        let own = place(&room).unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
+        // A bus stands in front of the command line.
+        let stands = if room == "buses" { "cli" } else { &room };
+        let own = place(stands).unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
         for (number, line) in read(&source).lines().enumerate() {
             let code = line.split("//").next().unwrap_or_default();
             for (_, path) in code

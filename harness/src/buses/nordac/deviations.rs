@@ -1,6 +1,6 @@
 //! The wrong slaves and the wrong masters of NORDAC inverters.
 
-use crate::cli::deviations::DeviationRow;
+use crate::command::deviations::DeviationRow;
 use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, deviations};
 
 /// The deviations of slaves, and those of the bench's own master.

@@ -13,7 +13,7 @@ mod language;
 mod report;
 mod valve;
 
-use crate::cli::run::play_entry;
+use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::report::finding::explain;
 use crate::report::html::{Head, ScenarioView, run, section};

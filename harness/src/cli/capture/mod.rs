@@ -7,12 +7,13 @@ mod tap;
 pub(crate) use place::TapAt;
 pub(crate) use place::taps_of;
 
-use super::args::{ImportArguments, ReadingArguments, TraceOutput, duration, rate};
-use super::exit::Exit;
+use super::args::{ImportArguments, ReadingArguments, TraceOutput, rate};
 use super::import::import;
-use super::output::Output;
-use super::rig_failure::find_any_rig;
 use crate::capture::NamedLink;
+use crate::command::args::duration;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::signals;
 use clap::Args;

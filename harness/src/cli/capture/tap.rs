@@ -5,7 +5,7 @@ use super::place::{TapAt, TapPort};
 use crate::buses::{TelegramCutter, live_text, sender_of};
 use crate::capture::live::LiveText;
 use crate::capture::{AWAY, Piece, RecordedPlace};
-use crate::cli::exit::Exit;
+use crate::command::exit::Exit;
 use crate::counted::counted;
 use crate::link::Line as _;
 use crate::link::frames::{

@@ -3,10 +3,10 @@
 pub(crate) mod read;
 mod step;
 
-use super::exit::Exit;
-use super::failure::Failure;
-use super::file;
-use super::output::Output;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::file;
+use crate::command::output::Output;
 use crate::html::Html;
 use crate::report::chart::{Chart, Curve, MAX_CURVES, number};
 use clap::{Args, ValueEnum};

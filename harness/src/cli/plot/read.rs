@@ -1,14 +1,12 @@
 //! Recordings of values, read back: the csv of `watch` and of `scope`, and the records in the JSON of `trace`.
 
+use crate::command::drawing::SCOPE_HEADING;
 use crate::regular;
 use crate::report::chart::{Curve, HEX, number_of};
 use csv::{ByteRecord, Reader, ReaderBuilder};
 use serde::Deserialize;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
-
-/// The first line of the csv of `scope`.
-pub(crate) const SCOPE_HEADING: &str = "time_us,signal,name,raw,value,unit";
 
 /// Bytes of a file at most.
 const MOST_BYTES: u64 = 64 << 20;

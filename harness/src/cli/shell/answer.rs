@@ -1,7 +1,7 @@
 //! What requests of a session give, as JSON.
 
 use super::request::SessionRequest;
-use crate::cli::output::Output;
+use crate::command::output::Output;
 use crate::library::Entry;
 use crate::scenario::run::Outcome;
 use crate::scenario::source::line_number;
@@ -45,7 +45,7 @@ pub(super) fn values(text: &str) -> Vec<Value> {
         let number = digits
             .parse::<f64>()
             .ok()
-            .filter(|_| unit != crate::cli::watch::HEX);
+            .filter(|_| unit != crate::command::watch::HEX);
         let value = match number {
             Some(number) => json!(number),
             None if digits.is_empty() => Value::Null,

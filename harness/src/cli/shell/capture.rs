@@ -1,14 +1,10 @@
 //! What a session exchanges from a request on, as a capture in pcapng.
 
-use super::HeldBench;
 use crate::capture::{LiveRecorder, Piece, Tape};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::guard::Guarded;
-use crate::link::{Line, Link};
-use crate::medium::Medium;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::held::HeldBench;
 use crate::regular::is_wrong_path;
-use crate::rig::Ends;
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -16,30 +12,6 @@ use serde_json::{Value, json};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-
-/// What a held bench has recorded of its bus.
-pub(crate) struct HeldRecord {
-    /// Everything since its link began, or since its record was last emptied.
-    pub(crate) traces: Vec<Trace>,
-    /// What its ports carry.
-    pub(crate) medium: Medium,
-    /// How many pieces its link has carried since it began.
-    pub(crate) carried: u64,
-    /// The link's time.
-    pub(crate) now: Instant,
-}
-
-impl HeldRecord {
-    /// What the `ports` of a link have recorded.
-    pub(crate) fn of(link: &Guarded<Ends>, ports: usize) -> Self {
-        Self {
-            traces: (0..ports).map(|port| link.trace(port)).collect(),
-            medium: link.medium(0),
-            carried: link.carried(),
-            now: link.now(),
-        }
-    }
-}
 
 /// How many bytes or frames of simulated drives a capture holds of one request at most: about as many as the record of a port.
 const MOST: u64 = 4_000_000;

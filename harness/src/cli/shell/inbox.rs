@@ -1,7 +1,7 @@
 //! The two ends of a session: a thread reads requests, and a thread writes lines. Neither keeps the bus waiting.
 
 use super::request::{SessionFault, SessionLine, SessionRequest, parse};
-use crate::cli::exit::Exit;
+use crate::command::exit::Exit;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use serde_json::Value;

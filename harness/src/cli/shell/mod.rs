@@ -3,21 +3,18 @@
 
 mod answer;
 mod capture;
-mod held;
 mod inbox;
 mod people;
 mod request;
 mod session;
 
-pub(crate) use capture::HeldRecord;
-pub(crate) use held::{HeldBench, HeldDrives, HeldPort, record_from_now};
 pub(crate) use request::schema;
 
-use super::args::{ColourWhen, ShowProgress};
-use super::exit::Exit;
-use super::output::{Output, Stream};
-use super::rig_failure::{alarm, find_any_rig, tell_end};
 use crate::buses::{Bus, hold};
+use crate::command::args::{ColourWhen, ShowProgress, duration};
+use crate::command::exit::Exit;
+use crate::command::output::{Output, Stream};
+use crate::command::rig_failure::{alarm, find_any_rig, tell_end};
 use crate::rig::UseOptions;
 use crate::signals::{at_ctrl_c, interrupt_flag, interrupt_flag_without_ctrl_c};
 use clap::Args;
@@ -45,7 +42,7 @@ pub struct ShellArguments {
     #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
     /// How long to wait if another program holds the rig, such as 30s.
-    #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = super::args::duration)]
+    #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }
 

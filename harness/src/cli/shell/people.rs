@@ -3,9 +3,9 @@
 use super::inbox::{LineWriter, RequestReader};
 use super::request::{DriveWords, SessionRequest};
 use super::session::{COMMANDS, SETTLED};
-use crate::cli::args::duration;
 use crate::cli::complete::fitting;
 use crate::cli::help::command;
+use crate::command::args::duration;
 use crate::counted::counted;
 use crate::scenario::problem::nearest;
 use clap::Arg;

@@ -1,8 +1,8 @@
 //! `drivebench cells --bus nordac`: the parameters of the inverter (NORDAC 4.1.3, 5).
 
 use crate::buses::nordac::value::ReplyWord;
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::{PARAMETERS, Parameter};
 

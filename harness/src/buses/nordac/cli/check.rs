@@ -1,10 +1,10 @@
 //! `drivebench rig check` of NORDAC inverters: the bench is opened, and every slave is asked for its diagnosis and its configuration.
 
 use crate::buses::nordac::rig::Session;
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::rig_failure::{exit_of, exit_of_end, tell_end};
 use crate::link::Line as _;
 use crate::port::UNPROVEN_RATE;
 use crate::rig::{Rig, UseOptions};

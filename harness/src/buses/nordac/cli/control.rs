@@ -9,10 +9,10 @@ use crate::buses::commands::{MoveArguments, OutputForm, SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
 use crate::buses::nordac::rig::{Inverters, Session};
 use crate::buses::nordac::value::{ExchangeStep, Setpoint, percentage, status, steps};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::{PortBench, on as with, select, single};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::{PortBench, on as with, select, single};
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
@@ -70,7 +70,7 @@ pub(super) fn go(
     };
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
-        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
+        let slaves = crate::command::port_bench::select(&select.drives, session)?;
         refuse_motion(arguments.leave, "go", &slaves)?;
         let mut driver = driver(session);
         switch_on(&mut driver, "go", &slaves, Setpoint::Raw(0), output)?;
@@ -235,7 +235,7 @@ pub(super) fn on(
     };
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
-        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
+        let slaves = crate::command::port_bench::select(&select.drives, session)?;
         refuse_motion(arguments.leave, "on", &slaves)?;
         let longest = longest_hold(session);
         let mut driver = driver(session);
@@ -288,7 +288,7 @@ pub(super) fn acknowledge(
     };
     let select = &arguments.select;
     with(bench, &select.rig, as_what, output, |session, output| {
-        let slaves = crate::cli::port_bench::select(&select.drives, session)?;
+        let slaves = crate::command::port_bench::select(&select.drives, session)?;
         let mut driver = driver(session);
         for slave in &slaves {
             driver.join(*slave)?;

@@ -3,11 +3,11 @@
 use crate::buses::commands::DriveCommand;
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::rig::Player;
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::PortBench;
-use crate::cli::shell::HeldDrives;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::held::HeldDrives;
+use crate::command::output::Output;
+use crate::command::port_bench::PortBench;
 use crate::link::Line;
 use crate::rig::port_session::PortSession;
 use harness_proto::time::Span;

@@ -5,11 +5,11 @@ use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error, percent};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, ReplyWord, cells, shown};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::watch::{HEX, decimal};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::{PortBench, on, select};
+use crate::command::watch::{HEX, decimal};
 use harness_proto::nordac::PkwError;
 use serde_json::json;
 

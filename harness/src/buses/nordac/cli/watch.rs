@@ -5,11 +5,11 @@ use super::read::{Found, find};
 use crate::buses::commands::{Use, WatchArguments};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, cells};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::{PortBench, on, select};
-use crate::cli::watch::{WatchBench, WatchedCell, watch as show};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::{PortBench, on, select};
+use crate::command::watch::{WatchBench, WatchedCell, watch as show};
 use harness_proto::time::{Instant, Span};
 
 /// Shows values, a line each time.

@@ -5,10 +5,10 @@ use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::nordac::driver::{Driver, Error, Written};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Assignment, assignments, shown};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::{PortBench, on, select};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::{PortBench, on, select};
 use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, Task};
 
 /// The parameters that are the address, and that load factory settings.

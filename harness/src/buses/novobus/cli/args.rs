@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::rig::{OpenBench, RigName};
 use super::sim::{SIM_HELP, SimArguments};
 use crate::buses::CyclicCommand;
-use crate::cli::drawing::DrawingArguments;
+use crate::command::drawing::DrawingArguments;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};

@@ -1,7 +1,7 @@
 //! Drives on the command line: `3`, `2:3` in ring 2, `0..2`, `2:0..1`, `all`.
 
 use crate::buses::novobus::driver::Axis;
-use crate::cli::failure::Failure;
+use crate::command::failure::Failure;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 

@@ -1,8 +1,8 @@
 //! `drivebench cells`: the drive's memory, cell by cell (ND21 14.2.1, 14.2.2).
 
-use crate::cli::args::CellsArguments;
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::args::CellsArguments;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::EEPROM;
 

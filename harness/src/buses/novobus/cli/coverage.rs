@@ -1,8 +1,8 @@
 //! `drivebench fuzz coverage`: the matrix of protocol transitions, what reaches it, and what the inputs of each target reach.
 
-use crate::cli::args::TableFormat;
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::args::TableFormat;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::fuzz::coverage::{Coverage, CoverageError, Sum};
 use clap::Args;
 use harness_sim::novobus::transitions::{CELLS, Transition, why_unreachable};

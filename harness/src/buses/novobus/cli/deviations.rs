@@ -1,6 +1,6 @@
 //! The wrong drives and the wrong masters of the ring.
 
-use crate::cli::deviations::DeviationRow;
+use crate::command::deviations::DeviationRow;
 use harness_sim::novobus::deviation::{deviations, master_deviations};
 
 /// The names of the deviations of drives.

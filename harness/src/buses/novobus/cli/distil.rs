@@ -1,7 +1,7 @@
 //! `drivebench fuzz distil`: what of a grown corpus is worth keeping.
 
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::fuzz::coverage::{CoverageError, read_folder};
 use crate::fuzz::distil::distil as distilled;

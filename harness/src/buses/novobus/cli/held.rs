@@ -4,10 +4,10 @@ use super::args::DriveCommand;
 use super::rig::{OpenBench, Use};
 use crate::buses::novobus::language::plan::RingAct;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::shell::{HeldBench, HeldRecord, record_from_now};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::held::{HeldBench, HeldRecord, record_from_now};
+use crate::command::output::Output;
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, PlayedScenario, Rig, Run, Session, SessionError, Shared, UseOptions};
@@ -38,7 +38,10 @@ pub(crate) fn hold(
 ) -> Result<Box<dyn HeldBench>, Failure> {
     let plan = rig.plan()?;
     let failed = |error: SessionError| {
-        Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+        Failure::Said(
+            crate::command::rig_failure::exit_of(&error),
+            error.to_string(),
+        )
     };
     let rig = Shared::new(Session::open(rig, options).map_err(failed)?);
     let mut held = HeldRings {
@@ -163,7 +166,10 @@ impl HeldBench for HeldRings {
             let ended = session.link().trouble().is_some_and(Trouble::ends_a_run);
             let notes = session.put_back(!ended);
             let mut played = played.map_err(|error| {
-                Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+                Failure::Said(
+                    crate::command::rig_failure::exit_of(&error),
+                    error.to_string(),
+                )
             })?;
             played.outcome.remarks.extend(notes);
             Ok(played)

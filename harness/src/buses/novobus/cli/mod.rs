@@ -36,9 +36,9 @@ pub(crate) use read::columns;
 pub(crate) use rig::{RigName, Use};
 
 use crate::buses::novobus::driver;
-use crate::cli::exit::Exit;
-use crate::cli::failure::{Failure, exit_of_trouble};
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::failure::{Failure, exit_of_trouble};
+use crate::command::output::Output;
 
 /// Runs a command and reports its errors.
 pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {

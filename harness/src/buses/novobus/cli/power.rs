@@ -1,9 +1,9 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
 use crate::buses::novobus::explore::masters;
-use crate::cli::exit::Exit;
-use crate::cli::fuzz::rig::{simulated, tell};
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::fuzz::rig::{simulated, tell};
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::explore::{
     Bounds, ExploreError, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, Progress,

@@ -4,9 +4,9 @@ use super::args::{OutputForm, ReadArguments};
 use super::axes;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::cell::{CellFound, find};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
 use crate::scenario::argument::{MemoryKind, MemoryRange, cells};
 use serde_json::json;
 

@@ -4,10 +4,10 @@
 use super::args::{OutputForm, RecoverArguments};
 use super::rig::{self, RigName, Use};
 use crate::buses::novobus::driver::{self, Axis, Recovery, SpelledOut, SpellingCause};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::rig_failure::tell_end;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::rig_failure::tell_end;
 use crate::counted::counted;
 use crate::link::Line;
 use harness_proto::novobus::address::MAX_DRIVES;

@@ -1,12 +1,12 @@
 //! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
 
 use crate::buses::novobus::driver::{Error, SpelledOut, SpellingCause};
-use crate::cli::exit::Exit;
-use crate::cli::failure::exit_of_trouble;
-use crate::cli::output::Output;
-use crate::cli::rig::ListFormat;
-use crate::cli::rig_failure::{alarm, exit_of, tell_end};
-use crate::cli::run::progress_bar;
+use crate::command::args::ListFormat;
+use crate::command::exit::Exit;
+use crate::command::failure::exit_of_trouble;
+use crate::command::output::Output;
+use crate::command::play::progress_bar;
+use crate::command::rig_failure::{alarm, exit_of, tell_end};
 use crate::counted::counted;
 use crate::rig::figures::{Figures, RingFigures, WrongParity, measure};
 use crate::rig::{Rig, Session, UseOptions};
@@ -23,7 +23,7 @@ pub struct CheckRigArguments {
     /// The rig: a name, a file, or sim:N.
     pub rig: String,
     /// How long to wait if another program holds the rig, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = crate::cli::args::duration)]
+    #[arg(long, value_name = "TIME", value_parser = crate::command::args::duration)]
     pub wait: Option<Duration>,
     /// Output format.
     #[arg(long, value_enum, default_value_t = ListFormat::Text)]

@@ -1,10 +1,10 @@
 //! `drivebench shrink` for a finding on rings.
 
-use crate::cli::exit::Exit;
-use crate::cli::fuzz::{on_ports, scope, sizes, tell};
-use crate::cli::output::Output;
-use crate::cli::rig_failure::find_rig;
-use crate::cli::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
+use crate::command::exit::Exit;
+use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
+use crate::command::fuzz::{on_ports, scope, sizes, tell};
+use crate::command::output::Output;
+use crate::command::rig_failure::find_rig;
 use crate::counted::counted;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{

@@ -3,10 +3,10 @@
 use super::args::RigArguments;
 use super::rig;
 use crate::buses::{self, Bus};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::frames::FrameArguments;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::frames::FrameArguments;
+use crate::command::output::Output;
 use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;
 use crate::scenario::argument::duration;

@@ -1,7 +1,7 @@
 //! `drivebench cells --bus unitek`: the registers of the drive.
 
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use harness_proto::unitek::units::usual;
 use harness_proto::unitek::{ALIASES, REGISTERS, Register};
 

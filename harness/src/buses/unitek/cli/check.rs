@@ -2,11 +2,11 @@
 
 use crate::buses::commands::Axes;
 use crate::buses::unitek::rig::Session;
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::select;
-use crate::cli::rig_failure::{exit_of, exit_of_end, tell_end};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::select;
+use crate::command::rig_failure::{exit_of, exit_of_end, tell_end};
 use crate::link::Line as _;
 use crate::rig::{Rig, UseOptions};
 use harness_proto::unitek::words::{ERRORS, set_bits};

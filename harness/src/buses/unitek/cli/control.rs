@@ -4,10 +4,10 @@ use super::write::{Order, refuse_denied};
 use crate::buses::commands::{DeleteErrorArguments, MoveArguments, SelectArguments, Use};
 use crate::buses::unitek::driver::{Driver, Error, Stopped};
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
-use crate::cli::port_bench::{PortBench, on, select};
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_bench::{PortBench, on, select};
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
@@ -33,7 +33,7 @@ pub(super) fn go(
     };
     let select = &arguments.select;
     on(bench, &select.rig, as_what, output, |session, output| {
-        let drives = crate::cli::port_bench::select(&select.drives, session)?;
+        let drives = crate::command::port_bench::select(&select.drives, session)?;
         let warning = format!("go: {}: motors may turn", UnitekDrives::named(&drives));
         if !arguments.leave {
             return Err(Failure::refused(format!(
@@ -120,7 +120,7 @@ pub(super) fn delete_error(
     };
     let select = &arguments.select;
     on(bench, &select.rig, as_what, output, |session, output| {
-        let drives = crate::cli::port_bench::select(&select.drives, session)?;
+        let drives = crate::command::port_bench::select(&select.drives, session)?;
         let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
         let orders: Vec<_> = drives.iter().map(order).collect();
         refuse_denied(&mut session.driver(), &orders)?;

@@ -1,6 +1,6 @@
 //! The wrong drives and the wrong drivers of UNITEK drives.
 
-use crate::cli::deviations::DeviationRow;
+use crate::command::deviations::DeviationRow;
 use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, deviations};
 
 /// The deviations of drives, and those of the bench's own driver.

@@ -18,10 +18,10 @@ pub(crate) use check::check;
 use super::driver;
 use crate::buses::commands::{DriveCommand, ParamsCommand};
 use crate::buses::unitek::rig::UnitekDrives;
-use crate::cli::exit::Exit;
-use crate::cli::failure::{Failure, exit_of_trouble};
-use crate::cli::output::Output;
-use crate::cli::port_bench::PortBench;
+use crate::command::exit::Exit;
+use crate::command::failure::{Failure, exit_of_trouble};
+use crate::command::output::Output;
+use crate::command::port_bench::PortBench;
 
 /// Runs a command on a rig, or on one that a session holds.
 ///

@@ -5,7 +5,7 @@ use super::{Run, rig, session};
 use crate::buses::novobus::explore::{OnRig, RingSetup};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::Twin;
-use crate::cli::fuzz::scope;
+use crate::command::fuzz::scope;
 use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swarm, Watcher};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};

@@ -3,11 +3,11 @@
 use super::replay::{ReplayArguments, kept, play};
 use super::run::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore};
 use super::tell;
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
-use crate::cli::promote::{PromoteArguments, keep};
-use crate::cli::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
-use crate::cli::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
+use crate::command::exit::Exit;
+use crate::command::fuzz::promote::{PromoteArguments, keep};
+use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
+use crate::command::output::Output;
+use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
 use crate::counted::counted;
 use crate::explore::line::{
     LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,

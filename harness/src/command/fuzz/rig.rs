@@ -1,8 +1,8 @@
 //! Work on a rig with ports: opened as `run --rig` opens it, given back in its safe state.
 
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
-use crate::cli::rig_failure::{alarm, exit_of, give_back};
+use crate::command::exit::Exit;
+use crate::command::output::Output;
+use crate::command::rig_failure::{alarm, exit_of, give_back};
 use crate::explore::{CaseScope, ExploreError, RingScope, RingSetup, Spice};
 use crate::guard::Limits;
 use crate::link::Line as _;

@@ -7,6 +7,9 @@ use crate::report::chart::Chart;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
+/// The first line of the csv of `scope`.
+pub(crate) const SCOPE_HEADING: &str = "time_us,signal,name,raw,value,unit";
+
 /// The files that curves are drawn into.
 #[derive(Clone, Debug, Default, Args)]
 pub struct DrawingArguments {

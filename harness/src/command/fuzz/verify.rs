@@ -1,7 +1,7 @@
 //! `drivebench verify` of the folder of a fuzz run.
 
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::evidence::{SIGNATURE, SUMS, Signer, sealed, unsigned};
 use crate::explore::files::read_text;

@@ -1,7 +1,7 @@
 //! Why a command on a bus came to no good end, and which exit code that is.
 
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::output::Output;
 use crate::library::LibraryError;
 use crate::link::Trouble;
 use crate::scenario::problem::Problems;

@@ -1,10 +1,9 @@
 //! A bench that a session holds, whatever its bus.
 
-use super::HeldRecord;
 use crate::buses::commands::DriveCommand;
-use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
-use crate::cli::output::Output;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
 use crate::guard::{Guarded, Safe};
 use crate::library::Entry;
 use crate::link::{Line, Link, Trouble};
@@ -13,7 +12,32 @@ use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::segment::SegmentRun;
 use crate::rig::segment::run::{PortPlayer, PortRun};
 use crate::rig::{End, Ends, PlayedScenario, Rig, SessionError, UseOptions};
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::Trace;
+
+/// What a held bench has recorded of its bus.
+pub(crate) struct HeldRecord {
+    /// Everything since its link began, or since its record was last emptied.
+    pub(crate) traces: Vec<Trace>,
+    /// What its ports carry.
+    pub(crate) medium: Medium,
+    /// How many pieces its link has carried since it began.
+    pub(crate) carried: u64,
+    /// The link's time.
+    pub(crate) now: Instant,
+}
+
+impl HeldRecord {
+    /// What the `ports` of a link have recorded.
+    pub(crate) fn of(link: &Guarded<Ends>, ports: usize) -> Self {
+        Self {
+            traces: (0..ports).map(|port| link.trace(port)).collect(),
+            medium: link.medium(0),
+            carried: link.carried(),
+            now: link.now(),
+        }
+    }
+}
 
 /// A bench that stays open between requests.
 pub(crate) trait HeldBench {
@@ -171,7 +195,10 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         // The scenario's master asked them, and they are in their safe state.
         self.session().drives().forget();
         let played = played.map_err(|error| {
-            Failure::Said(crate::cli::rig_failure::exit_of(&error), error.to_string())
+            Failure::Said(
+                crate::command::rig_failure::exit_of(&error),
+                error.to_string(),
+            )
         })?;
         // A scenario that was cancelled is cleared up when the link is of use again.
         let cancelled = self.trouble() == Some(Trouble::Interrupted);

@@ -2,8 +2,8 @@
 
 use super::exit::Exit;
 use super::failure::Failure;
+use super::held::{HeldDrives, HeldRecord};
 use super::output::Output;
-use super::shell::{HeldDrives, HeldRecord};
 use super::top::{RateWindow, TopReader, TopScene, live, once};
 use crate::buses::commands::{TopArguments, columns};
 use crate::capture::{Piece, Tape};

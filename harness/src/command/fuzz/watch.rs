@@ -1,6 +1,6 @@
 //! Output of a run while it goes on.
 
-use crate::cli::output::Output;
+use crate::command::output::Output;
 use crate::counted::counted;
 use crate::explore::{
     Differing, Finding, FuzzCase, FuzzRun, Pool, Progress, RunEnd, Swarm, Watcher,

@@ -1,0 +1,49 @@
+//! A scenario played on a simulated bench, and how far a list of them is.
+
+use crate::library::Entry;
+use crate::scenario::run::{AtMismatch, Outcome, Skip};
+use harness_sim::record::Trace;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::atomic::AtomicBool;
+
+/// A scenario that was played, with what it left.
+pub(crate) struct PlayedOnce {
+    pub(crate) outcome: Outcome,
+    pub(crate) traces: Vec<Trace>,
+}
+
+/// Plays a scenario on a simulated bench.
+pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> PlayedOnce {
+    play_entry_until(entry, at_mismatch, &AtomicBool::new(false))
+}
+
+/// The same, aborted once `interrupt` is set.
+pub(crate) fn play_entry_until(
+    entry: &Entry,
+    at_mismatch: AtMismatch,
+    interrupt: &AtomicBool,
+) -> PlayedOnce {
+    let Some(plan) = entry.settled() else {
+        return PlayedOnce {
+            outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
+            traces: Vec::new(),
+        };
+    };
+    let mut link = plan.simulate();
+    let outcome = plan.play_until(&mut *link, at_mismatch, interrupt);
+    PlayedOnce {
+        outcome,
+        traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
+    }
+}
+
+pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
+    let target = if shown && length > 1 {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
+}
