@@ -189,9 +189,8 @@ fn rooms_import_from_rooms_in_front_of_them() {
             continue;
         }
         let place = |name: &str| ROOMS.iter().position(|room| *room == name);
-        // A bus stands in front of the command line.
-        let stands = if room == "buses" { "cli" } else { &room };
-        let own = place(stands).unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
+        let stands = room.replace("buses", "cli");
+        let own = place(&stands).unwrap_or_else(|| panic!("{room} is not in the list of rooms"));
         for (number, line) in read(&source).lines().enumerate() {
             let code = line.split("//").next().unwrap_or_default();
             for (_, path) in code
@@ -382,15 +381,12 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
         let campaign = root().join("corpora").join(format!("{output}.toml"));
         assert!(campaign.exists(), "{output}");
     }
-    // The names of all others stand in the tests that compare them.
-    let tests: String = files("harness", "rs")
-        .iter()
-        .map(|path| read(path))
-        .collect();
-    for path in ["snap", "txt", "json", "svg"]
-        .map(|ending| files("snapshots", ending))
-        .concat()
-    {
+    // The names of all others stand in what compares them.
+    let mut tests = files("harness", "rs");
+    tests.push(root().join("scripts/freeze"));
+    let tests: String = tests.iter().map(|path| read(path)).collect();
+    let endings = ["snap", "txt", "json", "svg"];
+    for path in endings.map(|own| files("snapshots", own)).concat() {
         let own = name(&path, "snapshots");
         let named = ["scenarios/", "campaigns/"];
         let file = path
