@@ -1,3 +1,5 @@
+//! Which scenarios a rig does not play, and why.
+
 use super::*;
 use crate::library::Entry;
 use crate::link::Replay;
