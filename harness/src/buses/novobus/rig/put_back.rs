@@ -18,7 +18,7 @@ use harness_proto::nd21::own::{is_own, outputs_of_the_bus};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::guard::{DriveAct, Need, Touched};
+use harness_proto::novobus::guard::{DriveAct, Limits, Need, Touched};
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,6 +73,22 @@ fn is_setting(cell: &Cell) -> bool {
     let address = cell.address;
     let free = cell.access == Access::Write && cell.size <= 2 && !is_own(address);
     SETTINGS.contains(&address) || free && address != ram::NSOLL
+}
+
+/// What these limits let a scenario change without a reset: RAM and outputs.
+pub(super) fn within(limits: &Limits) -> impl Iterator<Item = Touched> {
+    let permits = |address| {
+        let byte = DriveAct::WriteByte(address, 0);
+        let word = DriveAct::WriteWord(address, 0);
+        [byte, word]
+            .iter()
+            .any(|act| limits.missing(act.need()).is_none())
+    };
+    let cells = RAM.iter().map(|cell| cell.address);
+    let cells = cells.filter(move |address| permits(*address) || limits.motion);
+    let outputs = limits.outputs.then_some(Touched::Outputs);
+    let monitoring = limits.monitoring.then_some(Touched::Ram(ram::FLAGS2));
+    cells.map(Touched::Ram).chain(outputs).chain(monitoring)
 }
 
 /// What is put back where this may have been changed.

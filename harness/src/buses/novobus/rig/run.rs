@@ -4,6 +4,7 @@
 use super::driven::Driven;
 use super::health::{Unhealthy, examine};
 use super::judge::{AttemptFacts, judge, known};
+use super::put_back::within;
 use super::session::Session;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::syntax::Header;
@@ -349,8 +350,14 @@ impl<'s> Run<'s> {
             let _outcome = play_over_bus(&own, link, AtMismatch::GoOn);
         });
         let mut touched = rehearsed.map_or_else(BTreeSet::new, |mut own| own.take_touched());
-        let axes = self.session.axes().into_iter().filter(|_| resets);
-        touched.extend(axes.map(|axis| (axis, Touched::Reset)));
+        for axis in self.session.axes() {
+            match resets {
+                true => touched.extend([(axis, Touched::Reset)]),
+                // Later, drives may be in the middle of something.
+                false if !self.played => touched.extend(within(&limits).map(|own| (axis, own))),
+                false => {}
+            }
+        }
         // Drives that are reset, or have just been opened, and the twin know of no recovery before.
         self.session.remember(&touched, resets || !self.played);
         self.played = true;

@@ -120,6 +120,26 @@ fn what_is_not_put_back_is_printed() {
     );
 }
 
+/// ND21 14.10.6, 10.4: without resets a scenario may begin while drives are in the error mode (9.7), and nothing can be read of them then.
+#[test]
+fn what_a_scenario_changes_behind_an_error_is_put_back() {
+    let mut rig = rig("");
+    rig.file.limits.allow_reset = false;
+    let mut session = session(&rig, "", Stalls::new(1, 0)).expect("a ring");
+    let before = all(&mut session);
+    let mut run = Run::new(&mut session).expect("a run");
+    for text in [
+        "> 01\n",
+        "recover\nwrite-io 1 = 01\nwrite-byte 0 scope_level = 44\n",
+    ] {
+        let entry = entry("t.scn", format!("title t\nring 3\n{text}"));
+        run.play(entry.plan.as_ref().expect("a plan"), None)
+            .expect("a healthy ring");
+    }
+    assert_eq!(session.end(false).remarks, [""; 0]);
+    assert_eq!(all(&mut session), before);
+}
+
 /// ND21 10.5: a reset loses what is in RAM alone; what the limits do not let the bench write is printed.
 #[test]
 fn what_the_limits_deny_is_printed() {
