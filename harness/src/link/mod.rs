@@ -27,7 +27,7 @@ pub(crate) use tamper::is_wrong_parity;
 pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::AnyStimulus;
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -316,11 +316,11 @@ pub trait PortLink: Link {
     /// A counter that increases as long as the user of this link keeps calling it; a watchdog reads it.
     fn beats(&self) -> Arc<AtomicU64>;
 
-    /// Prepares pieces for each port that a watchdog can send when the owner of this link hangs, as the port codes them.
+    /// How a watchdog can send when the owner of this link hangs, on each port as it codes pieces.
     ///
     /// # Errors
     /// No file descriptor is left.
-    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>>;
+    fn last_words(&self) -> io::Result<Vec<LastWords>>;
 
     /// Allows sending again after an interruption, or at an interface that is back, so that a safe state can be reached. Other trouble stays.
     fn resume(&mut self);

@@ -9,7 +9,7 @@ use super::lateness::Lateness;
 use super::port_end::{Accounting, MOST_RECORDED, PortEnd};
 use super::tamper::Tamper;
 use super::{HARMLESS, Lead, LinkFault, Moment, Trouble};
-use crate::port::{LastWords, Switch, Wire, wake_on_time};
+use crate::port::{LastWords, Parts, Switch, Wire, wake_on_time};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use rustix::event::{Timespec, poll};
@@ -305,14 +305,9 @@ impl<A: Accounting> Pump<A> {
     }
 
     /// As [`PortLink::last_words`](super::PortLink::last_words).
-    pub(crate) fn last_words(
-        &self,
-        bytes: &dyn Fn(usize) -> Vec<u8>,
-    ) -> std::io::Result<Vec<LastWords>> {
-        let ports = self.ports.iter().enumerate();
-        ports
-            .map(|(port, own)| own.wire.last_words(&bytes(port)))
-            .collect()
+    pub(crate) fn last_words(&self, parts: Parts) -> std::io::Result<Vec<LastWords>> {
+        let ports = self.ports.iter();
+        ports.map(|own| own.wire.last_words(parts)).collect()
     }
 
     /// As [`PortLink::resume`](super::PortLink::resume).

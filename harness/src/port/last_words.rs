@@ -1,24 +1,30 @@
-//! Bytes that another thread sends to a wire when the wire's owner hangs.
+//! What another thread sends to a wire when the wire's owner hangs.
 
+use crate::medium::Pieces;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use std::os::fd::OwnedFd;
 use std::time::{Duration, Instant};
 
-/// How long a wire may take them.
+/// How long a wire may take a part.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Coded bytes with their own descriptor of the wire.
+/// How pieces are written on a wire: parts that are sent one behind another.
+pub(crate) type Parts = fn(&Pieces) -> Vec<Vec<u8>>;
+
+/// A way to a wire with its own descriptor.
 #[derive(Debug)]
 pub struct LastWords {
-    pub(super) fd: OwnedFd,
-    pub(super) name: String,
-    pub(super) bytes: Vec<u8>,
-    /// How long the wire is left alone before them.
-    pub(super) gap: Duration,
+    fd: OwnedFd,
+    name: String,
+    parts: Parts,
+    /// How the wire codes a byte.
+    code: fn(u8) -> Vec<u8>,
+    /// How long the wire is left alone before each part.
+    gap: Duration,
 }
 
-/// The bytes could not be sent.
+/// They could not be sent.
 #[derive(Debug, thiserror::Error)]
 #[error("{name}: {error}")]
 pub struct Unsaid {
@@ -29,37 +35,46 @@ pub struct Unsaid {
 }
 
 impl LastWords {
-    /// Bytes as they are, for a descriptor that is no wire.
-    pub(crate) const fn raw(fd: OwnedFd, name: String, bytes: Vec<u8>) -> Self {
+    /// For a descriptor that takes bytes as they are.
+    pub(crate) const fn plain(fd: OwnedFd, name: String, parts: Parts) -> Self {
         let gap = Duration::ZERO;
         Self {
             fd,
             name,
-            bytes,
+            parts,
+            code: |byte| vec![byte],
             gap,
         }
     }
 
-    /// The same, with the wire left alone for this time before them: for stations that tell telegrams apart by pauses.
+    /// The same for a wire that codes each byte in this way.
+    pub(super) fn coded(self, code: fn(u8) -> Vec<u8>) -> Self {
+        Self { code, ..self }
+    }
+
+    /// The same, with the wire left alone for this time before each part: for stations that tell telegrams apart by pauses.
     pub(crate) fn after(self, gap: Duration) -> Self {
         Self { gap, ..self }
     }
 
-    /// Sends them, behind whatever the operating system has taken before; at most for two seconds.
+    /// Sends pieces, behind whatever the operating system has taken before; at most two seconds for each part.
     ///
     /// # Errors
     /// The port does not take them.
-    pub fn say(&self) -> Result<(), Unsaid> {
-        self.write().map_err(|error| Unsaid {
+    pub fn say(&self, pieces: &Pieces) -> Result<(), Unsaid> {
+        let parts = (self.parts)(pieces);
+        let said = parts.iter().try_for_each(|part| self.write(part));
+        said.map_err(|error| Unsaid {
             name: self.name.clone(),
             error,
         })
     }
 
-    fn write(&self) -> std::io::Result<()> {
+    fn write(&self, part: &[u8]) -> std::io::Result<()> {
         std::thread::sleep(self.gap);
         let end = Instant::now() + PATIENCE;
-        let mut rest = &self.bytes[..];
+        let coded: Vec<_> = part.iter().copied().flat_map(self.code).collect();
+        let mut rest = &coded[..];
         while !rest.is_empty() {
             match rustix::io::write(&self.fd, rest) {
                 Ok(taken) => rest = rest.get(taken..).unwrap_or_default(),

@@ -24,6 +24,7 @@ mod wire;
 pub use harness_uart::Counts;
 pub use holder::OtherProgram;
 pub(crate) use holder::is_exclusive;
+pub(crate) use last_words::Parts;
 pub use last_words::{LastWords, Unsaid};
 pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
 pub use serial::Switch;

@@ -133,7 +133,7 @@ impl Telnet {
     }
 
     /// A byte of data as it is written: an FF is doubled.
-    pub(super) fn escape(&self, byte: u8) -> ([u8; 2], usize) {
+    pub(super) fn escape(byte: u8) -> ([u8; 2], usize) {
         ([byte, byte], if byte == IAC { 2 } else { 1 })
     }
 

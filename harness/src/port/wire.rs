@@ -1,6 +1,6 @@
 //! One stream with its coding.
 
-use super::last_words::LastWords;
+use super::last_words::{LastWords, Parts};
 use super::rfc2217::{Telnet, is_telnet};
 use super::serial::{Serial, Switch};
 use crate::counted::counted;
@@ -132,24 +132,20 @@ impl Wire {
         self.fd.as_fd()
     }
 
-    /// Bytes that another thread can send when the owner of this wire hangs, coded as on this wire.
+    /// How another thread can send when the owner of this wire hangs, coded as on this wire.
     ///
     /// # Errors
     /// No more descriptors are available.
-    pub fn last_words(&self, bytes: &[u8]) -> std::io::Result<LastWords> {
-        let coded = bytes.iter().flat_map(|&byte| match &self.coding {
-            Coding::Plain | Coding::Serial(..) => vec![byte],
-            Coding::Marked(_) => mark(Received::good(byte)).as_bytes().to_vec(),
-            Coding::Telnet(telnet) => {
-                let (escaped, length) = telnet.escape(byte);
+    pub(crate) fn last_words(&self, parts: Parts) -> std::io::Result<LastWords> {
+        let fd = self.fd.try_clone()?;
+        let plain = LastWords::plain(fd, self.name.clone(), parts);
+        Ok(match &self.coding {
+            Coding::Plain | Coding::Serial(..) => plain,
+            Coding::Marked(_) => plain.coded(|byte| mark(Received::good(byte)).as_bytes().to_vec()),
+            Coding::Telnet(_) => plain.coded(|byte| {
+                let (escaped, length) = Telnet::escape(byte);
                 escaped[..length].to_vec()
-            }
-        });
-        Ok(LastWords {
-            bytes: coded.collect(),
-            fd: self.fd.try_clone()?,
-            name: self.name.clone(),
-            gap: std::time::Duration::ZERO,
+            }),
         })
     }
 
@@ -240,8 +236,8 @@ impl Wire {
             (Coding::Marked(_), Outgoing::Byte(byte)) => {
                 return self.queue(mark(Received::good(byte)).as_bytes());
             }
-            (Coding::Telnet(telnet), Outgoing::Byte(byte)) => {
-                let (bytes, length) = telnet.escape(byte);
+            (Coding::Telnet(_), Outgoing::Byte(byte)) => {
+                let (bytes, length) = Telnet::escape(byte);
                 return self.queue(&bytes[..length]);
             }
             // What a wire cannot send is sent as a good byte; callers check its abilities first.

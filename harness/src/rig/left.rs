@@ -1,19 +1,31 @@
 //! What a scenario changes in drives, until it is put back: for a program that ends before it can.
 
 use super::{Rig, state};
+use crate::medium::Pieces;
 use crate::regular::{self, Links};
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The most bytes that are read of the file.
-const MAX_SIZE: u64 = 1 << 16;
+const MAX_SIZE: u64 = 1 << 20;
+
+/// What may be changed.
+#[derive(Debug, Default)]
+struct Changed {
+    /// By scenarios before, which could not put it back.
+    kept: Vec<String>,
+    /// By the scenario that is played now.
+    now: Vec<String>,
+    /// What stops the drives where that scenario may have moved them.
+    stops: Option<Pieces>,
+}
 
 /// Sentences with the commands that put it back. They stand in the file `ID.left` beside the rig's lock too, for the next run behind one that
 /// was killed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NotPutBack {
-    now: Arc<Mutex<Vec<String>>>,
+    changed: Arc<Mutex<Changed>>,
     file: Option<PathBuf>,
     origin: String,
 }
@@ -23,7 +35,7 @@ impl NotPutBack {
     pub(crate) fn of(rig: &Rig) -> Self {
         let folder = state::folder().ok().filter(|_| !rig.is_simulated());
         Self {
-            now: Arc::default(),
+            changed: Arc::default(),
             file: folder.map(|own| own.join(format!("{}.left", rig.id()))),
             origin: rig.origin.clone(),
         }
@@ -34,31 +46,66 @@ impl NotPutBack {
         &self.origin
     }
 
-    /// What may be changed from now on; nothing once all is put back.
-    pub(crate) fn set(&self, now: Vec<String>) {
-        // A file that is not written is missed only by a run that is killed.
-        let _kept = self.file.as_ref().map(|file| match now.is_empty() {
+    fn changed(&self) -> MutexGuard<'_, Changed> {
+        self.changed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a scenario is about to change, and what stops drives that it moves.
+    pub(crate) fn foretell(&self, now: Vec<String>, stops: Option<Pieces>) {
+        let mut changed = self.changed();
+        (changed.now, changed.stops) = (now, stops);
+        drop(changed);
+        self.write();
+    }
+
+    /// All that was foretold is put back but for this.
+    pub(crate) fn keep(&self, notes: &[String]) {
+        let mut changed = self.changed();
+        let fresh = notes.iter().filter(|own| !changed.kept.contains(own));
+        let fresh: Vec<_> = fresh.cloned().collect();
+        changed.kept.extend(fresh);
+        drop(changed);
+        self.foretell(Vec::new(), None);
+    }
+
+    /// Writes the file. One that is not written is missed only by a run that is killed.
+    fn write(&self) {
+        let Some(file) = &self.file else { return };
+        let all = self.all().join("\n");
+        let _kept = match all.is_empty() {
             true => std::fs::remove_file(file),
-            false => {
-                state::create(file).and_then(|mut own| own.write_all(now.join("\n").as_bytes()))
-            }
-        });
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = now;
+            false => state::create(file).and_then(|mut own| own.write_all(all.as_bytes())),
+        };
     }
 
-    /// What may be changed now.
+    /// What the scenario that is played now may have changed.
+    pub(crate) fn foretold(&self) -> Vec<String> {
+        self.changed().now.clone()
+    }
+
+    /// The same, and what those before have.
     pub(crate) fn all(&self) -> Vec<String> {
-        let now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
-        now.clone()
+        let changed = self.changed();
+        [&changed.kept[..], &changed.now].concat()
     }
 
-    /// What the run before has left, which is said once.
+    /// What stops drives that may have been moved.
+    pub(crate) fn stops(&self) -> Option<Pieces> {
+        self.changed().stops.clone()
+    }
+
+    /// What the run before has left.
     pub(crate) fn before(&self) -> Option<String> {
-        let file = self.file.as_ref()?;
-        let kept = regular::read(file, Links::Refuse, MAX_SIZE).ok()?;
-        let _said = std::fs::remove_file(file);
+        let kept = regular::read(self.file.as_ref()?, Links::Refuse, MAX_SIZE).ok()?;
         let kept = String::from_utf8_lossy(&kept).replace('\n', "; ");
         (!kept.is_empty())
             .then(|| format!("the run before ended without putting back what it changed: {kept}"))
+    }
+
+    /// The same, which is said once.
+    pub(crate) fn take_before(&self) -> Option<String> {
+        let before = self.before();
+        let _said = self.file.as_ref().map(std::fs::remove_file);
+        before
     }
 }

@@ -24,7 +24,7 @@ const LISTEN: Span = Span::from_millis(150);
 const LOSSES: Span = Span::from_millis(300);
 
 /// What a session asks of the bus of its drives.
-pub trait PortDrives: Clone + std::fmt::Debug {
+pub trait PortDrives: Clone + std::fmt::Debug + 'static {
     /// What a drive is called, and what the stations share.
     const WORDS: [&'static str; 2];
 
@@ -125,6 +125,12 @@ impl<D: PortDrives> PortSession<D> {
                 let end = Some(Box::new(session.end(false)));
                 let rig = rig.id().to_owned();
                 return Err(SessionError::Interrupted { rig, end });
+            }
+            Err(SessionError::Drives { rig, why }) => {
+                let why = [Some(why), session.left.before()];
+                let why: Vec<_> = why.into_iter().flatten().collect();
+                let why = why.join("; ");
+                return Err(SessionError::Drives { rig, why });
             }
             other => other?,
         }
@@ -295,14 +301,24 @@ impl<D: PortDrives> PortSession<D> {
         if self.listen_only {
             return Ok(None);
         }
-        let pieces = self.drives.last_words();
+        let (words, alarm) = (self.last_words(), alarm.telling(self.left.clone()));
         let Some(ports) = self.link.inner_mut().ports_mut() else {
             return Ok(None);
         };
-        let words = |_| pieces.clone();
-        let words = ports.last_words(&words).map_err(SessionError::Watchdog)?;
-        let alarm = alarm.telling(self.left.clone());
-        watch_over(&self.rig, ports.beats(), words, alarm).map(Some)
+        let own = ports.last_words().map_err(SessionError::Watchdog)?;
+        let words = move |_| words();
+        watch_over(&self.rig, ports.beats(), (own, words), alarm).map(Some)
+    }
+
+    /// What stops every drive without waiting for anything: where the rig's file has it, and then where a scenario may have moved it.
+    pub(crate) fn last_words(&self) -> impl Fn() -> Vec<Pieces> + Send + use<D> {
+        let (own, left) = (self.drives.last_words(), self.left.clone());
+        move || {
+            [Some(own.clone()), left.stops()]
+                .into_iter()
+                .flatten()
+                .collect()
+        }
     }
 
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
@@ -344,15 +360,29 @@ impl<D: PortDrives> PortSession<D> {
     }
 }
 
+impl<D: PortDrives> PortSession<D> {
+    /// Takes the drives of a session that was not closed to their safe state. Returns what is to be said.
+    fn abandon(&mut self) -> Vec<String> {
+        let end = self.end(true);
+        let safe = end.safe.iter().map(ToString::to_string);
+        safe.chain(self.left.all()).collect()
+    }
+
+    /// The same of a session over simulated drives, as if they were behind a port.
+    #[cfg(test)]
+    pub(crate) fn abandon_as_at_port(&mut self) -> Vec<String> {
+        self.ended = false;
+        self.abandon()
+    }
+}
+
 impl<D: PortDrives> Drop for PortSession<D> {
     /// A panic unwinds through here.
     fn drop(&mut self) {
         if !self.ended {
-            let end = self.end(true);
-            let mut words: Vec<_> = end.safe.iter().map(ToString::to_string).collect();
-            words.extend(self.left.all());
+            let words = self.abandon().join("\n");
             if std::thread::panicking() {
-                let _nobody_reads = writeln!(std::io::stderr(), "{}", words.join("\n"));
+                let _nobody_reads = writeln!(std::io::stderr(), "{words}");
             }
         }
     }

@@ -6,6 +6,7 @@ use super::around::power_off;
 use super::file::SafeStep;
 use super::left::NotPutBack;
 use super::session_error::SessionError;
+use crate::medium::Pieces;
 use crate::port::LastWords;
 use std::fmt;
 use std::sync::Arc;
@@ -78,13 +79,12 @@ pub(crate) struct Watchdog {
 }
 
 impl Watchdog {
-    /// Watches a count that goes up while the program lives. Where it stands still for `limit`, every wire gets its last words,
-    /// `then` is done, and the alarm sounds.
+    /// Watches a count that goes up while the program lives. Where it stands still for `limit`, `stop` is done, which returns what has
+    /// failed, and the alarm sounds.
     pub(crate) fn start(
         beats: Arc<AtomicU64>,
         limit: Duration,
-        words: Vec<LastWords>,
-        then: impl FnOnce() -> Vec<String> + Send + 'static,
+        stop: impl FnOnce() -> Vec<String> + Send + 'static,
         alarm: Alarm,
     ) -> std::io::Result<Self> {
         let (leash, left) = channel();
@@ -102,10 +102,7 @@ impl Watchdog {
                              did: use the emergency stop",
                             limit.as_secs_f64()
                         )];
-                        for words in &words {
-                            why.extend(words.say().err().map(|error| error.to_string()));
-                        }
-                        why.extend(then());
+                        why.extend(stop());
                         alarm.sound(&why.join("; "));
                         return;
                     }
@@ -115,23 +112,34 @@ impl Watchdog {
     }
 }
 
-/// Watches over a rig as its file says: where the count of `beats` stands still for too long, the ports get their last words, and power
-/// that belongs to the safe state is switched off.
+/// Watches over a rig as its file says: where the count of `beats` stands still for too long, each port gets the words that are its own then,
+/// and power that belongs to the safe state is switched off.
 pub(crate) fn watch_over(
     rig: &Rig,
     beats: Arc<AtomicU64>,
-    words: Vec<LastWords>,
+    (ports, words): (
+        Vec<LastWords>,
+        impl Fn(usize) -> Vec<Pieces> + Send + 'static,
+    ),
     alarm: Alarm,
 ) -> Result<Watchdog, SessionError> {
     let safe_state = &rig.file.safe_state;
     let limit = safe_state.watchdog.0;
     let cut = safe_state.order.contains(&SafeStep::PowerOff);
     let rig = rig.clone();
-    let then = move || match cut {
-        true => power_off(&rig),
-        false => Vec::new(),
+    let stop = move || {
+        let said = ports.iter().enumerate().flat_map(|(port, own)| {
+            let said = words(port).into_iter().map(|words| own.say(&words));
+            said.filter_map(|own| Some(own.err()?.to_string()))
+                .collect::<Vec<_>>()
+        });
+        let mut failed: Vec<_> = said.collect();
+        if cut {
+            failed.extend(power_off(&rig));
+        }
+        failed
     };
-    let started = Watchdog::start(beats, limit, words, then, alarm);
+    let started = Watchdog::start(beats, limit, stop, alarm);
     started.map_err(SessionError::Watchdog)
 }
 
@@ -153,8 +161,8 @@ mod tests {
     fn start(limit: Duration) -> (Watchdog, std::sync::mpsc::Receiver<String>) {
         let (bite, bitten) = channel();
         let alarm = Alarm::new(move |why| bite.send(why.to_owned()).expect("the test waits"));
-        let then = || vec!["the power is off".to_owned()];
-        let dog = Watchdog::start(Arc::default(), limit, Vec::new(), then, alarm);
+        let stop = || vec!["the power is off".to_owned()];
+        let dog = Watchdog::start(Arc::default(), limit, stop, alarm);
         (dog.expect("a thread"), bitten)
     }
 
@@ -173,7 +181,7 @@ mod tests {
         let (bite, bitten) = channel();
         let alarm = Alarm::new(move |why| bite.send(why.to_owned()).expect("the test waits"));
         let alarm = alarm.telling(left.clone());
-        left.set(vec!["slave 8: `drivebench write 8`".to_owned()]);
+        left.foretell(vec!["slave 8: `drivebench write 8`".to_owned()], None);
         alarm.sound("it hangs");
         assert_eq!(
             bitten.recv().expect("it bites"),

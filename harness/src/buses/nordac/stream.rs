@@ -168,6 +168,18 @@ impl SegmentLink {
     }
 }
 
+/// The telegrams of which octets consist.
+pub(super) fn telegrams(pieces: &Pieces) -> Vec<Vec<u8>> {
+    let mut rest = pieces.as_out().octets();
+    let mut all = Vec::new();
+    while let Decoded::Value { used, .. } = Telegram::decode(rest) {
+        let (telegram, behind) = rest.split_at(used);
+        all.push(telegram.to_vec());
+        rest = behind;
+    }
+    all
+}
+
 impl Line for SegmentLink {
     fn medium(&self, _port: usize) -> Medium {
         Medium::Octets(self.rate.format())
@@ -212,17 +224,10 @@ impl PortLink for SegmentLink {
     }
 
     /// One telegram behind the other, each with its idle time.
-    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> std::io::Result<Vec<LastWords>> {
-        let pieces = words(0);
-        let mut rest = pieces.as_out().octets();
-        let mut all = Vec::new();
-        while let Decoded::Value { used, .. } = Telegram::decode(rest) {
-            let telegram = rest[..used].to_vec();
-            let words = self.pump.last_words(&|_| telegram.clone())?;
-            all.extend(words.into_iter().map(|own| own.after(LAST_WORDS_GAP)));
-            rest = &rest[used..];
-        }
-        Ok(all)
+    fn last_words(&self) -> std::io::Result<Vec<LastWords>> {
+        let ports = self.pump.last_words(telegrams)?;
+        let apart = ports.into_iter().map(|own| own.after(LAST_WORDS_GAP));
+        Ok(apart.collect())
     }
 
     fn resume(&mut self) {

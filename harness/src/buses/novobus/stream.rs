@@ -9,7 +9,7 @@ use crate::link::pump::{Pump, Spot};
 use crate::link::{
     Capability, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble, link_name,
 };
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Switch, Wire};
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
@@ -180,9 +180,9 @@ impl PortLink for StreamLink {
         self.pump.beats()
     }
 
-    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> std::io::Result<Vec<LastWords>> {
+    fn last_words(&self) -> std::io::Result<Vec<LastWords>> {
         self.pump
-            .last_words(&|port| words(port).as_out().octets().to_vec())
+            .last_words(|pieces| vec![pieces.as_out().octets().to_vec()])
     }
 
     fn resume(&mut self) {

@@ -157,12 +157,21 @@ impl<L: Line> Place<'_, L> {
     /// Sets the identifiers back. Returns what is to be said all the same.
     fn bring_back(&mut self, at: Axis) -> Result<Option<String>, String> {
         let moved = self.places.is_some_and(Places::has_moved) || at != self.first;
+        let Axis { rx, tx, .. } = self.first;
         let Some(mut search) = self.search().filter(|_| moved) else {
             return Ok(None);
         };
-        search.bring_back((at.rx, at.tx))?;
+        let others = search.bring_back((at.rx, at.tx))?;
+        let back = others.then(|| {
+            format!(
+                "its identifiers are set back to those of the rig's file, {rx:03X} and {tx:03X}"
+            )
+        });
         let still = search.settle();
-        Ok(still.map(|rx| format!("it still obeys {rx:03X}, which was given to it for a while")))
+        let still =
+            still.map(|rx| format!("it still obeys {rx:03X}, which was given to it for a while"));
+        let notes: Vec<_> = back.into_iter().chain(still).collect();
+        Ok((!notes.is_empty()).then(|| notes.join("; ")))
     }
 
     /// Where a drive that does not answer was looked for, and where it may be.

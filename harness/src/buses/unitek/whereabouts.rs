@@ -109,12 +109,14 @@ impl<L: Line> Search<'_, L> {
         found
     }
 
-    /// Sets the identifiers of a drive that answers on `at` back to those of the rig's file, and reads them there.
+    /// Sets the identifiers of a drive that answers on `at` back to those of the rig's file, and reads them there. Returns whether they were
+    /// others.
     ///
     /// # Errors
     /// Where it answers instead, and the frames that set it back, in a sentence.
-    pub(super) fn bring_back(&mut self, mut at: (u16, u16)) -> Result<(), String> {
+    pub(super) fn bring_back(&mut self, mut at: (u16, u16)) -> Result<bool, String> {
         let first = self.places.first;
+        let mut others = false;
         for _ in 0..ROUNDS {
             let mut right = at == first;
             // The identifier of the replies first: those that follow come where the rig's file expects them.
@@ -141,8 +143,9 @@ impl<L: Line> Search<'_, L> {
                 at = found;
             }
             if right {
-                return Ok(());
+                return Ok(others);
             }
+            others = true;
         }
         Err(self.away(at, None))
     }

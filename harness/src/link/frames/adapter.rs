@@ -3,6 +3,8 @@
 use super::clock::AdapterClock;
 use crate::frames::slcan::{self, STAMP_PERIOD, SlcanCommand, flags};
 use crate::frames::socketcand::{Messages, SocketcandAnswer, SocketcandRequest};
+use crate::medium::Pieces;
+use crate::port::Parts;
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_socketcan::{Report, decode_error};
@@ -70,11 +72,15 @@ impl Adapter {
         matches!(self, Self::Slcan(_)) || !frame.is_remote()
     }
 
-    /// How a frame is written, beside the conversation.
-    pub(super) fn encode(&self, frame: &Frame, out: &mut Vec<u8>) {
+    /// How frames are written, beside the conversation.
+    pub(super) fn parts(&self) -> Parts {
         match self {
-            Self::Slcan(_) => SlcanCommand::Send(*frame).write(out),
-            Self::Socketcand(_) => SocketcandRequest::Send(*frame).write(out),
+            Self::Slcan(_) => {
+                |pieces| written(pieces, |own, out| SlcanCommand::Send(own).write(out))
+            }
+            Self::Socketcand(_) => {
+                |pieces| written(pieces, |own, out| SocketcandRequest::Send(own).write(out))
+            }
         }
     }
 
@@ -116,6 +122,17 @@ impl Adapter {
             Self::Socketcand(own) => own.push(character, read),
         }
     }
+}
+
+/// Frames, each as an adapter's language writes it.
+fn written(pieces: &Pieces, write: fn(Frame, &mut Vec<u8>)) -> Vec<Vec<u8>> {
+    let frames = pieces.as_out().frames().iter();
+    let write = |frame: &Frame| {
+        let mut out = Vec::new();
+        write(*frame, &mut out);
+        out
+    };
+    frames.map(write).collect()
 }
 
 /// What closes a channel. An adapter that was told to be silent is put back.

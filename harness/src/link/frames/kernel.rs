@@ -191,17 +191,13 @@ impl Transport for Kernel {
         end.map_err(|error| self.lost(&error))
     }
 
-    fn last_words(&self, frames: &[Frame]) -> io::Result<Vec<LastWords>> {
+    fn last_words(&self) -> io::Result<LastWords> {
+        let fd = self.interface.as_fd().try_clone_to_owned()?;
         // The kernel takes one frame at a time.
-        let words = frames.iter().map(|frame| {
-            let fd = self.interface.as_fd().try_clone_to_owned()?;
-            Ok(LastWords::raw(
-                fd,
-                self.name.clone(),
-                socketcan::encode(frame).to_vec(),
-            ))
-        });
-        words.collect()
+        Ok(LastWords::plain(fd, self.name.clone(), |pieces| {
+            let frames = pieces.as_out().frames().iter();
+            frames.map(|own| socketcan::encode(own).to_vec()).collect()
+        }))
     }
 
     fn restarts(&self) -> bool {
@@ -389,8 +385,9 @@ mod tests {
             ]);
             Err(Trouble::Lost("can0 is down".to_owned()))
         }
-        fn last_words(&self, _: &[Frame]) -> io::Result<Vec<LastWords>> {
-            Ok(Vec::new())
+        fn last_words(&self) -> io::Result<LastWords> {
+            let end = self.end.try_clone()?.into();
+            Ok(LastWords::plain(end, String::new(), |_| Vec::new()))
         }
         fn restarts(&self) -> bool {
             self.restarts

@@ -17,7 +17,7 @@ pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD, Listen
 
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Switch, wake_on_time};
 use adapter::Event;
 use harness_proto::can::{self, BitRate, CanError, Frame};
@@ -451,8 +451,8 @@ impl PortLink for FrameLink {
         Arc::clone(&self.beats)
     }
 
-    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>> {
-        self.transport.last_words(words(0).as_out().frames())
+    fn last_words(&self) -> io::Result<Vec<LastWords>> {
+        self.transport.last_words().map(|own| vec![own])
     }
 
     fn resume(&mut self) {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::link::Link;
+use crate::medium::Pieces;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::sync::Mutex;
@@ -488,9 +489,9 @@ fn what_is_no_server_of_socketcand_is_named() {
 fn last_words_are_coded() {
     let (address, said) = slcan(good);
     let link = opened(&settings(&address, false));
-    let words = |_: usize| Pieces::Frames(vec![frame("201#510400"), frame("201#310000")]);
-    for words in link.last_words(&words).expect("a descriptor") {
-        words.say().expect("sent");
+    let frames = Pieces::Frames(vec![frame("201#510400"), frame("201#310000")]);
+    for words in link.last_words().expect("a descriptor") {
+        words.say(&frames).expect("sent");
     }
     loop {
         let said = said.lock().expect("a list").join("");

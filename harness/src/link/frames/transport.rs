@@ -33,8 +33,8 @@ pub(super) trait Transport: fmt::Debug + Send {
     fn due(&self) -> Option<Instant>;
     /// Reads what has come, into `events`; what came before an error is there too.
     fn receive(&mut self, now: Instant, events: &mut Vec<Event>) -> Result<(), Trouble>;
-    /// Frames that another thread can send.
-    fn last_words(&self, frames: &[Frame]) -> io::Result<Vec<LastWords>>;
+    /// How another thread can send frames.
+    fn last_words(&self) -> io::Result<LastWords>;
     /// Whether it goes on by itself behind bus-off.
     fn restarts(&self) -> bool {
         false
@@ -123,11 +123,7 @@ impl Transport for Stream {
         result
     }
 
-    fn last_words(&self, frames: &[Frame]) -> io::Result<Vec<LastWords>> {
-        let mut bytes = Vec::new();
-        frames
-            .iter()
-            .for_each(|frame| self.adapter.encode(frame, &mut bytes));
-        Ok(vec![self.wire.last_words(&bytes)?])
+    fn last_words(&self) -> io::Result<LastWords> {
+        self.wire.last_words(self.adapter.parts())
     }
 }

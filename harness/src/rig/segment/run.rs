@@ -39,7 +39,7 @@ pub(crate) trait PortPlayer: Sized {
     fn shows_life(&mut self, beats: Beats);
 
     /// Where it says what a scenario changes, before it does: for a program that ends before that is put back.
-    fn tells(&mut self, _left: NotPutBack) {}
+    fn tells(&mut self, left: NotPutBack);
 
     /// What a record says of a rig on which motors may turn or not.
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
@@ -73,11 +73,6 @@ pub(crate) trait PortPlayer: Sized {
     /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
     fn set_back(&mut self, own: &Self::Own, session: &mut PortSession<Self::Drives>)
     -> Vec<String>;
-
-    /// What the last attempt may have left changed, with what puts it back: for drives that were not seen in their safe state.
-    fn left_changed(&self, _rig: &Rig) -> Vec<String> {
-        Vec::new()
-    }
 
     /// The scenarios that a qualification plays behind the selected ones.
     fn conversations(_rig: &Rig) -> Vec<Source> {
@@ -125,7 +120,7 @@ impl<P: PortPlayer> PortRun<P> {
         player.tells(session.left().clone());
         Self {
             again: Again::new(!session.rig().is_simulated()),
-            notes: session.left().before().into_iter().collect(),
+            notes: session.left().take_before().into_iter().collect(),
             session,
             player,
             options: options.clone(),
@@ -150,7 +145,7 @@ impl<P: PortPlayer> PortRun<P> {
         let player = &mut self.player;
         let set_back = |session: &mut _| player.set_back(own, session);
         let notes = self.session.without_deadline(set_back);
-        self.session.left().set(notes.clone());
+        self.session.left().keep(&notes);
         self.notes.extend(notes);
     }
 
@@ -320,8 +315,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
             self.session.resume();
             if let Err(safe) = self.clear_up() {
                 not_safe = Some(safe);
-                let left = self.player.left_changed(self.session.rig());
-                self.notes.extend(left);
+                self.notes.extend(self.session.left().foretold());
             }
         }
         let notes = self.notes();

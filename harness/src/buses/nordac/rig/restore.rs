@@ -8,10 +8,11 @@ use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
 use super::observed::Written;
 use super::player::{Begun, Player, idle};
 use super::talk::{Talk, TalkError};
-use crate::buses::nordac::safe_state::found;
+use crate::buses::nordac::safe_state::{found, last_words};
 use crate::buses::nordac::value::shown;
 use crate::guard::Guarded;
 use crate::link::Line;
+use crate::medium::Pieces;
 use harness_proto::nordac::guard::{Class, class};
 use harness_proto::nordac::master::ExchangeError;
 use harness_proto::nordac::pkw::Index;
@@ -25,6 +26,9 @@ mod tests;
 
 /// The bus mode (5.5): the module restarts with another one, as with another PPO type or address.
 const BUS_MODE: u16 = 1619;
+
+/// The most places at which slaves that a scenario moves are stopped by a watchdog: each takes it up to 1.3 s.
+const MOST_STOPPED: usize = 8;
 
 /// A parameter: its number and IND.
 type Place = (u16, u16);
@@ -83,29 +87,48 @@ impl Player {
         notes
     }
 
-    /// What the last attempt may have changed, and what puts it back, where the slaves were not seen in their safe state.
-    pub(super) fn commands(&self, written: &BTreeSet<Written>, origin: &str) -> Vec<String> {
-        let all = self.known().iter().map(|known| {
+    /// Says what a scenario is about to write, and which addresses it gives to slaves, with what puts it back. A slave is stopped where it may be
+    /// then, with the PPO type that it may have.
+    pub(super) fn foretell(&self, begun: &Begun) {
+        let writes = |known: &Known| {
             let slave = known.slave;
-            let changed = changed(known, &[slave.address], written);
-            (slave, commands(known, slave, &changed, origin))
-        });
-        let all = all.filter(|(_, commands)| !commands.is_empty());
-        all.map(|(slave, commands)| {
-            format!("slave {}: nothing was put back{commands}", slave.address)
-        })
-        .collect()
-    }
-
-    /// The same of what a scenario is about to write, and of the addresses that it gives to slaves.
-    pub(super) fn foretold(&self, begun: &Begun) -> Vec<String> {
-        let mut all = self.commands(&begun.written, self.left.origin());
+            let changed = changed(known, &[slave.address], &begun.written);
+            let commands = commands(known, slave, &changed, self.left.origin());
+            let nothing = format!("slave {}: nothing was put back{commands}", slave.address);
+            (!commands.is_empty()).then_some(nothing)
+        };
+        let mut all: Vec<_> = self.known().iter().filter_map(writes).collect();
         let moved = begun.moved.iter().filter(|(slave, to)| slave != to);
-        all.extend(moved.map(|(slave, to)| {
+        all.extend(moved.clone().map(|(slave, to)| {
             format!("slave {slave} may be at address {to} (1624): with `address = {to}` in the rig's file it is found there")
         }));
-        all
+        let same = self
+            .known()
+            .iter()
+            .map(|known| (known, known.slave.address));
+        let moved = moved.filter_map(|(slave, to)| {
+            let mut known = self.known().iter();
+            Some((known.find(|own| own.slave.address == *slave)?, *to))
+        });
+        let elsewhere = same.chain(moved).filter_map(|(known, address)| {
+            let ppo = known.slave.ppo.filter(|_| !may_switch(known, begun));
+            let slave = RigSlave { address, ppo };
+            (slave != known.slave).then_some(slave)
+        });
+        let elsewhere: Vec<_> = elsewhere.take(MOST_STOPPED).collect();
+        let stops = Pieces::Octets(last_words(&elsewhere).concat());
+        self.left
+            .foretell(all, (!elsewhere.is_empty()).then_some(stops));
     }
+}
+
+/// Whether a scenario may give a slave another PPO type.
+fn may_switch(known: &Known, begun: &Begun) -> bool {
+    let address = known.slave.address;
+    let moved = begun.moved.iter().filter(|own| own.0 == address);
+    let places: Vec<_> = moved.map(|own| own.1).chain([address]).collect();
+    let all = changed(known, &places, &begun.written);
+    all.iter().any(|own| own.0 == PPO_TYPE)
 }
 
 /// What may have been `written` to a slave that was at these addresses, in the order in which it is put back.

@@ -91,10 +91,6 @@ impl PortPlayer for Player {
         self.put_back(session.link(), &origin)
     }
 
-    fn left_changed(&self, rig: &Rig) -> Vec<String> {
-        self.commands(self.written(), &rig.origin)
-    }
-
     fn conversations(rig: &Rig) -> Vec<Source> {
         conversations(rig)
     }

@@ -460,12 +460,13 @@ impl Session {
         let Some(ports) = self.link.inner_mut().ports_mut() else {
             return Ok(None);
         };
-        let stop = |ring: usize| sizes.get(ring).map_or(Vec::new(), |size| blind_stop(*size));
-        let stop = |ring: usize| Pieces::Octets(stop(ring));
-        let beats = ports.beats();
-        let words = ports.last_words(&stop).map_err(SessionError::Watchdog)?;
+        let stop = move |ring: usize| {
+            let size = sizes.get(ring).into_iter();
+            size.map(|own| Pieces::Octets(blind_stop(*own))).collect()
+        };
+        let words = ports.last_words().map_err(SessionError::Watchdog)?;
         let alarm = alarm.telling(self.left.clone());
-        watch_over(&self.rig, beats, words, alarm).map(Some)
+        watch_over(&self.rig, ports.beats(), (words, stop), alarm).map(Some)
     }
 
     /// Whether the rig was left at rest and its drives answer: then they are asked nothing more, and go on as they are.

@@ -18,15 +18,21 @@ pub(super) type Observed<'l> = crate::rig::segment::observed::Observed<'l, Frame
 /// A drive, by the identifier that it had before the first frame.
 type Addressed = u16;
 
+/// Registers that may have been written, with the drives.
+pub(super) type Written = BTreeSet<(Addressed, u8)>;
+
+/// An identifier that was written to this register of a drive.
+pub(super) type Given = (u8, u16, Addressed);
+
 /// What was noted.
 #[derive(Default)]
 pub(super) struct FrameNotes {
-    /// The registers that frames may have written, with the drives.
-    written: BTreeSet<(Addressed, u8)>,
+    /// The registers that frames may have written.
+    pub(super) written: Written,
     /// The levels of the EEPROM that frames may have stored (84), with the drives.
     stored: BTreeSet<(Addressed, u16)>,
-    /// The identifiers that were written to 68 and 88, with the drives to which they were.
-    given: Vec<(u16, Addressed)>,
+    /// The identifiers that were written to 68, 69 and 88.
+    pub(super) given: Vec<Given>,
     /// The last request, by register, and when it had left.
     asked: Option<(u8, Instant)>,
     /// The shortest time from the end of a request to the end of its reply.
@@ -57,12 +63,8 @@ impl FrameNotes {
     /// The drive to which a frame with this identifier goes.
     fn addressed(&self, id: u16) -> Addressed {
         let mut given = self.given.iter().rev();
-        given.find(|own| own.0 == id).map_or(id, |own| own.1)
-    }
-
-    /// The registers that may have been written, with the drives.
-    pub(super) fn written(&self) -> impl Iterator<Item = (u16, u8)> {
-        self.written.iter().copied()
+        let own = given.find(|own| own.0 != 0x69 && own.1 == id);
+        own.map_or(id, |own| own.2)
     }
 
     /// The levels of the EEPROM that may have been stored, with the drives.
@@ -91,7 +93,9 @@ impl LinkNotes for FrameNotes {
                     let (drive, value) = (self.addressed(rx), (data.bits() & 0xFFFF) as u16);
                     self.written.insert((drive, register));
                     match register {
-                        0x68 | 0x88 if value != drive => self.given.push((value, drive)),
+                        0x68 | 0x69 | 0x88 if value != drive => {
+                            self.given.push((register, value, drive));
+                        }
                         0x84 => {
                             self.stored.insert((drive, value));
                         }

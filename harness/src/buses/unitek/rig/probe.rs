@@ -54,6 +54,9 @@ const HOMING: u8 = 0x78;
 /// How long homing is waited for.
 const LONGEST_HOMING: Span = Span::from_millis(10_000);
 
+/// The registers that probes write and set back; the first one without any permission.
+pub(super) const WRITTEN: [u8; 4] = [MASK, WIDTH, SECOND, TIME_OUT];
+
 /// How often a probe is made that a busy computer has disturbed.
 const TRIES: usize = 3;
 

@@ -4,13 +4,14 @@ use super::player::{Own, Player, stores};
 use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
-use super::set_back::{left_changed, set_back};
+use super::set_back::set_back;
 use super::{Session, axes, limits, rate};
 use crate::buses::Bus;
 use crate::buses::unitek::simulate::Bench;
 use crate::link::frames::SLACK;
 use crate::link::{Link, LinkEvent, Replay};
 use crate::rig::Rig;
+use crate::rig::left::NotPutBack;
 use crate::rig::port_file::Port;
 use crate::rig::port_session::patience;
 use crate::rig::segment::observed::Beats;
@@ -65,6 +66,10 @@ impl PortPlayer for Player {
         self.beats = beats;
     }
 
+    fn tells(&mut self, left: NotPutBack) {
+        self.left = left;
+    }
+
     fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {
         let limits = limits(rig, allow_motion);
         let rate = rig.port().map_or(0, |port| rate(port).bits_per_second());
@@ -107,10 +112,6 @@ impl PortPlayer for Player {
             self.note_stored();
         }
         set_back(self, session)
-    }
-
-    fn left_changed(&self, rig: &Rig) -> Vec<String> {
-        left_changed(self, rig)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

@@ -2,16 +2,21 @@
 //! that does it.
 
 use super::known::Known;
+use super::observed::{Given, Written};
 use super::player::Player;
 use super::{Axis, Session};
 use crate::buses::unitek::driver::{Driver, Error};
+use crate::buses::unitek::safe_state::last_words;
+use crate::medium::Pieces;
 use crate::rig::Rig;
+use crate::rig::left::NotPutBack;
 use harness_proto::time::Span;
 use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::guard::{Class, class};
 use harness_proto::unitek::master::Job;
 use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS, ERRORS_FAULT, set_bits};
 use harness_proto::unitek::{Access, Register, Width};
+use std::collections::BTreeSet;
 
 /// Registers that commands and functions change, which the safe state sets.
 const COMMANDS: [u8; 4] = [0x31, 0x51, 0x6E, 0x90];
@@ -24,6 +29,12 @@ const ERROR_MAP: u8 = 0x8F;
 
 /// The function that clears errors, and the value that clients write.
 const CANCEL: (u8, u16) = (0x8E, 0x4D44);
+
+/// The registers of the identifiers: to receive, and to send.
+const IDENTIFIERS: [u8; 2] = [0x68, 0x69];
+
+/// The most identifiers beside those of the rig's file on which a watchdog stops drives.
+const MOST_STOPPED: usize = 16;
 
 /// How often something is tried: a frame may be lost.
 const TRIES: usize = 3;
@@ -59,27 +70,76 @@ pub(super) fn set_back(player: &Player, session: &mut Session) -> Vec<String> {
     notes
 }
 
-/// What is said of drives that were not seen in their safe state: what their registers held before those that may have been written were, and
-/// the command that writes it.
-pub(super) fn left_changed(player: &Player, rig: &Rig) -> Vec<String> {
+/// Says what is about to be written to drives, and the identifiers that they are given, with the commands that set it back. A drive is stopped on
+/// these identifiers too.
+pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, given: &[Given]) {
+    let origin = left.origin();
     let of_drive = |known: &Known| {
-        let before = held_before(known, player);
+        let mut before = held_before(known, written);
+        let has = |register| before.iter().any(|own: &(u8, u32)| own.0 == register);
+        let node = known.axis.node;
+        let cleared = match has(TIME_OUT) {
+            true => {
+                let delete = delete_error(node, origin);
+                format!("; `{delete}` clears a time-out of the bus behind that")
+            }
+            false => String::new(),
+        };
+        let moved = moved(known.axis, given, origin);
+        before.retain(|own| !IDENTIFIERS.contains(&own.0));
         let moves = before.iter().any(|own| needs_motion(own.0));
-        let values = before.iter().map(|own| assignment(own.0, own.1));
-        let values = values.collect::<Vec<_>>().join(" ");
-        let (node, rig) = (known.axis.node, &rig.origin);
-        let moves = if moves { " --move" } else { "" };
-        let command = format!("drivebench write {node} {values}{moves} --rig {rig}");
+        let moves = if moves { "--move " } else { "" };
+        let values: String = before
+            .iter()
+            .map(|own| assignment(own.0, own.1) + " ")
+            .collect();
+        let command = format!("drivebench write {node} {values}{moves}--rig {origin}");
         let note =
             format!("drive {node}: registers may be left changed; `{command}` sets them back");
-        (!before.is_empty()).then_some(note)
+        [moved, (!before.is_empty()).then(|| note + &cleared)]
     };
-    player.read_so_far().iter().filter_map(of_drive).collect()
+    let all = drives.iter().flat_map(of_drive).flatten().collect();
+    let elsewhere = drives.iter().flat_map(|known| {
+        let own = places(known.axis, given, 0x68).skip(1);
+        own.map(|rx| Axis { rx, ..known.axis })
+    });
+    let elsewhere: Vec<_> = elsewhere.take(MOST_STOPPED).collect();
+    let stops = Pieces::Frames(last_words(&elsewhere));
+    left.foretell(all, (!elsewhere.is_empty()).then_some(stops));
+}
+
+/// The identifiers that a drive may have: that of the rig's file first, and those that were written to a register.
+fn places(axis: Axis, given: &[Given], register: u8) -> impl Iterator<Item = u16> {
+    let first = if register == 0x68 { axis.rx } else { axis.tx };
+    let own = given
+        .iter()
+        .filter(move |own| (own.0, own.2) == (register, axis.rx));
+    let own: BTreeSet<u16> = own.map(|own| own.1).filter(|id| *id != first).collect();
+    std::iter::once(first).chain(own)
+}
+
+/// On which identifiers a drive may be found, and the command that sets them back; `None` for those of the rig's file.
+fn moved(axis: Axis, given: &[Given], origin: &str) -> Option<String> {
+    let [rx, tx] = IDENTIFIERS.map(|register| {
+        let ids = places(axis, given, register).map(|id| format!("{id:03X}"));
+        ids.collect::<Vec<_>>().join(" or ")
+    });
+    let Axis {
+        node,
+        rx: first,
+        tx: second,
+    } = axis;
+    (rx.len() + tx.len() > 6).then(|| {
+        format!(
+            "drive {node} may receive on {rx} and send on {tx} (68, 69): with its `rx` and `tx` in the rig's file it is found there, and \
+             `drivebench write {node} 0x69=0x{second:04X} 0x68=0x{first:04X} --hold --rig {origin}` sets them back"
+        )
+    })
 }
 
 /// What the registers held at first that may have been written, CAN_TIMEOUT before the others.
-fn held_before(known: &Known, player: &Player) -> Vec<(u8, u32)> {
-    let written = |register| player.written().contains(&(known.axis.rx, register));
+fn held_before(known: &Known, written: &Written) -> Vec<(u8, u32)> {
+    let written = |register| written.contains(&(known.axis.rx, register));
     // 83 has loaded all parameters.
     let all = written(0x83);
     let changed = |register: &u8| {
@@ -92,6 +152,11 @@ fn held_before(known: &Known, player: &Player) -> Vec<(u8, u32)> {
     let mut before: Vec<_> = before.map(|(register, raw)| (*register, *raw)).collect();
     before.sort_by_key(|(register, _)| *register != TIME_OUT);
     before
+}
+
+/// The command that clears errors.
+fn delete_error(node: u8, origin: &str) -> String {
+    format!("drivebench delete-error {node} --move --rig {origin}")
 }
 
 /// A register and its value for `drivebench write`.
@@ -124,7 +189,7 @@ impl SetBack<'_, '_> {
     /// Sets registers back that may have been written.
     fn registers(&mut self, known: &Known, player: &Player) -> Result<Vec<String>, Error> {
         let mut notes = Vec::new();
-        for (register, raw) in held_before(known, player) {
+        for (register, raw) in held_before(known, player.written()) {
             notes.extend(self.register(register, raw)?);
         }
         Ok(notes)
@@ -206,9 +271,8 @@ impl SetBack<'_, '_> {
         }
         let names: Vec<_> = set_bits(ERRORS, left).map(|bit| bit.name).collect();
         let (node, rig) = (self.axis.node, &self.rig.origin);
-        let cleared = format!(
-            "`drivebench delete-error {node} --move --rig {rig}` clears it when its cause is gone"
-        );
+        let delete = delete_error(node, rig);
+        let cleared = format!("`{delete}` clears it when its cause is gone");
         let (why, way) = match denied {
             Some(why) => (why, cleared),
             None if left & ERROR_TIME_OUT != 0 => (

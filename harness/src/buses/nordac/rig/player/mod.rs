@@ -286,7 +286,7 @@ impl Player {
             Ok(begun) => match self.other_station(&begun.moved, link) {
                 Ok(None) => {
                     if again.is_none() {
-                        self.left.set(self.foretold(&begun));
+                        self.foretell(&begun);
                     }
                     begun.switches
                 }

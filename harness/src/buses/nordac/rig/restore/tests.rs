@@ -3,20 +3,25 @@
 
 use super::super::RigSlave;
 use super::super::player::{Own, Player};
+use super::super::talk::Talk;
 use crate::buses::nordac::gate::guarded;
-use crate::buses::nordac::safe_state::safe_state;
+use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
+use crate::buses::nordac::stream::telegrams;
 use crate::guard::{Guarded, Standstill};
-use crate::link::Capability;
+use crate::link::{Capability, Line as _, LinkEvent, Octets as _, Recording, Sink};
+use crate::medium::Pieces;
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::nordac::guard::{GuardedSlave, Limits};
 use harness_proto::nordac::parameter::Flag;
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::{PARAMETERS, Parameter, PpoType};
+use harness_proto::nordac::words::stw;
+use harness_proto::nordac::{Image, PARAMETERS, Parameter, PpoType};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 const PATIENCE: Span = Span::from_millis(5);
@@ -197,6 +202,89 @@ fn what_is_not_put_back_is_told_with_its_command() {
     };
     let command = "`drivebench write 8 \"1600=0\" --rig desk.toml`";
     assert!(note.contains(command), "{note}");
+}
+
+/// A program that ends in the middle of a scenario: the way back of what it has changed by then was foretold, and the last words switch the output
+/// off at the address and with the PPO type that the slave has then (NORDAC 2.6, 4.1.3).
+#[test]
+fn what_does_not_end_has_foretold_what_it_changes() {
+    for (task, (address, ppo), says) in [
+        (
+            "265800000000000A",
+            (10, PpoType::One),
+            "slave 8 may be at address 10 (1624): with `address = 10`",
+        ),
+        (
+            "2656000000000001",
+            (8, PpoType::Two),
+            "`drivebench write 8 \"1622=0\" ",
+        ),
+    ] {
+        let text = format!(
+            "title T\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 PKW={task}\nwait 5ms\n"
+        );
+        let own = Own::read(&Source {
+            name: "t.scn".to_owned(),
+            text: text.into(),
+        });
+        let own = Arc::new(own.expect("a scenario"));
+        let broken_off = |after| {
+            let mut desk = Desk::new(2, &[], Limits::unlimited());
+            let mut sink = Panics(after);
+            let mut recording = Recording::new(&mut desk.line, &mut sink);
+            let player = &mut desk.player;
+            let played = catch_unwind(AssertUnwindSafe(|| player.attempt(&own, &mut recording)));
+            let whole = played.is_ok();
+            (desk, whole, sink.0)
+        };
+        let (_, whole, left) = broken_off(usize::MAX);
+        assert!(whole);
+        let (mut desk, whole, _) = broken_off(usize::MAX - left);
+        assert!(!whole);
+        let said = desk.player.left.all().join("\n");
+        assert!(said.contains(says), "{said}");
+        let on = |line: &Bench| {
+            let drive = line.drive(8).expect("a drive");
+            drive.inverter().state().output_on()
+        };
+        let own = Pieces::Octets(last_words(&desk.slaves).concat());
+        let pieces = [Some(own), desk.player.left.stops()].into_iter().flatten();
+        // Past the gate, as a watchdog sends them.
+        let line = desk.line.inner_mut();
+        let pass = |line: &mut Bench, span| {
+            let end = line.now() + span;
+            while line.now() < end && line.wait(end) {}
+        };
+        // The module restarts, and the rest of the scenario turns the motor.
+        pass(line, PATIENCE * 4);
+        let mut talk = Talk::new(Box::new(&mut *line), PATIENCE);
+        talk.start(address, ppo, None).expect("starts");
+        for word in [stw::READY, stw::START] {
+            let words = [word, 0x2000, 0, 0, 0, 0];
+            let image = Image {
+                words,
+                ..Image::default()
+            };
+            talk.exchange(address, ppo, &image).expect("answers");
+        }
+        drop(talk);
+        assert!(on(line), "{task}");
+        for telegram in pieces.flat_map(|own| telegrams(&own)) {
+            line.send_octets(0, &telegram);
+            pass(line, PATIENCE);
+        }
+        assert!(!on(line), "{task}");
+    }
+}
+
+/// Panics after some events.
+struct Panics(usize);
+
+impl Sink for Panics {
+    fn take(&mut self, _: &LinkEvent) {
+        self.0 -= 1;
+        assert_ne!(self.0, 0, "as the test wants it");
+    }
 }
 
 /// NORDAC 5.7: earlier faults stay in the fault memory, and a scenario that would show them is not met.

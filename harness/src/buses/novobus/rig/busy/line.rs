@@ -8,7 +8,7 @@ use crate::link::lateness::Lateness;
 use crate::link::pump::SLACK;
 use crate::link::stamp::stamped;
 use crate::link::{Capability, InnerLink, Lead, Line, Link, Moment, Octets, PlacedFault, PortLink};
-use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -270,7 +270,7 @@ impl PortLink for BusyLine {
         Arc::clone(&self.beats)
     }
 
-    fn last_words(&self, _: &dyn Fn(usize) -> Pieces) -> std::io::Result<Vec<LastWords>> {
+    fn last_words(&self) -> std::io::Result<Vec<LastWords>> {
         Ok(Vec::new())
     }
 

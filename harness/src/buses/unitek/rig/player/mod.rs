@@ -14,8 +14,9 @@ pub(super) use own::{Own, stores};
 
 use super::Axis;
 use super::known::Known;
-use super::observed::{FrameNotes, Observed};
+use super::observed::{FrameNotes, Observed, Written};
 use super::profile::Profiled;
+use super::set_back::foretell;
 use crate::buses::LimitSetting;
 use crate::buses::unitek::driver::Error;
 use crate::buses::unitek::gate::guarded;
@@ -25,6 +26,7 @@ use crate::buses::unitek::language::syntax::{PropertyValue, SetupKind};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
+use crate::rig::left::NotPutBack;
 use crate::rig::segment::observed::{Beats, LinkTimes, Slow};
 use crate::scenario::expression::Scope;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
@@ -66,6 +68,7 @@ struct Rehearsal {
     outcome: Outcome,
     at_rest: AtRest,
     denied: Option<(String, Vec<LimitSetting>)>,
+    noted: FrameNotes,
 }
 
 /// How an attempt went, before it is judged.
@@ -96,7 +99,7 @@ pub(crate) struct Player {
     /// What was found out where finding out has failed.
     partly: Vec<Known>,
     /// What has been written since the registers were read.
-    written: BTreeSet<(u16, u8)>,
+    written: Written,
     /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
     moved: BTreeSet<u16>,
     /// The levels of the EEPROM that the last attempt may have stored, with the drives.
@@ -109,6 +112,8 @@ pub(crate) struct Player {
     qualifies: bool,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
+    /// Where it says what a scenario or a probe changes, before it does.
+    pub(super) left: NotPutBack,
     /// The attempts of a qualification.
     notes: Vec<Note>,
 }
@@ -138,6 +143,7 @@ impl Player {
             before: None,
             qualifies: false,
             beats: Beats::default(),
+            left: NotPutBack::default(),
             notes: Vec::new(),
         }
     }
@@ -186,12 +192,12 @@ impl Player {
 
     /// Remembers what was written.
     fn take_notes(&mut self, noted: &FrameNotes) {
-        self.written.extend(noted.written());
+        self.written.extend(&noted.written);
         self.levels.extend(noted.stored());
     }
 
     /// The registers that may differ from what was read at first.
-    pub(super) const fn written(&self) -> &BTreeSet<(u16, u8)> {
+    pub(super) const fn written(&self) -> &Written {
         &self.written
     }
 
@@ -295,7 +301,15 @@ impl Player {
             return Gone::Unanswered(error);
         }
         let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
-            Ok(rehearsal) => rehearsal.map(|own| own.at_rest).unwrap_or_default(),
+            Ok(rehearsal) => rehearsal.map_or_else(Vec::new, |own| {
+                foretell(
+                    &self.left,
+                    self.known(),
+                    &own.noted.written,
+                    &own.noted.given,
+                );
+                own.at_rest
+            }),
             Err(skip) => return Gone::Skipped(skip),
         };
         let at_rest = self.prepare(own, self.limits.motion, link);
@@ -314,7 +328,8 @@ impl Player {
         self.take_notes(&link.noted);
         let settings = link
             .noted
-            .written()
+            .written
+            .iter()
             .filter(|own| BUS_SETTINGS.contains(&own.1));
         self.moved.extend(settings.map(|own| own.0));
         Gone::Played(Box::new(outcome), [at_rest, model])
@@ -435,15 +450,15 @@ impl Player {
         }
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut forgotten);
-        let at_rest = self.prepare(own, limits.motion, &mut recording);
-        recording.begin();
+        let mut observed = Observed::new(&mut recording);
+        let at_rest = self.prepare(own, limits.motion, &mut observed);
+        observed.begin();
+        observed = observed.slowed(other.slow);
         let (outcome, at_rest) = match at_rest {
-            Ok(at_rest) => {
-                let mut link = Observed::new(&mut recording).slowed(other.slow);
-                (play(&own.plan, &mut link, AtMismatch::Stop), at_rest)
-            }
+            Ok(at_rest) => (play(&own.plan, &mut observed, AtMismatch::Stop), at_rest),
             Err(error) => (self.unanswered(&error), Vec::new()),
         };
+        let noted = std::mem::take(&mut observed.noted);
         let denied = match link.trouble() {
             Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
             _ => None,
@@ -452,6 +467,7 @@ impl Player {
             outcome,
             at_rest,
             denied,
+            noted,
         }
     }
 

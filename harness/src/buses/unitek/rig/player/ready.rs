@@ -4,6 +4,7 @@ use super::super::known::Known;
 use super::super::observed::Observed;
 use super::super::probe;
 use super::super::qualify::free;
+use super::super::set_back::foretell;
 use super::{AT_REST, AtRest, Own, Player};
 use crate::buses::unitek::driver::{Driver, Error};
 use crate::link::Link;
@@ -52,12 +53,20 @@ impl Player {
         if known.cells.is_empty() {
             known.read_all(&mut driver)?;
             drop(driver);
+            let [free, _] = free(&self.axes, known.axis);
+            let rx = known.axis.rx;
+            let (written, given) = match self.qualifies && self.limits.bus_settings {
+                true => (&probe::WRITTEN[..], &[(0x88, free, rx)][..]),
+                false => (&probe::WRITTEN[..1], &[][..]),
+            };
+            let written = written.iter().map(|own| (rx, *own)).collect();
+            foretell(&self.left, std::slice::from_ref(known), &written, given);
             probe::settle(known, link, self.patience)?;
             if self.qualifies {
-                let [free, _] = free(&self.axes, known.axis);
                 let times = (self.patience, self.rate);
                 probe::settle_within(known, link, times, &self.limits, free)?;
             }
+            self.left.foretell(Vec::new(), None);
             self.profile.settle(known, self.rate)?;
             driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
         }

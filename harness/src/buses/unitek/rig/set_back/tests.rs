@@ -2,15 +2,17 @@
 
 use super::super::player::Player;
 use crate::buses::unitek::simulate::Bench;
-use crate::link::{FrameFault, Link, LinkEvent, Moment, PlacedFault, Sink};
+use crate::link::{FrameFault, Line as _, Link as _, LinkEvent, Moment, PlacedFault, Sink};
 use crate::rig::port_file::CONFIRMATION;
 use crate::rig::segment::SegmentRun as _;
 use crate::rig::segment::run::PortRun;
 use crate::rig::{Attempt, Keeper, UseOptions, parse};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
 use harness_proto::unitek::words::ERROR_TIME_OUT;
 use harness_proto::unitek::{Access, REGISTERS};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -197,6 +199,92 @@ fn an_interrupted_probe_is_undone() {
         assert_eq!(state(&run), before, "event {after} of {events}");
     }
     assert_ne!(changed, 0, "no interrupt came while a register was changed");
+}
+
+/// A program that ends in the middle of a scenario or of a probe, by a panic or without a word: what it has changed by then was foretold with the
+/// way back, and the last words lock both drives where they are (UNITEK 3.1, 4.5). Behind a panic they stand in their safe state, at the
+/// identifiers of the rig's file.
+#[test]
+fn what_does_not_end_has_foretold_what_it_changes() {
+    let limits = format!("{ALL}bit_rate_way_back = \"by hand\"\n");
+    let moves = format!("drive 2\n{LEAVES}");
+    for (qualifies, text, least) in [(false, &moves[..], 8), (true, "read 1 1B", 0)] {
+        let (mut run, _) = bench(&limits, &[], qualifies);
+        let before = state(&run);
+        let source = source("own", &format!("title own\nbus unitek\ndrive 1\n{text}"));
+        let mut all = Panics(usize::MAX);
+        let played = run.play(&source, Some(&mut all));
+        assert_eq!(played.expect("a rig").outcome.verdict, Verdict::Passed);
+        assert_eq!(run.session().left().all(), [] as [String; 0]);
+        let events = usize::MAX - all.0;
+        let points = (events - 12..=events).chain((1..events).step_by(events / 60));
+        let (mut moved, mut changed) = (0, 0);
+        for after in points {
+            let panics = after % 2 == 0;
+            let (mut run, _) = bench(&limits, &[], qualifies);
+            let mut keeper = Panics(after);
+            let play = || run.play(&source, Some(&mut keeper)).is_ok();
+            assert!(catch_unwind(AssertUnwindSafe(play)).is_err());
+            pass(&mut run);
+            let said = run.session().left().all().join("\n");
+            for ((node, register, reads), (.., held)) in state(&run).into_iter().zip(&before) {
+                let way = match register {
+                    0x8F => format!("`drivebench delete-error {node} "),
+                    _ => format!(" 0x{register:02X}=0x"),
+                };
+                let own = format!("drive {node}");
+                let mut lines = said.lines().filter(|line| line.starts_with(&own));
+                let foretold = reads == *held || lines.any(|line| line.contains(&way));
+                assert!(foretold, "{node} {register:02X} {said}");
+                let elsewhere = register == 0x68 && reads != *held;
+                let place = format!(" or {reads:03X}");
+                assert!(!elsewhere || said.contains(&place), "{place}: {said}");
+                moved += usize::from(elsewhere);
+                changed += usize::from(reads != *held);
+            }
+            if panics {
+                let said = run.session_mut().abandon_as_at_port().join("\n");
+                let safe = said.starts_with("safe state: every drive is locked");
+                assert!(safe, "{said}");
+            } else {
+                for pieces in run.session().last_words()() {
+                    run.session_mut().link().send(0, pieces.as_out());
+                }
+                pass(&mut run);
+            }
+            for node in [1, 2] {
+                let drive = simulated(&run).drive(node).expect("a drive");
+                assert_eq!(drive.register(0x51), 4, "{after} of {events}: {said}");
+                let back = drive.register(0x68) == 0x200 + u32::from(node);
+                assert!(!panics || back, "{after} of {events}");
+            }
+        }
+        assert!(moved >= least && changed > 0, "{moved} {changed}");
+    }
+}
+
+/// What was sent arrives.
+fn pass(run: &mut PortRun<Player>) {
+    let link = run.session_mut().link();
+    link.reset_after_denial();
+    let end = link.now() + Span::from_millis(20);
+    while link.now() < end && link.wait(end) {}
+}
+
+/// Panics after some events.
+struct Panics(usize);
+
+impl Sink for Panics {
+    fn take(&mut self, _: &LinkEvent) {
+        self.0 -= 1;
+        assert_ne!(self.0, 0, "as the test wants it");
+    }
+}
+
+impl Keeper for Panics {
+    fn begins(&mut self, _: usize) {}
+
+    fn ends(&mut self, _: usize, _: &Attempt) {}
 }
 
 /// Interrupts a run after some events.
