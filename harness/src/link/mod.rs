@@ -14,6 +14,8 @@ pub(crate) mod pump;
 mod record;
 mod replay;
 pub(crate) mod stamp;
+#[cfg(test)]
+pub(crate) mod stands_still;
 pub(crate) mod tamper;
 
 pub use crate::trouble::Trouble;

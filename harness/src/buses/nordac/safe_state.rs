@@ -4,7 +4,7 @@ use super::rig::talk::{Talk, TalkError};
 use super::rig::{MASTER, RigSlave};
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
-use harness_proto::nordac::master::ExchangeError;
+use harness_proto::nordac::master::{ExchangeError, StartError};
 use harness_proto::nordac::words::{State, stw, zsw};
 use harness_proto::nordac::{IDENT, Image, PpoType};
 use harness_proto::profibus::Telegram;
@@ -19,6 +19,9 @@ const WATCHDOG: [u8; 2] = [1, 100];
 
 /// The DP watchdog by which a slave forgets the bench: 100 ms.
 const FORGET: [u8; 2] = [1, 10];
+
+/// How often a slave is taken into the exchange that leaves it again.
+const TRIES: usize = 3;
 
 /// The time between two exchanges while a motor ramps down.
 const AGAIN: Span = Span::from_millis(5);
@@ -225,6 +228,20 @@ fn release(talk: &mut Talk<'_>, address: u8) -> Result<(), TalkError> {
     Ok(())
 }
 
+/// Whether a slave is not in the exchange: its DP watchdog may have expired.
+fn has_left(error: &TalkError) -> bool {
+    match error {
+        TalkError::Exchange { why, .. } => *why == ExchangeError::Left,
+        TalkError::Start { why, .. } => {
+            matches!(
+                why,
+                StartError::NotActivated { .. } | StartError::Refused(_)
+            )
+        }
+        _ => false,
+    }
+}
+
 /// An inverter on its way to the safe state.
 struct Off<'t, 'l> {
     talk: &'t mut Talk<'l>,
@@ -234,23 +251,25 @@ struct Off<'t, 'l> {
 }
 
 impl Off<'_, '_> {
-    /// One exchange with a control word and setpoint 0; a slave that is not in the exchange is taken into it first. Gives the status word.
+    /// One exchange with a control word and setpoint 0; a slave that is not in the exchange is taken into it first. It leaves it again where the
+    /// computer stands still for longer than the DP watchdog, and is then taken into it once more. Gives the status word.
     fn exchange(&mut self, word: u16) -> Result<u16, String> {
-        let text = |error: TalkError| error.to_string();
-        let left = |error: &TalkError| {
-            let why = ExchangeError::Left;
-            matches!(error, TalkError::Exchange { why: own, .. } if *own == why)
-        };
         let (address, ppo) = (self.address, self.ppo);
-        match self.talk.exchange(address, ppo, &image(word)) {
-            Err(error) if left(&error) => {
-                let started = self.talk.start(address, ppo, Some(WATCHDOG));
-                started.map_err(text)?;
-                let again = self.talk.exchange(address, ppo, &image(word));
-                Ok(again.map_err(text)?.first())
+        let (mut tries, mut refused) = (0..TRIES, None);
+        loop {
+            let exchanged = self.talk.exchange(address, ppo, &image(word));
+            let error = match exchanged {
+                Ok(inputs) => return Ok(inputs.first()),
+                Err(error) if !has_left(&error) => return Err(error.to_string()),
+                Err(error) => error,
+            };
+            if tries.next().is_none() {
+                return Err(refused.unwrap_or(error).to_string());
             }
-            Err(error) => Err(error.to_string()),
-            Ok(inputs) => Ok(inputs.first()),
+            refused = self.talk.start(address, ppo, Some(WATCHDOG)).err();
+            if let Some(error) = refused.as_ref().filter(|own| !has_left(own)) {
+                return Err(error.to_string());
+            }
         }
     }
 
@@ -272,9 +291,10 @@ impl Off<'_, '_> {
     /// Switches the output off, and waits until the status word shows that.
     fn block(&mut self) -> Result<String, String> {
         let end = self.talk.now() + self.standing.within;
-        let mut off_for = 0;
+        let (mut off_for, mut asked) = (0, 0);
         loop {
             let status = self.exchange(stw::SAFE)?;
+            asked += 1;
             let off = status & OUTPUT == 0;
             off_for = if off { off_for + 1 } else { 0 };
             // ZSW bit 4 repeats OFF2: what is seen is behind the word that was sent.
@@ -283,7 +303,8 @@ impl Off<'_, '_> {
                 let state = State::of_zsw(status).map_or("unknown", State::name);
                 return Ok(format!("{state}, status word {status:04X}"));
             }
-            if self.talk.now() >= end && off_for == 0 {
+            // Replies lag behind also where the computer has stood still for all that time.
+            if self.talk.now() >= end && off_for == 0 && asked >= LAGGING {
                 return Err(format!(
                     "its status word reads {status:04X} {} after control word 047D was sent first: the output is on, or \
                      its terminals control it (1621)",
@@ -296,267 +317,4 @@ impl Off<'_, '_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::buses::nordac::gate::guarded;
-    use crate::buses::nordac::rig::values;
-    use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
-    use crate::link::{DriveFault, Link, Moment, Octets, PlacedFault, Trouble};
-    use harness_proto::nordac::Parameter;
-    use harness_proto::nordac::guard::{GuardedSlave, Limits};
-    use harness_proto::nordac::pkw::Index;
-    use harness_proto::nordac::properties::PROPERTIES;
-    use harness_proto::profibus::fdl::{FrameControl, Function, Sequence};
-    use harness_proto::profibus::{BusRate, Pdu};
-
-    const PATIENCE: Span = Span::from_millis(5);
-
-    fn set(slave: &mut SlaveSetup, number: u16, value: i64) {
-        let parameter = Parameter::of(number).expect("a parameter");
-        slave.parameters.push((parameter, Index::default(), value));
-    }
-
-    /// An inverter that the bus controls (1621).
-    fn slave(address: u8, ppo: PpoType) -> SlaveSetup {
-        let mut slave = SlaveSetup::new(address);
-        slave.ppo = ppo;
-        set(&mut slave, 1621, 2);
-        slave
-    }
-
-    fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<RigSlave>) {
-        let known = slaves.iter().map(|own| RigSlave {
-            address: own.address,
-            ppo: Some(own.ppo),
-        });
-        let known: Vec<_> = known.collect();
-        let setup = Setup {
-            rate: BusRate::K500,
-            slaves,
-            master: None,
-        };
-        let gated: Vec<_> = known.iter().map(|own| GuardedSlave::from(*own)).collect();
-        (guarded(Bench::new(&setup), limits, &gated, false), known)
-    }
-
-    /// Takes motors to a frequency.
-    fn run(line: &mut Guarded<Bench>, slaves: &[RigSlave]) {
-        let mut talk = Talk::new(Box::new(line), PATIENCE);
-        for slave in slaves {
-            let ppo = slave.ppo.expect("known");
-            talk.start(slave.address, ppo, None).expect("starts");
-            for word in [stw::READY, stw::START, stw::START] {
-                let words = Image {
-                    words: [word, 0x2000, 0, 0, 0, 0],
-                    ..Image::default()
-                };
-                talk.exchange(slave.address, ppo, &words).expect("answers");
-            }
-            talk.pass(Span::from_millis(2_000)).expect("sound");
-        }
-    }
-
-    fn is_on(line: &Guarded<Bench>, address: u8) -> bool {
-        let drive = line.inner().drive(address).expect("a drive");
-        drive.inverter().state().output_on()
-    }
-
-    fn safe(line: &mut Guarded<Bench>, slaves: &[RigSlave], order: &[StandstillStep]) -> Safe {
-        let standing = Standstill {
-            order: order.to_vec(),
-            within: Span::from_millis(500),
-            ..Standstill::default()
-        };
-        safe_state(line, slaves, PATIENCE, &standing)
-    }
-
-    /// In every PPO type and under every value of every open point: motors that run are off afterwards, and it is seen.
-    #[test]
-    fn motors_that_run_are_stopped_whatever_the_manual_leaves_open() {
-        let mut all = PpoType::ALL
-            .map(|ppo| vec![slave(8, ppo), slave(9, ppo)])
-            .to_vec();
-        for property in PROPERTIES {
-            for word in values(property) {
-                let mut own = slave(8, PpoType::One);
-                assert!(property.set(&mut own.properties, &word), "{word}");
-                all.push(vec![own]);
-            }
-        }
-        for setup in all {
-            let name = format!("{:?} {:?}", setup[0].ppo, setup[0].properties);
-            let (mut line, slaves) = line(setup, Limits::unlimited());
-            run(&mut line, &slaves);
-            assert!(is_on(&line, 8), "{name}");
-            let safe = safe(
-                &mut line,
-                &slaves,
-                &[StandstillStep::Stop, StandstillStep::Block],
-            );
-            assert!(safe.confirmed, "{safe} {name}");
-            for slave in &slaves {
-                assert!(!is_on(&line, slave.address), "{name}");
-            }
-        }
-    }
-
-    /// Without permission for motion, with words that wait for Sync, and after the slave has fallen out of the exchange.
-    #[test]
-    fn other_ways_in() {
-        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
-        let none = safe(&mut line, &slaves, &[StandstillStep::Block]);
-        assert!(none.confirmed, "{none}");
-        for seconds in [0, 5] {
-            let (mut line, slaves) = self::line(vec![slave(8, PpoType::One)], Limits::unlimited());
-            run(&mut line, &slaves);
-            match seconds {
-                // Sync and Freeze, which Set_Prm asked for.
-                0 => {
-                    let prm = [0xB8, 1, 100, 0, 0x75, 0x31, 0];
-                    let control = FrameControl::request(Function::SrdLow, Sequence::First);
-                    let pdu = Pdu::with_saps(8, MASTER, control, Some(61), Some(62), &prm);
-                    let prm = Telegram::Pdu(pdu.expect("fits")).encode();
-                    let control = FrameControl::request(Function::SrdLow, Sequence::None);
-                    let cfg = PpoType::One.cfg();
-                    let pdu = Pdu::with_saps(8, MASTER, control, Some(62), Some(62), cfg);
-                    let cfg = Telegram::Pdu(pdu.expect("fits")).encode();
-                    let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
-                    for octets in [prm, cfg] {
-                        talk.send(&octets).expect("sent");
-                        talk.pass(PATIENCE).expect("sound");
-                    }
-                    let started = talk.exchange(8, PpoType::One, &image(stw::START));
-                    started.expect("answers");
-                    let both = GlobalControl::SYNC | GlobalControl::FREEZE;
-                    talk.command(8, both).expect("sent");
-                }
-                // The watchdog ends the exchange.
-                _ => {
-                    let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
-                    let started = talk.start(8, PpoType::One, Some(WATCHDOG));
-                    started.expect("starts");
-                    talk.pass(Span::from_millis(5_000)).expect("sound");
-                }
-            }
-            assert!(
-                is_on(&line, 8),
-                "zeros and an end of the exchange stop nothing"
-            );
-            let safe = safe(
-                &mut line,
-                &slaves,
-                &[StandstillStep::Stop, StandstillStep::Block],
-            );
-            assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
-        }
-    }
-
-    /// The reply to a request of before comes behind the first request of the safe state. It is no reply to that.
-    #[test]
-    fn a_late_reply_is_not_taken_for_another() {
-        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::unlimited());
-        run(&mut line, &slaves);
-        let control = FrameControl::request(Function::SrdHigh, Sequence::First);
-        let words = image(stw::START).encode(PpoType::One);
-        let exchange = Pdu::new(8, MASTER, control, &words).expect("fits");
-        line.send_octets(0, &Telegram::Pdu(exchange).encode());
-        let safe = safe(
-            &mut line,
-            &slaves,
-            &[StandstillStep::Stop, StandstillStep::Block],
-        );
-        assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
-    }
-
-    #[test]
-    fn a_silent_slave_is_not_confirmed_and_the_others_are_stopped() {
-        let both = vec![slave(8, PpoType::One), slave(9, PpoType::One)];
-        let (mut line, slaves) = line(both, Limits::unlimited());
-        run(&mut line, &slaves[1..]);
-        line.inject(0, PlacedFault::Drive(8, DriveFault::Off), Moment::Now);
-        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
-        assert!(!safe.confirmed);
-        assert!(
-            safe.words
-                .contains("slave 8: NOT confirmed: slave 8 does not reply to Slave_Diag"),
-            "{safe}"
-        );
-        assert!(safe.words.contains("slave 9: start-disable"), "{safe}");
-        assert!(!is_on(&line, 9));
-    }
-
-    /// An inverter that ignores OFF2 keeps its output on: that is seen, also where its first replies are from before the start (`pzd-latency`).
-    /// On its quick-stop ramp it stops.
-    #[test]
-    fn an_output_that_stays_on_is_not_confirmed() {
-        for latency in [1, 5, 20] {
-            let mut deaf = slave(8, PpoType::One);
-            deaf.deviation = harness_sim::nordac::deviation::deviation("no-off2");
-            assert!(deaf.deviation.is_some());
-            deaf.properties.pzd_latency = latency;
-            let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
-            run(&mut line, &slaves);
-            let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
-            assert!(!safe.confirmed, "{latency}: {safe}");
-            assert!(safe.words.contains("the output is on"), "{safe}");
-            let safe = self::safe(&mut line, &slaves, &[StandstillStep::Stop]);
-            assert!(safe.confirmed && !is_on(&line, 8), "{latency}: {safe}");
-        }
-    }
-
-    /// A denied telegram of which the begin was sent, and whose FCS is the begin of the telegram that stops: it is ended first.
-    #[test]
-    fn a_begun_telegram_does_not_keep_the_stop_back() {
-        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
-        // 047F with an HSW that makes the FCS 68.
-        let telegram = (0..=u16::MAX).find_map(|main| {
-            let control = FrameControl::request(Function::SrdHigh, Sequence::First);
-            let words = Image {
-                words: [stw::START, main, 0, 0, 0, 0],
-                ..Image::default()
-            };
-            let pdu = Pdu::new(8, MASTER, control, &words.encode(PpoType::One)).ok()?;
-            let octets = Telegram::Pdu(pdu).encode().to_vec();
-            (octets[octets.len() - 2] == SD2).then_some(octets)
-        });
-        let telegram = telegram.expect("one of them");
-        line.send_octets(0, &telegram[..telegram.len() - 2]);
-        assert_eq!(line.trouble(), None);
-        line.send_octets(0, &[SD2]);
-        assert!(matches!(line.trouble(), Some(Trouble::Denied(_))));
-        line.reset_after_denial();
-        let safe = safe(&mut line, &slaves, &[StandstillStep::Block]);
-        assert!(safe.confirmed, "{safe}");
-    }
-
-    /// In the exchange, and in Wait_Prm after the DP watchdog of the slaves; with PPO types that are known, and with those that are not.
-    #[test]
-    fn last_words_switch_every_output_off() {
-        for (waits, known) in [(0, true), (0, false), (5_000, true), (5_000, false)] {
-            let all = PpoType::ALL.into_iter().zip(8..);
-            let all = all.map(|(ppo, address)| slave(address, ppo)).collect();
-            let (mut line, mut slaves) = line(all, Limits::unlimited());
-            run(&mut line, &slaves);
-            let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
-            for slave in &slaves {
-                let ppo = slave.ppo.expect("known");
-                let started = talk.start(slave.address, ppo, Some(WATCHDOG));
-                started.expect("starts");
-            }
-            talk.pass(Span::from_millis(waits)).expect("sound");
-            drop(talk);
-            assert!(slaves.iter().all(|own| is_on(&line, own.address)));
-            if !known {
-                slaves.iter_mut().for_each(|own| own.ppo = None);
-            }
-            for telegram in last_words(&slaves) {
-                line.send_octets(0, &telegram);
-                let end = line.now() + PATIENCE;
-                while line.now() < end && line.wait(end) {}
-            }
-            for slave in &slaves {
-                assert!(!is_on(&line, slave.address), "{waits} {known} {slave:?}");
-            }
-        }
-    }
-}
+mod tests;

@@ -287,6 +287,8 @@ fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<
     let full = f64::from(low(full.data.bits()));
     let end = driver.now() + standing.within;
     loop {
+        // The speed may be read before a computer stands still for all that time.
+        let over = driver.now() >= end;
         let reply = driver.read(axis, 0x30).map_err(text)?;
         // 32767 is 100 % (UNITEK 6.1).
         let raw = f64::from(low(reply.data.bits()).cast_signed());
@@ -294,7 +296,7 @@ fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<
         if rpm.abs() <= standing.rpm {
             return Ok(());
         }
-        if driver.now() >= end {
+        if over {
             let scaling = Scaling::default();
             let speed = shown(
                 Register::of(0x30),
@@ -317,6 +319,7 @@ mod tests {
     use super::*;
     use crate::buses::unitek::gate::guarded;
     use crate::buses::unitek::simulate::{Bench, Setup};
+    use crate::link::stands_still::StandsStill;
     use crate::link::{DriveFault, FrameFault, Link, Moment, PlacedFault};
     use crate::medium::Out;
     use harness_proto::unitek::guard::Limits;
@@ -406,6 +409,26 @@ mod tests {
         assert_eq!(registers(&line, 1)[..3], [4, 0, 0]);
         let stands = safe(&mut line);
         assert!(stands.confirmed, "{stands}");
+    }
+
+    /// A computer that stands still, for longer than drives need to stand, is not taken for a drive that does not.
+    #[test]
+    fn a_computer_that_stands_still_accuses_no_drive() {
+        for (after, coasts) in (1..12).flat_map(|own| [(own, false), (own, true)]) {
+            let mut line = line(Limits::unlimited());
+            send(&mut line, &["201#31FF7F"]);
+            let standing = Standstill {
+                order: vec![StandstillStep::Block],
+                within: Span::from_millis(if coasts { 50 } else { 5_000 }),
+                ..Standstill::default()
+            };
+            let span = Span::from_millis(if coasts { 60 } else { 6_000 });
+            let line = &mut line;
+            let stands = StandsStill { line, after, span };
+            let mut driver = Driver::new(Box::new(stands), &axes(), PATIENCE);
+            let made = make_safe(&mut driver, axes()[0], &[], &standing);
+            assert_eq!(made.is_err(), coasts, "frame {after}: {made:?}");
+        }
     }
 
     /// Without permission for motion the drives, which another master may have released, are locked first.

@@ -58,6 +58,11 @@ pub(crate) trait PortPlayer: Sized {
         false
     }
 
+    /// Whether drives that are restarted for each attempt are set up to be wrong.
+    fn deviates(_rig: &Rig) -> bool {
+        false
+    }
+
     /// What was recorded of the rig, as a link.
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay;
 
@@ -235,7 +240,12 @@ impl<P: PortPlayer> PortRun<P> {
             self.player.doubt();
         }
         // What a fault of the scenario has switched off is no drive that disobeys.
-        if anew && outcome.verdict == Verdict::Failed && !P::disturbs(own) {
+        let may_disobey = match outcome.verdict {
+            Verdict::Failed => true,
+            Verdict::Skipped => false,
+            _ => P::deviates(self.session.rig()),
+        };
+        if anew && may_disobey && !P::disturbs(own) {
             let safe = self.session.make_safe();
             self.not_safe = self.not_safe.take().or((!safe.confirmed).then_some(safe));
         }

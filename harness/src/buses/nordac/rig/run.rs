@@ -4,13 +4,14 @@ use super::player::{Own, Player};
 use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
-use super::{Session, limits, rate, slaves};
+use super::{Session, limits, rate, setup, slaves};
 use crate::buses::Bus;
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::TOLERANCE;
 use crate::link::{Capability, Link, LinkEvent, Replay};
 use crate::rig::Rig;
 use crate::rig::left::NotPutBack;
+use crate::rig::port_session::setup_text;
 use crate::rig::segment::observed::Beats;
 use crate::rig::segment::run::PortPlayer;
 use crate::rig::segment::{OnSegment, Qualified};
@@ -76,6 +77,13 @@ impl PortPlayer for Player {
             Capability::LineErrors,
         ];
         own.plan.needs.iter().any(|need| faults.contains(need))
+    }
+
+    fn deviates(rig: &Rig) -> bool {
+        let setup = rig.port().map(|port| setup(port, &setup_text(rig)));
+        let slaves = setup.and_then(Result::ok).map(|own| own.slaves);
+        let mut slaves = slaves.into_iter().flatten();
+        slaves.any(|own| own.deviation.is_some())
     }
 
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
