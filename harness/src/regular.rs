@@ -52,19 +52,15 @@ pub(crate) fn kind(of: FileType) -> &'static str {
 /// # Errors
 /// It cannot be opened, or is a folder, a FIFO, a device or the like.
 pub(crate) fn open(path: &Path, links: Links) -> io::Result<File> {
-    if links == Links::Refuse && path.symlink_metadata()?.is_symlink() {
+    let failed = |error| in_words(path, error);
+    if links == Links::Refuse && path.symlink_metadata().map_err(failed)?.is_symlink() {
         return Err(refused("it is a symbolic link, which could lead anywhere"));
     }
     let opened = OpenOptions::new()
         .read(true)
         .custom_flags(links.flags())
         .open(path);
-    let file = opened.map_err(|error| match (error.kind(), links) {
-        (io::ErrorKind::NotFound, Links::Follow) => {
-            io::Error::new(io::ErrorKind::NotFound, no_such_file(path))
-        }
-        _ => error,
-    })?;
+    let file = opened.map_err(failed)?;
     match file.metadata()?.is_file() {
         true => Ok(file),
         false => Err(refused("it is not a regular file")),
@@ -81,6 +77,51 @@ fn no_such_file(path: &Path) -> String {
         }
         None => "no such file, and no similar name is in its folder".to_owned(),
     }
+}
+
+/// Why a place cannot be used, and what to do, in place of the operating system's words. The kind of the error stays.
+pub(crate) fn in_words(path: &Path, error: io::Error) -> io::Error {
+    let words = match error.kind() {
+        io::ErrorKind::NotFound => no_such_file(path),
+        io::ErrorKind::NotADirectory => {
+            "a part of this path is a file; name a folder in its place".to_owned()
+        }
+        io::ErrorKind::AlreadyExists => "there is a file of this name; name another one".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder; name a file in it".to_owned(),
+        io::ErrorKind::PermissionDenied => {
+            "this user is not permitted to; name another place, or change its permissions"
+                .to_owned()
+        }
+        _ => return error,
+    };
+    io::Error::new(error.kind(), words)
+}
+
+/// Looks for a folder with the file in which a command keeps its run.
+///
+/// # Errors
+/// Why there is none, and what to name, in a sentence.
+pub(crate) fn has_run(path: &Path, record: &str) -> Result<(), String> {
+    let why = if let Err(error) = path.metadata() {
+        match error.kind() {
+            io::ErrorKind::NotFound => match near_in_folder(path) {
+                Some(near) => {
+                    return Err(format!("there is no such folder; did you mean `{near}`?"));
+                }
+                None => "there is no such folder".to_owned(),
+            },
+            _ => return Err(in_words(path, error).to_string()),
+        }
+    } else if path.is_file() {
+        "it is a file".to_owned()
+    } else if !path.join(record).exists() {
+        format!("there is no {record} in it")
+    } else {
+        return Ok(());
+    };
+    Err(format!(
+        "{why}; name the folder in which a command has kept its run"
+    ))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -161,14 +202,30 @@ pub(crate) fn write(
         return write(BufWriter::new(&file));
     }
     if kind.is_some_and(|kind| !kind.is_file()) {
-        return Err(refused("it is not a regular file"));
+        let folder = kind.is_some_and(|kind| kind.is_dir());
+        let why = if folder {
+            "it is a folder; name a file in it"
+        } else {
+            "it is not a regular file"
+        };
+        return Err(refused(why));
     }
     // Not the link is replaced, but the file that it leads to.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let mut beside = path.clone().into_os_string();
     beside.push(format!(".{}.part", std::process::id()));
     let beside = PathBuf::from(beside);
-    let written = File::create_new(&beside)
+    let begun = File::create_new(&beside).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => {
+            let folder = folder_of(&path).display();
+            io::Error::new(
+                error.kind(),
+                format!("there is no folder {folder}; make it first"),
+            )
+        }
+        _ => in_words(&path, error),
+    });
+    let written = begun
         .and_then(|file| write(BufWriter::new(&file)).and_then(|()| file.sync_all()))
         .and_then(|()| std::fs::rename(&beside, &path));
     written.inspect_err(|_| {

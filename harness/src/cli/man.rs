@@ -19,7 +19,10 @@ pub(crate) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result
             clap_mangen::generate_to(without_help(command), folder)?;
         }
         Some(folder) => {
-            output.complain(&format!("{} is not a folder", folder.display()));
+            output.complain(&format!(
+                "{} is not a folder; make it first",
+                folder.display()
+            ));
             return Ok(Exit::Usage);
         }
     }

@@ -8,7 +8,7 @@ use super::tally::{EarlierVerdicts, Tally};
 use crate::buses::Bus;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::command::page::Page;
+use crate::command::page::{Page, writable};
 use crate::command::play::{PlayedOnce, play_entry, progress_bar};
 use crate::command::rig_failure::find_any_rig;
 use crate::counted::counted;
@@ -193,7 +193,9 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         Ok(chosen) => chosen,
         Err(exit) => return Ok(exit),
     };
-    let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
+    let junit = arguments.junit.as_deref();
+    let writable = junit.is_none_or(|path| writable(path, output).is_ok());
+    let (true, Ok(page)) = (writable, Page::new(arguments.html.as_deref(), output)) else {
         return Ok(Exit::Usage);
     };
     let job = PlayOrder {

@@ -5,6 +5,7 @@ use super::run::details;
 use crate::buses::{SharedForm, bits_per_second, carry_frames, rows, share_a_line, write_shared};
 use crate::command::exit::Exit;
 use crate::command::output::{Output, unless_closed};
+use crate::command::page::writable;
 use crate::command::play::play_entry;
 use crate::library::{Entry, sources};
 use crate::regular;
@@ -83,7 +84,7 @@ pub(crate) struct ShownRun<'s> {
     pub(crate) records: &'s [CellRecord],
 }
 
-/// Whether a form can go where it is to go: what is no text is kept from a terminal.
+/// Whether a form can go where it is to go: into a file that can be written, and what is no text not to a terminal.
 pub(crate) fn fits_output(format: TraceFormat, showing: &TraceOutput, output: &mut Output) -> bool {
     if format == TraceFormat::Pcapng && showing.output.is_none() && output.terminal {
         output.complain(
@@ -91,7 +92,8 @@ pub(crate) fn fits_output(format: TraceFormat, showing: &TraceOutput, output: &m
         );
         return false;
     }
-    true
+    let path = showing.output.as_ref();
+    path.is_none_or(|path| writable(path, output).is_ok())
 }
 
 /// Shows a run. Returns false after reporting that the file could not be written.

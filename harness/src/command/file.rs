@@ -63,5 +63,5 @@ pub(crate) fn write_while<T>(
 /// A file could not be written.
 pub(crate) fn failed(path: &Path, error: &std::io::Error) -> Failure {
     let message = format!("failed to write {}: {error}", path.display());
-    Failure::Said(Exit::RigError, message)
+    Failure::Said(Exit::of_file(error), message)
 }

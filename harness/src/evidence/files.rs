@@ -139,10 +139,7 @@ impl Listing {
 
     fn add(&mut self, path: &Path, folder: &str) -> Result<(), EvidenceError> {
         let whole = path.join(folder);
-        let failed = |error| EvidenceError::File {
-            path: whole.display().to_string(),
-            error,
-        };
+        let failed = |error| EvidenceError::file(&whole, error);
         if !folder.is_empty() {
             match whole.symlink_metadata() {
                 Ok(metadata) if metadata.is_dir() => {}

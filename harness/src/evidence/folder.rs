@@ -12,6 +12,7 @@ use super::signature;
 use crate::buses::SimulatedLink;
 use crate::buses::{SharedForm, share_a_line, write_shared};
 use crate::link::{Capability, LinkEvent, Sink};
+use crate::regular;
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
@@ -43,7 +44,7 @@ pub enum EvidenceError {
     /// It cannot be signed, or its signature cannot be checked.
     #[error("failed to use a signature: {0}")]
     Signature(String),
-    /// It is no folder of a run.
+    /// It is no folder of a run: which, and why not.
     #[error("{0} is not an evidence folder: {1}")]
     Foreign(String, String),
     /// A folder of an earlier run that cannot be continued.
@@ -52,6 +53,16 @@ pub enum EvidenceError {
     /// Folders that are no parts of one run.
     #[error("failed to merge: {0}")]
     Merge(String),
+}
+
+impl EvidenceError {
+    /// A place that cannot be used.
+    pub(super) fn file(path: &Path, error: io::Error) -> Self {
+        Self::File {
+            path: path.display().to_string(),
+            error: regular::in_words(path, error),
+        }
+    }
 }
 
 /// What a record begins with.
@@ -127,10 +138,7 @@ impl Folder {
     /// [`EvidenceError`].
     pub fn create(path: &Path, about: &AboutRun<'_>) -> Result<Self, EvidenceError> {
         about.sign.map_or(Ok(()), signature::ready)?;
-        let failed = |error| EvidenceError::File {
-            path: path.display().to_string(),
-            error,
-        };
+        let failed = |error| EvidenceError::file(path, error);
         if fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(EvidenceError::NotEmpty(path.display().to_string()));
         }
@@ -260,10 +268,7 @@ impl Folder {
         let path = self.path.join(file);
         let beside = self.path.join(format!("{file}.part"));
         let written = fs::write(&beside, text).and_then(|()| fs::rename(&beside, &path));
-        written.map_err(|error| EvidenceError::File {
-            path: path.display().to_string(),
-            error,
-        })
+        written.map_err(|error| EvidenceError::file(&path, error))
     }
 
     fn check(&mut self) -> Result<(), EvidenceError> {

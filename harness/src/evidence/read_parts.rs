@@ -41,10 +41,7 @@ pub(super) fn entries(path: &Path) -> Result<Vec<String>, EvidenceError> {
 }
 
 pub(super) fn failed(path: &Path) -> impl Fn(std::io::Error) -> EvidenceError {
-    move |error| EvidenceError::File {
-        path: path.display().to_string(),
-        error,
-    }
+    move |error| EvidenceError::file(path, error)
 }
 
 /// Copies the files of a folder of evidence.

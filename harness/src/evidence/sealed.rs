@@ -41,10 +41,7 @@ pub fn unseal(path: &Path) -> Result<(), EvidenceError> {
 }
 
 fn failed(file: &Path, error: std::io::Error) -> EvidenceError {
-    EvidenceError::File {
-        path: file.display().to_string(),
-        error,
-    }
+    EvidenceError::file(file, error)
 }
 
 /// What a folder does not prove whose signature is not checked.

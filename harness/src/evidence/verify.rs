@@ -22,6 +22,7 @@ use super::selection;
 use super::signature::{self, Signer};
 use crate::buses::judge_of;
 use crate::counted::counted;
+use crate::regular;
 use crate::rig::judge::known;
 use crate::rig::run::twin;
 use crate::rig::segment::{Qualified, SegmentJudge};
@@ -100,6 +101,8 @@ pub(super) struct Judged {
 /// # Errors
 /// It is no folder of evidence, or its record is damaged; with the place. Or a signature cannot be checked here.
 pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, EvidenceError> {
+    regular::has_run(path, RECORD)
+        .map_err(|why| EvidenceError::Foreign(path.display().to_string(), why))?;
     let mut files = compare_sums(path)?;
     if let Some(signer) = signer {
         files.extend(signature::check(path, signer)?);
@@ -175,6 +178,7 @@ impl Opened {
     /// Reads the record and the rig's file of a folder.
     pub(super) fn folder(path: &Path) -> Result<Self, EvidenceError> {
         let foreign = |what: String| EvidenceError::Foreign(path.display().to_string(), what);
+        regular::has_run(path, RECORD).map_err(foreign)?;
         let record =
             files::read(path, RECORD).map_err(|error| foreign(format!("{RECORD}: {error}")))?;
         let beside = |name: &str| {

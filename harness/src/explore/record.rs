@@ -7,6 +7,7 @@ use super::Case;
 use super::FuzzCase;
 use super::error::ExploreError;
 use super::files::read_text;
+use crate::regular;
 use rustix::fs::FlockOperation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -128,8 +129,10 @@ impl FuzzRecord {
         folder: &Path,
         about: &FuzzSettings<C>,
     ) -> Result<Self, ExploreError> {
-        let unusable =
-            |error: std::io::Error| ExploreError::unwritten("make the folder", folder, &error);
+        let unusable = |error: std::io::Error| {
+            let error = regular::in_words(folder, error);
+            ExploreError::unwritten("make the folder", folder, &error)
+        };
         std::fs::create_dir_all(folder).map_err(unusable)?;
         if std::fs::read_dir(folder)
             .map_err(unusable)?
@@ -230,10 +233,7 @@ fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
 /// There is no record, or its first line is damaged.
 pub fn rig_of(folder: &Path) -> Result<String, ExploreError> {
     let path = folder.join(RECORD);
-    let text = match path.exists() {
-        true => read_text(&path)?,
-        false => return Err(no_run(folder)),
-    };
+    let text = record_of(folder)?;
     let first = text.lines().next().unwrap_or_default();
     let line: Option<serde_json::Value> = serde_json::from_str(first).ok();
     let rig = line.and_then(|line| Some(line.get("rig")?.as_str()?.to_owned()));
@@ -245,11 +245,11 @@ pub fn rig_of(folder: &Path) -> Result<String, ExploreError> {
     })
 }
 
-fn no_run(folder: &Path) -> ExploreError {
-    ExploreError::Usage(format!(
-        "{} holds no run: there is no {RECORD} in it",
-        folder.display()
-    ))
+/// The text of the record in a folder.
+fn record_of(folder: &Path) -> Result<String, ExploreError> {
+    regular::has_run(folder, RECORD)
+        .map_err(|why| ExploreError::Usage(format!("{} holds no run: {why}", folder.display())))?;
+    read_text(&folder.join(RECORD))
 }
 
 /// What the folder of a run on a ring holds, and how long its record is up to the last line of progress.
@@ -266,10 +266,7 @@ pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
 /// There is no record, or it is damaged.
 pub fn read_as<C: FuzzCase>(folder: &Path) -> Result<(KeptRun<C>, usize), ExploreError> {
     let path = folder.join(RECORD);
-    if !path.exists() {
-        return Err(no_run(folder));
-    }
-    let text = read_text(&path)?;
+    let text = record_of(folder)?;
     let damaged = |number: usize, why: &str| {
         ExploreError::File(format!(
             "{}, line {}: {why}; the run cannot go on from a damaged record, begin another one",

@@ -389,7 +389,11 @@ fn nothing_is_played_again_if_all_has_passed() {
         "whole",
         "it is of the rig sim-3 with another file",
     );
-    refused("sim:3", "absent", "failed to use absent");
+    refused(
+        "sim:3",
+        "absent",
+        "absent is not an evidence folder: there is no such folder",
+    );
     refused("sim:3", "all", "all is not an evidence folder");
     ended(&desk.run(&["run", "all", "--rerun", "whole"]), 2, "--rig");
     edit(&desk.path("left/run.jsonl"), "\"passed\"", "\"failed\"");

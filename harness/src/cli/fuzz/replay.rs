@@ -103,6 +103,7 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
         return Ok(placed.take(MOST_CASES).collect());
     }
     let unreadable = |error: std::io::Error| {
+        let error = crate::regular::in_words(folder, error);
         ExploreError::File(format!("failed to read {}: {error}", folder.display()))
     };
     let mut files = Vec::new();

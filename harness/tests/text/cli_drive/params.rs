@@ -132,8 +132,8 @@ fn all_mistakes_of_a_file_of_parameters_are_shown_at_once() {
     refused("params diff 0 no-such-file.toml", 2, &["failed to read"]);
     refused(
         "params save 0 /no/such/folder/p.toml",
-        3,
-        &["failed to write"],
+        2,
+        &["there is no folder /no/such/folder; make it first"],
     );
     refused("params save 0 /", 2, &["is not the name of a file"]);
 }

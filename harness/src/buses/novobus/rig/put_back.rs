@@ -232,7 +232,7 @@ fn is_of_the_bus(code: u16) -> bool {
 impl Session {
     /// Scenarios are about to be played: says what a run before, which was killed, has left.
     pub(super) fn begin(&mut self) {
-        self.before.earlier = self.left.before();
+        self.before.earlier = self.left.take_before();
     }
 
     /// Reads what a scenario may change of the drives, where it has not been read: nothing of it is recorded. Where drives may be in the middle
@@ -274,7 +274,7 @@ impl Session {
         self.before.errors.get_or_insert_default();
         let origin = &self.rig().origin;
         let left = sentences(&self.before.values, "nothing was put back", origin);
-        self.left.set(left);
+        self.left.foretell(left, None);
     }
 
     /// Puts back what scenarios have changed since drives were [read](Self::remember), where they were seen in their safe state. Returns what is
@@ -288,7 +288,7 @@ impl Session {
         let mut all: Vec<_> = earlier.into_iter().collect();
         if let Some(errors) = errors {
             let notes = self.all_back(safe, values, &errors);
-            self.left.set(notes.clone());
+            self.left.keep(&notes);
             all.extend(notes);
         }
         all
