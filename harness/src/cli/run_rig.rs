@@ -468,8 +468,10 @@ fn measured(run: &mut Run<'_>) -> Vec<String> {
     }
     let unknown: u64 = switches.iter().map(|switch| switch.unknown).sum();
     if unknown > 0 {
+        let marked: u64 = switches.iter().map(|switch| switch.marked).sum();
         lines.push(format!(
-            "{} came meanwhile, and are compared without their line status: a UART has one parity setting for both directions\n",
+            "{} came meanwhile or soon after, {marked} of them with an error: they are compared without their line status, since a UART has one parity \
+             setting for both directions\n",
             counted(unknown, "byte")
         ));
     }

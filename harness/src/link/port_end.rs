@@ -23,6 +23,13 @@ const MOST_UNEXPLAINED: u64 = 1_000_000;
 /// Octets that may come for each octet that was sent, on any bus: a reply of PROFIBUS DP has at most 255.
 const MOST_A_REPLY: u64 = 300;
 
+/// The longest silence in front of an octet with a wrong parity bit. Drives that monitor time-outs allow 10 ms without a byte (ND21 9.9), and
+/// switching the parity takes some of them.
+const LONGEST_SILENCE: Span = Span::from_millis(6);
+
+/// How much later than due an octet may leave a USB adapter, which gets its octets each millisecond.
+const ADAPTER: Span = Span::from_millis(2);
+
 /// What a bus knows of the octets that are under way at a port.
 pub(crate) trait Accounting: fmt::Debug + Send {
     /// Nothing is under way.
@@ -37,6 +44,11 @@ pub(crate) trait Accounting: fmt::Debug + Send {
     /// How long the line is idle before what is sent together.
     fn idle(&self) -> Span {
         Span::ZERO
+    }
+
+    /// How long behind an octet the last one that it causes comes back; `None` where none comes while others are sent.
+    fn returns(&self, _octet_time: Span) -> Option<Span> {
+        None
     }
 
     /// Whether more has left than has come.
@@ -64,6 +76,8 @@ pub(crate) struct PortEnd<A> {
     pub(crate) free: Instant,
     /// The next byte must not be given to the operating system before that.
     exact: bool,
+    /// What comes while its parity is switched for an octet that leaves has no known line status.
+    pub(crate) shares_parity: bool,
     /// What an adapter gives back that hears itself; `None` for one that does not.
     pub(crate) echo: Option<Echo>,
     /// When the awaited reply is due.
@@ -83,6 +97,7 @@ pub(crate) struct PortEnd<A> {
 impl<A: Accounting> PortEnd<A> {
     pub(crate) fn new(wire: Wire, accounting: A) -> Self {
         Self {
+            shares_parity: wire.is_uart(),
             wire,
             accounting,
             queue: VecDeque::new(),
@@ -118,14 +133,29 @@ impl<A: Accounting> PortEnd<A> {
         self.log = [Vec::new(), Vec::new()];
     }
 
-    /// Leaves the line idle before the next byte, for as long as the bus says, counted from the last byte in either direction.
-    pub(crate) fn pause(&mut self, now: Instant) {
+    /// Leaves the line idle before the next byte, for as long as the bus says, counted from the last byte in either direction. `tolerance` is
+    /// what the bench's times may be off by.
+    pub(crate) fn pause(&mut self, now: Instant, octet_time: Span, tolerance: Span) {
         let idle = self.accounting.idle();
-        let free = (self.free.max(self.last_arrival) + idle).max(now);
-        if idle > Span::ZERO && free > self.free {
+        let last = self.free.max(self.last_arrival);
+        let quiet = self.silence(now, octet_time, tolerance);
+        let free = (last + idle).max(self.free + quiet).max(now);
+        if idle.max(quiet) > Span::ZERO && free > self.free {
             self.free = free;
             self.exact = free > now;
         }
+    }
+
+    /// How long an octet with a wrong parity bit waits behind one that it would follow without a pause: until that one has come back, so that
+    /// nothing comes while the parity is switched. Behind a pause it waits for nothing, since the pause may be meant; nor does it where the
+    /// silence would be longer than drives or the stated times of a scenario allow.
+    fn silence(&self, now: Instant, octet_time: Span, tolerance: Span) -> Span {
+        let follows = self.sent > 0 && now < self.free + octet_time;
+        let wanted = self.shares_parity && follows && self.outgoing.damages_next_parity();
+        let back = self.accounting.returns(octet_time).filter(|_| wanted);
+        let silence = back.map(|back| back + ADAPTER);
+        let allowed = LONGEST_SILENCE.min(tolerance);
+        silence.filter(|own| *own <= allowed).unwrap_or(Span::ZERO)
     }
 
     /// Queues a byte of the bench's.

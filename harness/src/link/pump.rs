@@ -159,7 +159,7 @@ impl<A: Accounting> Pump<A> {
     pub(crate) fn send(&mut self, port: usize, octets: &[u8]) -> Instant {
         let now = self.now();
         let rest = !self.port_busy(port, now);
-        let (octet_time, looked) = (self.octet_time, self.looked);
+        let (octet_time, looked, tolerance) = (self.octet_time, self.looked, self.tolerance);
         let sound = self.trouble.is_none();
         let Some(own) = self.ports.get_mut(port).filter(|_| sound) else {
             return now;
@@ -171,7 +171,7 @@ impl<A: Accounting> Pump<A> {
         }
         if !octets.is_empty() {
             let echo_is_due = looked >= own.free + ECHO;
-            own.pause(now);
+            own.pause(now, octet_time, tolerance);
             let silent = own
                 .echo
                 .as_ref()

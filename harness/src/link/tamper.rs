@@ -101,6 +101,12 @@ impl Tamper {
         self.armed.iter().flat_map(each)
     }
 
+    /// Whether the next byte gets a wrong parity bit.
+    pub(crate) fn damages_next_parity(&self) -> bool {
+        let next = self.armed.get(&(self.count + 1));
+        next.is_some_and(|all| all.iter().copied().any(is_wrong_parity))
+    }
+
     /// A byte that goes on at `start`.
     pub(crate) fn pass(&mut self, byte: Received, start: Instant) -> Passed {
         self.count += 1;

@@ -40,6 +40,8 @@ pub struct Switch {
     pub idle: Duration,
     /// Bytes that came meanwhile. A UART has one parity setting for both directions, so it is not known whether they came with errors.
     pub unknown: u64,
+    /// Those of them that the kernel has marked with an error.
+    pub marked: u64,
 }
 
 /// What belongs to a serial port beside its stream.
@@ -84,7 +86,11 @@ impl Switches {
     fn note(&mut self, idle: Duration, restored: Instant) {
         self.restored = Some(restored);
         if self.done.len() < MOST_SWITCHES {
-            self.done.push(Switch { idle, unknown: 0 });
+            self.done.push(Switch {
+                idle,
+                unknown: 0,
+                marked: 0,
+            });
         }
     }
 
@@ -95,6 +101,7 @@ impl Switches {
         }
         if let Some(last) = self.done.last_mut() {
             last.unknown += 1;
+            last.marked += u64::from(byte.error.is_some());
         }
         Received::good(byte.byte)
     }

@@ -58,7 +58,7 @@ fn the_parity_is_switched_between_drained_bytes() {
 /// than it came, and a computer that stands still reads it later than any adapter hands it over.
 #[test]
 fn what_comes_while_the_parity_is_switched_has_no_known_line_status() {
-    let bad = Received::bad(0x13, LineError::Parity);
+    let (good, bad) = (Received::good(0x14), Received::bad(0x13, LineError::Parity));
     let start = Instant::now();
     let mut switches = Switches::default();
     assert_eq!(switches.judged(bad), bad);
@@ -67,10 +67,11 @@ fn what_comes_while_the_parity_is_switched_has_no_known_line_status() {
     // The port is looked at once more before the adapter must have handed over everything, and then after a standstill.
     switches.has_read_all(start + LATEST / 2);
     assert_eq!(switches.judged(bad), Received::good(0x13));
+    assert_eq!(switches.judged(good), good);
     switches.has_read_all(start + LATEST * 50);
     assert_eq!(switches.judged(bad), bad);
-    let idle = Duration::from_millis(2);
-    assert_eq!(switches.take(), [Switch { idle, unknown: 2 }]);
+    let done = switches.take();
+    assert_eq!((done[0].unknown, done[0].marked), (3, 2));
 }
 
 /// A fiftieth is what the clocks of adapters are off by.

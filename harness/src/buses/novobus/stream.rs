@@ -52,6 +52,10 @@ impl Accounting for RoundTrip {
         self.came += 1;
     }
 
+    fn returns(&self, octet_time: Span) -> Option<Span> {
+        Some(self.soonest(octet_time))
+    }
+
     fn is_owed(&self) -> bool {
         self.sent > self.came
     }

@@ -1,10 +1,11 @@
 //! Tests when the link is awake for an answer.
 
 use super::*;
-use crate::link::Octets;
 use crate::link::pump::{SLACK, STAY};
+use crate::link::{LinkFault, Octets};
 use crate::port::{PortAddress, PortSettings, open};
 use harness_proto::novobus::sync::SYNCO;
+use harness_sim::fault::Flips;
 use std::io::Write as _;
 use std::net::{TcpListener, TcpStream};
 use std::time;
@@ -149,4 +150,58 @@ fn a_flood_ends_the_link() {
     );
     drop(link);
     flood.join().expect("it ends with the socket");
+}
+
+/// A UART has one parity setting for both directions. A damaged byte waits until the byte in front of it has come back, where nothing stated
+/// is broken by it and drives that monitor time-outs miss nothing (ND21 9.9).
+#[test]
+fn a_wrong_parity_bit_waits_for_a_silent_line() {
+    let byte = Rate::default().byte_time();
+    let parity = LinkFault::Flip(Flips {
+        parity: true,
+        ..Flips::default()
+    });
+    let start = |drives: u8, before: usize, pause: Span, tolerance: Span, fault: Option<_>| {
+        let (mut link, _ring) = link();
+        let mut port = link.pump.ports.remove(0);
+        port.accounting.drives = drives;
+        port.shares_parity = true;
+        for _ in 0..before {
+            port.send(Instant::START, 0x88, byte);
+        }
+        if let Some(fault) = fault {
+            port.outgoing.suffer(fault);
+        }
+        let now = port.free + pause;
+        port.pause(now, byte, tolerance);
+        let at = port.free.max(now);
+        port.send(now, 0xFE, byte);
+        assert_eq!(port.queue.back().map(|own| own.0), Some(at));
+        assert_eq!(port.free, at + byte, "what comes behind it is later too");
+        at.since(Instant::START + byte * before as u64)
+    };
+    let (tolerance, none) = (TOLERANCE, Span::ZERO);
+    let silent = byte * 3 + Span::from_millis(2);
+    assert_eq!(start(3, 1, none, tolerance, Some(parity)), silent);
+    let late = Span::from_micros(100);
+    assert_eq!(start(3, 2, late, tolerance, Some(parity)), silent);
+    // A sound byte, another fault, the first of a conversation, a large ring, exact times, a stated pause.
+    assert_eq!(start(3, 1, none, tolerance, None), none);
+    let replaced = Some(LinkFault::Replace(0x55));
+    assert_eq!(start(3, 1, none, tolerance, replaced), none);
+    assert_eq!(start(3, 0, none, tolerance, Some(parity)), none);
+    let long = Span::from_millis(250);
+    for drives in [13, 14, 250] {
+        let wanted = byte * u64::from(drives) + Span::from_millis(2);
+        let waits = wanted <= Span::from_millis(6);
+        let silence = if waits { wanted } else { none };
+        assert_eq!(
+            start(drives, 1, none, long, Some(parity)),
+            silence,
+            "{drives} drives"
+        );
+    }
+    assert_eq!(start(3, 1, none, Span::from_millis(2), Some(parity)), none);
+    let pause = Span::from_millis(1);
+    assert_eq!(start(3, 1, pause, tolerance, Some(parity)), pause);
 }
