@@ -389,8 +389,8 @@ impl Recalled {
         let outcome = &again.attempt.outcome;
         let judged = outcome.verdict.name();
         let found = outcome.finding.as_ref().map(|found| found.message.clone());
+        let why = found.clone().or_else(|| outcome.remarks.first().cloned());
         if self.verdict != judged {
-            let why = found.or_else(|| outcome.remarks.first().cloned());
             let why = why.map_or_else(String::new, |why| format!(": {why}"));
             let verdict = &self.verdict;
             return Some(format!(
@@ -401,7 +401,7 @@ impl Recalled {
             format!(
                 "the record says \"{}\", its bytes say \"{}\"",
                 self.finding.as_deref().unwrap_or("nothing"),
-                found.as_deref().unwrap_or("nothing")
+                why.as_deref().unwrap_or("nothing")
             )
         })
     }

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use std::fmt;
 
 /// How far ahead of the line bytes are given to the operating system.
-const AHEAD: Span = Span::from_millis(100);
+pub(crate) const AHEAD: Span = Span::from_millis(100);
 
 /// Bytes of a conversation that are recorded on each link; more are counted only.
 pub(crate) const MOST_RECORDED: usize = 4_000_000;
@@ -25,7 +25,7 @@ const MOST_A_REPLY: u64 = 300;
 
 /// The longest silence in front of an octet with a wrong parity bit. Drives that monitor time-outs allow 10 ms without a byte (ND21 9.9), and
 /// switching the parity takes some of them.
-const LONGEST_SILENCE: Span = Span::from_millis(6);
+pub(crate) const LONGEST_SILENCE: Span = Span::from_millis(6);
 
 /// How much later than due an octet may leave a USB adapter, which gets its octets each millisecond.
 const ADAPTER: Span = Span::from_millis(2);

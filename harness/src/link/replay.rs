@@ -7,8 +7,10 @@
 //! A record of a ring with ports holds every [`Look`], so that the caller sees the same at each call and must do the same. Records of
 //! schema 1 have no looks: of these only the order is repeated, and a driver that depends on the time may send something else.
 
+use super::port_end::{AHEAD, LONGEST_SILENCE};
 use super::{
     Capability, Lead, Line, Link, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble,
+    is_wrong_parity,
 };
 use crate::counted::counted;
 use crate::medium::{Heard, Medium, Out, Pieces};
@@ -57,6 +59,8 @@ struct Known {
     free: [Instant; 2],
     /// For how long faults of this conversation may hold bytes.
     held: Span,
+    /// For how long a byte with a wrong parity bit may wait for a silent line.
+    silence: Span,
 }
 
 impl Default for Known {
@@ -68,6 +72,7 @@ impl Default for Known {
             came: Default::default(),
             free: [Instant::START; 2],
             held: Span::ZERO,
+            silence: Span::ZERO,
         }
     }
 }
@@ -295,7 +300,12 @@ impl Replay {
         };
         let free = std::mem::replace(&mut known.free[port.min(1)], end);
         let earliest = free.max(now) + took;
-        let latest = next.map(|next| free.max(next) + took + known.held);
+        // Bytes of the conversation before may still occupy the line.
+        let free = match free {
+            Instant::START => Instant::START + AHEAD,
+            free => free,
+        };
+        let latest = next.map(|next| free.max(next) + took + known.held + known.silence);
         if end < earliest || latest.is_some_and(|latest| !shared && end > latest) {
             let pieces = pieces_of(what);
             self.fails(format!(
@@ -499,6 +509,9 @@ impl Link for Replay {
                 self.events.pop_front();
                 if let (Some(known), PlacedFault::Link(_, what)) = (&mut self.known, fault) {
                     known.held = known.held + held_by(what, self.medium.octet_time());
+                    if is_wrong_parity(what) {
+                        known.silence = LONGEST_SILENCE.min(self.tolerance);
+                    }
                 }
                 self.trouble_comes();
             }

@@ -3,6 +3,7 @@
 use super::*;
 use crate::link::Octets;
 use harness_proto::line::Rate;
+use harness_sim::fault::Flips;
 
 fn ms(at: u64) -> Instant {
     Instant::START + Span::from_millis(at)
@@ -202,4 +203,50 @@ fn a_difference_behind_a_denial_is_reported() {
     converse(&mut replay);
     let left = replay.left().expect("a difference");
     assert!(left.contains("a look at the ports"), "{left}");
+}
+
+/// A byte with a wrong parity bit may wait for a silent line, for a while and within the rig's tolerance; no other byte may. The first one of a
+/// conversation may wait for a line that is not free yet.
+#[test]
+fn bytes_may_leave_later_than_the_next_look() {
+    let byte = Rate::default().byte_time();
+    let parity = LinkFault::Flip(Flips {
+        parity: true,
+        ..Flips::default()
+    });
+    let left = |fault, silence: Span, occupied: Span, tolerance: Span| {
+        let fault = PlacedFault::Link(0, fault);
+        let first = Instant::START + occupied + byte;
+        let sent = |end, byte| LinkEvent::Sent(0, end, Pieces::Octets(vec![byte]));
+        let look = |at| {
+            LinkEvent::Look(Look {
+                at,
+                busy: true,
+                lead: None,
+                pause: None,
+            })
+        };
+        let events = vec![
+            LinkEvent::Begin(Instant::START),
+            look(Instant::START),
+            sent(first, 0x88),
+            LinkEvent::Fault(0, Instant::START, fault, Moment::Now),
+            sent(first + silence + byte, 0xFE),
+            look(Instant::START + byte),
+        ];
+        let mut replay = Replay::new(events, Rate::default(), tolerance, vec![3], Vec::new());
+        replay.begin();
+        replay.send_octets(0, &[0x88]);
+        replay.inject(0, fault, Moment::Now);
+        replay.send_octets(0, &[0xFE]);
+        replay.wait(Instant::START + byte);
+        replay.left()
+    };
+    let (allowed, none) = (Span::from_millis(5), Span::ZERO);
+    assert_eq!(left(parity, allowed, none, allowed), None);
+    assert!(left(parity, allowed + byte, none, allowed).is_some());
+    assert!(left(LinkFault::Drop, allowed, none, allowed).is_some());
+    // Bytes of the conversation before occupy the line, as far ahead as they are given to the operating system.
+    assert_eq!(left(LinkFault::Drop, none, AHEAD, allowed), None);
+    assert!(left(LinkFault::Drop, none, AHEAD + byte, allowed).is_some());
 }

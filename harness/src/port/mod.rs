@@ -15,6 +15,7 @@
 
 mod holder;
 mod last_words;
+mod ledger;
 mod open;
 mod rfc2217;
 mod serial;

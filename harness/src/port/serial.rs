@@ -4,6 +4,7 @@
 //! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
 
 use super::holder::refuse_used;
+use super::ledger::Ledger;
 use super::open::{OpenError, printed};
 use harness_proto::line::{Format, Parity as LineParity, Received};
 use harness_proto::time::Span;
@@ -62,8 +63,8 @@ pub(super) struct Serial {
     /// The driver has said that all bytes have left before the line can have carried them.
     hasty: bool,
     switches: Switches,
-    /// The overruns that the driver has counted.
-    overruns: Option<u32>,
+    /// What the driver counts, if it does.
+    ledger: Option<Ledger>,
     /// Whether the driver says nothing of the rates that its chip makes, and the rate is none that every chip makes.
     unproven_rate: bool,
     low_latency: Option<LowLatency>,
@@ -147,6 +148,7 @@ pub(super) fn open(
     set_marks(&fd, format).map_err(refused)?;
     rustix::termios::tcflush(&fd, QueueSelector::IFlush)
         .map_err(|error| OpenError::of(path, &error.into()))?;
+    serial.ledger = harness_uart::counts(&fd).map(|own| Ledger::new(own, Instant::now()));
     if low_latency {
         serial.low_latency = LowLatency::of(&fd);
     }
@@ -200,7 +202,7 @@ fn raw(
         free: Instant::now(),
         hasty: false,
         switches: Switches::default(),
-        overruns: harness_uart::counts(&fd).map(|own| own.overruns),
+        ledger: None,
         unproven_rate: made.is_none() && !USUAL_RATES.contains(&bits_per_second),
         low_latency: None,
     };
@@ -288,14 +290,19 @@ impl Serial {
         &mut self.switches
     }
 
-    /// How many bytes the driver has lost since the last call, as far as it counts.
-    pub(super) fn take_overruns(&mut self, fd: &OwnedFd) -> u64 {
-        let now = self.overruns.and_then(|_| harness_uart::counts(fd));
-        let Some((before, now)) = self.overruns.zip(now.map(|own| own.overruns)) else {
-            return 0;
-        };
-        self.overruns = Some(now);
-        u64::from(now.wrapping_sub(before))
+    /// A byte was read.
+    pub(super) fn read(&mut self, byte: Received) -> Received {
+        self.ledger.iter_mut().for_each(Ledger::read);
+        self.switches.judged(byte)
+    }
+
+    /// Bytes since the last call that the driver has lost, or that another program has sent or read at this port, as far as the driver counts.
+    pub(super) fn take_unplaced(&mut self, fd: &OwnedFd, has_come: bool) -> u64 {
+        let now = Instant::now();
+        let ledger = self.ledger.as_mut();
+        let ledger = ledger.filter(|own| has_come || own.is_due(now));
+        let counted = ledger.and_then(|own| Some(own.unplaced(harness_uart::counts(fd)?, now)));
+        counted.unwrap_or(0)
     }
 
     /// Whether it is not known that the port makes the rate that it was asked for.
@@ -310,6 +317,7 @@ impl Serial {
 
     /// This number of bytes was written.
     pub(super) fn wrote(&mut self, bytes: usize) {
+        self.ledger.iter_mut().for_each(|own| own.sent(bytes));
         let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
         self.free = self.free.max(Instant::now()) + self.byte_time * bytes;
     }
@@ -323,6 +331,7 @@ impl Serial {
 
     /// Sends a byte with a wrong parity bit. What came before must have been read.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
+        self.ledger.iter_mut().for_each(|own| own.sent(1));
         let idle = send_wrong_parity(
             &mut fd.as_fd(),
             byte,

@@ -376,9 +376,7 @@ impl Wire {
         self.read_chunks(into)?;
         if let Coding::Serial(_, serial) = &mut self.coding {
             serial.switches().has_read_all(by);
-            if into.len() > before {
-                self.unplaced += serial.take_overruns(&self.fd);
-            }
+            self.unplaced += serial.take_unplaced(&self.fd, into.len() > before);
         }
         Ok(())
     }
@@ -432,7 +430,7 @@ impl Wire {
             }
             Coding::Serial(unmark, serial) => {
                 for byte in unmarked(unmark, bytes, &self.name) {
-                    into.push(serial.switches().judged(byte?));
+                    into.push(serial.read(byte?));
                 }
             }
             Coding::Telnet(telnet) => {

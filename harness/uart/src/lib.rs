@@ -97,6 +97,8 @@ fn set(port: BorrowedFd<'_>, settings: SerialStruct) -> Result<(), Errno> {
 pub struct Counts {
     /// Bytes sent.
     pub sent: u32,
+    /// Bytes received.
+    pub received: u32,
     /// Bytes lost in the chip or in the kernel's queue.
     pub overruns: u32,
     /// Bytes with a wrong parity bit.
@@ -113,6 +115,7 @@ impl Counts {
     pub const fn since(self, before: Self) -> Self {
         Self {
             sent: self.sent.wrapping_sub(before.sent),
+            received: self.received.wrapping_sub(before.received),
             overruns: self.overruns.wrapping_sub(before.overruns),
             parity: self.parity.wrapping_sub(before.parity),
             framing: self.framing.wrapping_sub(before.framing),
@@ -127,6 +130,7 @@ pub fn counts(port: impl AsFd) -> Option<Counts> {
     let count = |own: c_int| own.cast_unsigned();
     Some(Counts {
         sent: count(own.tx),
+        received: count(own.rx),
         overruns: count(own.overrun).wrapping_add(count(own.buf_overrun)),
         parity: count(own.parity),
         framing: count(own.frame),

@@ -108,7 +108,7 @@ impl Outcome {
         {
             self.verdict = Verdict::Inconclusive;
             self.remarks.push(format!(
-                "{} reported without a place: the transport cannot show what was damaged or lost",
+                "{} reported without a place: the transport cannot show what was damaged or lost, or another program uses the port",
                 counted(count, "line error")
             ));
         }

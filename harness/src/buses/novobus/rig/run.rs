@@ -212,12 +212,13 @@ impl<'s> Run<'s> {
             }
             Err((ring, ill)) => return Err(self.session.ill(ring, ill)),
         };
-        let ports = self.session.link().inner_mut().ports_mut();
-        let unplaced = ports.map_or(0, |ports| ports.take_unplaced());
         let all = Conversation::all(&both.events, self.byte_time, simulated);
         if let (false, Some(last)) = (simulated, all.last()) {
             drop_late(self.session.link(), &way.rings, last);
         }
+        // Bytes that do not come may be those of another program.
+        let ports = self.session.link().inner_mut().ports_mut();
+        let unplaced = ports.map_or(0, |ports| ports.take_unplaced());
         let opening = opening(self.session.rig(), &way, &all, self.exactness);
         let (conversations, fresh) = way.compared(all, self.exactness);
         if fresh && let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
