@@ -50,8 +50,8 @@ impl Ledger {
         now >= self.asked + OFTEN
     }
 
-    /// Bytes since the last call that were lost, that another program has sent, or that it has read. All that has come is read.
-    pub(super) fn unplaced(&mut self, counts: Counts, now: Instant) -> u64 {
+    /// Bytes since the last call that were lost or that another program has read, and those that it has sent. All that has come is read.
+    pub(super) fn beside(&mut self, counts: Counts, now: Instant) -> (u64, u64) {
         let lost = counts.since(self.counts).overruns;
         let foreign = more(counts.sent, self.sent);
         self.sent = self.sent.wrapping_add(foreign);
@@ -63,7 +63,7 @@ impl Ledger {
             self.received = (now, counts.received);
         }
         (self.counts, self.asked) = (counts, now);
-        u64::from(lost) + u64::from(foreign) + u64::from(missed)
+        (u64::from(lost) + u64::from(missed), u64::from(foreign))
     }
 }
 
@@ -80,55 +80,57 @@ mod tests {
     #[test]
     fn what_another_program_sends_and_reads_is_counted_once() {
         let start = Instant::now();
-        let later = |steps: u32| start + DELIVERED * steps;
+        // The driver's counts wrap.
         let counts = |sent: u32, received: u32| Counts {
             sent: sent.wrapping_sub(5),
             received: received.wrapping_sub(5),
             ..Counts::default()
         };
-        // The driver's counts wrap.
-        let mut ledger = Ledger::new(counts(0, 0), start);
-        ledger.sent(10);
+        let mut own = Ledger::new(counts(0, 0), start);
+        let mut beside = |sent, read, counted: Counts, steps| {
+            own.sent(sent);
+            (0..read).for_each(|_| own.read());
+            own.beside(counted, start + DELIVERED * steps)
+        };
         assert_eq!(
-            ledger.unplaced(counts(7, 3), start),
-            0,
+            beside(10, 0, counts(7, 3), 0),
+            (0, 0),
             "3 bytes wait to be sent"
         );
-        (0..3).for_each(|_| ledger.read());
-        assert_eq!(ledger.unplaced(counts(10, 10), later(1)), 0);
-        // Seven bytes are under way to the program: they are not missed before they had time to come.
-        (0..2).for_each(|_| ledger.read());
-        assert_eq!(ledger.unplaced(counts(10, 10), later(1)), 0);
+        assert_eq!(beside(0, 3, counts(10, 10), 1), (0, 0));
         assert_eq!(
-            ledger.unplaced(counts(10, 10), later(2)),
-            5,
+            beside(0, 2, counts(10, 10), 1),
+            (0, 0),
+            "5 are under way to the program"
+        );
+        assert_eq!(
+            beside(0, 0, counts(10, 10), 2),
+            (5, 0),
             "another program has read 5"
         );
         assert_eq!(
-            ledger.unplaced(counts(16, 10), later(2)),
-            6,
+            beside(0, 0, counts(16, 10), 2),
+            (0, 6),
             "another program has sent 6"
         );
         let lost = Counts {
             overruns: 1,
             ..counts(16, 10)
         };
-        assert_eq!(ledger.unplaced(lost, later(3)), 1);
-        assert_eq!(ledger.unplaced(lost, later(4)), 0);
+        assert_eq!(beside(0, 0, lost, 3), (1, 0));
+        assert_eq!(beside(0, 0, lost, 4), (0, 0));
     }
 
     /// A driver that counts nothing accuses no program.
     #[test]
     fn a_driver_that_does_not_count() {
         let start = Instant::now();
-        let mut ledger = Ledger::new(Counts::default(), start);
-        ledger.sent(5);
-        (0..5).for_each(|_| ledger.read());
+        let mut own = Ledger::new(Counts::default(), start);
+        own.sent(5);
+        (0..5).for_each(|_| own.read());
         for step in 0..3 {
-            assert_eq!(
-                ledger.unplaced(Counts::default(), start + DELIVERED * step),
-                0
-            );
+            let found = own.beside(Counts::default(), start + DELIVERED * step);
+            assert_eq!(found, (0, 0));
         }
     }
 }

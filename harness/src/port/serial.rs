@@ -301,8 +301,8 @@ impl Serial {
         let now = Instant::now();
         let ledger = self.ledger.as_mut();
         let ledger = ledger.filter(|own| has_come || own.is_due(now));
-        let counted = ledger.and_then(|own| Some(own.unplaced(harness_uart::counts(fd)?, now)));
-        counted.unwrap_or(0)
+        let beside = ledger.and_then(|own| Some(own.beside(harness_uart::counts(fd)?, now)));
+        beside.map_or(0, |(lost, foreign)| lost + foreign)
     }
 
     /// Whether it is not known that the port makes the rate that it was asked for.

@@ -6,6 +6,7 @@
 //! and a byte that arrives between open and raw mode may be echoed. So a tap's TX and RTS are not to be wired.
 
 use super::holder::refuse_used;
+use super::ledger::Ledger;
 use super::open::OpenError;
 use super::serial::refuse_rate;
 use harness_proto::line::{Format, LineError, Parity, Received};
@@ -19,6 +20,7 @@ use rustix::termios::{
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// What is read at a time.
 const CHUNK: usize = 4_096;
@@ -30,6 +32,7 @@ pub struct SilentTap {
     path: PathBuf,
     unmark: Option<Unmark>,
     kinds: ErrorKinds,
+    ledger: Option<Ledger>,
     _low_latency: Option<LowLatency>,
 }
 
@@ -79,6 +82,7 @@ impl SilentTap {
             path: path.to_owned(),
             unmark: (marks || !pty).then(Unmark::default),
             kinds: ErrorKinds::new(harness_uart::counts(&fd)),
+            ledger: harness_uart::counts(&fd).map(|own| Ledger::new(own, Instant::now())),
             _low_latency: LowLatency::of(&fd),
             fd,
         };
@@ -121,6 +125,9 @@ impl SilentTap {
         let before = heard.len();
         let state = self.read_all(heard)?;
         let new = heard.get_mut(before..).unwrap_or_default();
+        if let Some(ledger) = &mut self.ledger {
+            new.iter().for_each(|_| ledger.read());
+        }
         if new.iter().any(|own| own.error.is_some()) {
             self.kinds.name(new, harness_uart::counts(&self.fd));
         }
@@ -150,6 +157,13 @@ impl SilentTap {
                 }
             }
         }
+    }
+
+    /// Bytes since the last call that the driver has lost, or that another program has read, as far as the driver counts.
+    pub fn take_lost(&mut self) -> u64 {
+        let counts = harness_uart::counts(&self.fd);
+        let both = self.ledger.as_mut().zip(counts);
+        both.map_or(0, |(own, counts)| own.beside(counts, Instant::now()).0)
     }
 
     /// What the driver has counted at this port so far; `None` where it does not count.

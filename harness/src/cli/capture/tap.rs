@@ -71,9 +71,8 @@ pub(super) struct Tap {
     ear: Ear,
     settings: TapSettings,
     cutter: Option<TelegramCutter>,
-    /// What the kernel had counted at the port before, and the overruns until now.
+    /// What the kernel had counted when the port was opened.
     before: Option<Counts>,
-    overruns: u32,
     looked: Instant,
     /// The time of the last octet.
     last: u64,
@@ -152,7 +151,6 @@ impl Tap {
             settings,
             cutter,
             before: None,
-            overruns: 0,
             looked: Instant::now(),
             last: 0,
             pieces: 0,
@@ -161,7 +159,6 @@ impl Tap {
         };
         own.note_listening();
         own.before = own.counts();
-        own.overruns = own.before.map_or(0, |own| own.overruns);
         Ok(own)
     }
 
@@ -203,13 +200,15 @@ impl Tap {
             Ear::Frames(_) => self.frames(now, &mut pieces),
             Ear::Opening(_) | Ear::Away => self.look_for_it(now, &mut pieces),
         }
-        if self.before.is_some() && self.looked.elapsed() >= AGAIN {
+        if let Ear::Octets(tap) = &mut self.ear
+            && self.looked.elapsed() >= AGAIN
+        {
             self.looked = Instant::now();
-            let overruns = self.counts().map_or(self.overruns, |own| own.overruns);
-            let lost = overruns.wrapping_sub(self.overruns);
-            self.overruns = overruns;
+            let lost = tap.take_lost();
             if lost > 0 {
-                let words = format!("{lost} or more bytes lost: the port's queue was full");
+                let words = format!(
+                    "{lost} or more bytes lost: the port's queue was full, or another program reads the port"
+                );
                 pieces.push(Piece::Event(now, words));
             }
         }
@@ -319,6 +318,8 @@ impl Tap {
                     }
                     TapPort::Link(_) | TapPort::Line(..) => {
                         self.ear = settings.open(&at).unwrap_or(Ear::Away);
+                        // The driver of an adapter that is plugged in again counts from 0.
+                        self.before = self.counts();
                     }
                 }
             }
