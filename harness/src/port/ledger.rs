@@ -1,5 +1,5 @@
-//! What the driver of a serial port counts beside what this program has sent and read there. More than that is another program's: root opens a
-//! port in the middle of a run, whoever has it.
+//! What the driver of a serial port counts beside what this program has sent and read there. More than that is another program's: root
+//! opens a port in the middle of a run, though the bench has it.
 
 use harness_uart::Counts;
 use std::time::{Duration, Instant};
