@@ -29,6 +29,13 @@ fn simulated_drives_that_disobey_end_with_exit_code_7() {
             "unitek-4.5-lengths",
         ),
         (line, "bus = \"nordac\"\n", on, "nordac-3.2.1-bit-1"),
+        // Its scenario passes.
+        (
+            line,
+            "bus = \"nordac\"\n",
+            "\"slave 8 deviates refuses-by-sc\"",
+            "nordac-en-1-end",
+        ),
     ] {
         let desk = desk(port, bus, setup);
         let run = ["run", "--rig", "desk.toml", "--allow-motion", "--filter"];
