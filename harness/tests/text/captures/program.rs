@@ -84,7 +84,7 @@ fn a_file_that_cannot_be_written_is_told() {
         "-o",
         "/no/such/folder/x.svg",
     ]);
-    assert_eq!(code(&output), 3);
+    assert_eq!(code(&output), 2);
     assert!(stderr(&output).contains("failed to write /no/such/folder/x.svg"));
 }
 
