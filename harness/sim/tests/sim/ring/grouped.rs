@@ -338,7 +338,7 @@ fn grouped_nd21s_do_what_each_does_by_itself() {
 }
 
 #[test]
-#[ignore = "takes 11 minutes of processor time; .ci/nightly runs it"]
+#[ignore = "takes more than 26 minutes of processor time; .ci/nightly runs it"]
 fn grouped_drives_do_what_each_does_in_a_million_rings() {
     let test = "grouped_drives_do_what_each_does_in_a_million_rings -- --ignored";
     play::<PlainDrive>(1_000_000, test);
