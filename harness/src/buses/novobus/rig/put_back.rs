@@ -4,11 +4,11 @@
 //! error until it is confirmed (14.10.1). A reset at the end would lose what was in RAM alone before the run (12.7), so each cell that differs
 //! is written. Positions, orders and what the drive's program works in are not put back: they are the drive's own.
 
-use super::session::Session;
+use super::session::{Session, come_round};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, Width};
 use crate::buses::novobus::guard::safe_state::telegram;
 use crate::guard::Guarded;
-use crate::link::Line;
+use crate::link::{Line, Octets as _};
 use crate::medium::Out;
 use crate::rig::Ends;
 use harness_proto::nd21::bits::{flags2, status};
@@ -339,7 +339,7 @@ impl Session {
     }
 }
 
-/// Does something with the drives of open rings.
+/// Does something with the drives of open rings. What was sent before is let back first: it would be taken for bytes that nobody has sent.
 fn with_bus<T>(
     link: &mut Guarded<Ends>,
     rings: &[RingSize],
@@ -349,6 +349,10 @@ fn with_bus<T>(
         patience: PATIENCE,
         ..Options::default()
     };
+    come_round(link);
+    for ring in 0..rings.len() {
+        while link.receive_octet(ring).is_some() {}
+    }
     let bus = OpenRings::open(Box::new(&mut *link), rings, options)?;
     let result = act(&bus);
     bus.close();

@@ -547,12 +547,13 @@ impl Session {
 
     /// Waits until what was sent has come round. The lines are silent then.
     pub(crate) fn settle(&mut self) {
-        self.come_round();
+        come_round(&mut self.link);
         self.link.begin();
     }
+}
 
-    fn come_round(&mut self) {
-        let end = self.link.now() + LONGEST_ROUND;
-        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
-    }
+/// Waits until what was sent has come round.
+pub(super) fn come_round(link: &mut Guarded<Ends>) {
+    let end = link.now() + LONGEST_ROUND;
+    while link.busy() && link.now() < end && link.wait(end) {}
 }

@@ -4,9 +4,10 @@ use super::super::busy::line::Stalls;
 use super::super::busy::{entry, rig, session};
 use super::super::run::Run;
 use super::*;
-use crate::link::{DriveFault, Link as _, LinkFault, Moment, Octets as _, PlacedFault};
+use crate::link::{DriveFault, Link as _, LinkFault, Moment, PlacedFault};
 use crate::scenario::argument::{MemoryKind, assignments};
 use crate::scenario::verdict::Verdict;
+use harness_proto::novobus::sync::SYNCO;
 
 /// The EEPROM, the monitoring, settings, an output, and an error (ND21 14.10.5, 14.10.2, 14.2.1, 10.4, 14.10.1).
 const CHANGES: &str = "title t\nring 3\n\
@@ -91,6 +92,27 @@ fn a_lost_byte_leaves_nothing_changed() {
         assert_eq!(session.link().unused_faults(), [""; 0], "byte {byte}");
         assert_eq!(all(&mut session), before, "byte {byte}");
     }
+}
+
+/// A ring behind a slow adapter still owes bytes when drives are read: they are let back first, and no drive is sent to the error mode for them.
+#[test]
+fn bytes_on_their_way_disturb_nothing() {
+    let rig = rig("");
+    let mut session = session(&rig, "", Stalls::new(1, 0)).expect("a ring");
+    let before = all(&mut session);
+    play(&mut session, CHANGES);
+    let _examined = session.examined();
+    session.link().begin();
+    session.link().inner_mut().send_octets(0, &[SYNCO; 2_000]);
+    let axes = session.axes();
+    let rings = session.rings().to_vec();
+    let disturbed = with_bus(session.link(), &rings, |bus| {
+        latched(bus, &axes)?;
+        Ok(bus.corrected_errors())
+    });
+    assert_eq!(disturbed, Ok(0));
+    assert_eq!(session.put_back(true), [""; 0]);
+    assert_eq!(all(&mut session), before);
 }
 
 /// ND21 9.9: drives that are not reached are named with the command that puts back what they held.

@@ -1,6 +1,6 @@
 //! The ways out of a session.
 
-use super::Session;
+use super::{Session, come_round};
 use crate::buses::simulated;
 use crate::guard::{Guarded, Safe, safe_state};
 use crate::link::{Line as _, Link as _};
@@ -91,7 +91,7 @@ impl Session {
 
     /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
     fn come_home(&mut self) {
-        self.come_round();
+        come_round(&mut self.link);
         if self.lock.is_none() || !self.link.at_rest() || self.link.busy() {
             return;
         }
