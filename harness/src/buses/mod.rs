@@ -39,7 +39,6 @@ pub use novobus::language::Novobus as DefaultBus;
 
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
-pub(crate) use nordac::cli::CyclicCommand;
 pub(crate) use nordac::senders::{LineRead, TelegramCutter};
 pub(crate) use unitek::dbc::dbc;
 
@@ -50,12 +49,14 @@ use crate::campaign::line::LineCampaign;
 use crate::capture::live::LiveText;
 use crate::capture::{Carries, RecordedPlace, ends};
 use crate::command::args::ListFormat;
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::fuzz::{LineFuzz, verify};
 use crate::command::held::HeldBench;
 use crate::command::output::Output;
 use crate::command::rig_failure::{exit_of, find_any_rig};
+use crate::command::rig_name::RigName;
 use crate::evidence::Signer;
 use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
@@ -75,7 +76,6 @@ use crate::serve::{ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt, serv
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
-use commands::{DriveCommand, RigName};
 use harness_proto::can::Frame;
 use harness_proto::line::{Format, Rate};
 use harness_proto::profibus::BusRate;

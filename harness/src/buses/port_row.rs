@@ -1,7 +1,7 @@
 //! What each bus knows of `[port.1]`, as a row of a table.
 
-use super::commands::DriveCommand;
 use super::{Bus, PortBus};
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::fuzz::LineFuzz;

@@ -9,17 +9,17 @@ use super::plot::PlotArguments;
 use super::rig::RigCommand;
 use super::shell::ShellArguments;
 use crate::buses::Bus;
-use crate::buses::commands::DriveCommand;
-use crate::buses::rings::rig::named::ring_size;
 use crate::capture::{NamedLink, UartFormat};
 use crate::command::args::{
     CellsArguments, ColourWhen, DeviationsArguments, ShowProgress, TableFormat, duration,
 };
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::fuzz::promote::PromoteArguments;
 use crate::command::fuzz::shrink::ShrinkArguments;
 use crate::evidence::Keep;
 use crate::partition::Partition;
+use crate::rig::rings::ring_size;
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
 use std::path::PathBuf;

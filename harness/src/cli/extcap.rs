@@ -5,7 +5,6 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use crate::buses::rings::rig::named::ring_size;
 use crate::buses::{Bus, carries_frames, example, has_rings};
 use crate::capture::{LiveRecorder, Tape};
 use crate::command::exit::Exit;
@@ -15,6 +14,7 @@ use crate::library::{Entry, sources};
 use crate::report::pcapng::LINK_TYPE;
 use crate::report::pcapng_frames;
 use crate::rig::find::{self, find};
+use crate::rig::rings::ring_size;
 use crate::scenario::run::AtMismatch;
 use crate::signals;
 use clap::{Args, Subcommand};

@@ -1,6 +1,6 @@
 //! A bench that a session holds, whatever its bus.
 
-use crate::buses::commands::DriveCommand;
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;

@@ -1,8 +1,11 @@
 //! What the commands of all buses share: exit codes, messages, files, an open bench and its live view.
 
 pub(crate) mod args;
+pub(crate) mod axes;
+pub(crate) mod cyclic;
 pub(crate) mod deviations;
 pub(crate) mod drawing;
+pub(crate) mod drive;
 pub(crate) mod exit;
 pub(crate) mod failure;
 pub(crate) mod file;
@@ -15,6 +18,8 @@ pub(crate) mod page;
 pub(crate) mod play;
 pub(crate) mod port_bench;
 pub(crate) mod rig_failure;
+pub(crate) mod rig_name;
+pub(crate) mod sim;
 pub(crate) mod top;
 mod top_page;
 pub(crate) mod watch;

@@ -292,6 +292,28 @@ fn break_at(line: &str, room: usize) -> Option<usize> {
     before.or_else(|| line[end..].find(' ').map(|at| end + at))
 }
 
+/// A table with a heading; each column is as wide as what stands in it.
+pub(crate) fn columns(heading: &[&str], rows: &[impl AsRef<[String]>]) -> String {
+    let mut widths: Vec<_> = heading.iter().map(|own| own.len()).collect();
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row.as_ref()) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        let padded: Vec<_> = cells
+            .zip(&widths)
+            .map(|(cell, width)| format!("{cell:width$}"))
+            .collect();
+        format!("{}\n", padded.join("  ").trim_end())
+    };
+    let mut text = line(&mut heading.iter().copied());
+    for row in rows {
+        text.push_str(&line(&mut row.as_ref().iter().map(String::as_str)));
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,7 +7,7 @@ use super::exit::Exit;
 use super::failure::{Failure, exit_of_trouble};
 use super::output::Output;
 use super::top_page::TopPage;
-use crate::buses::commands::TopArguments;
+use crate::command::drive::TopArguments;
 use crate::counted::counted;
 use crate::signals::{interrupt, interrupt_flag};
 use crate::top::screen::{ScreenInput, leave};

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::failure::Failure;
 use super::file;
 use super::output::Output;
-use crate::buses::commands::{WatchArguments, WatchForm};
+use crate::command::drive::{WatchArguments, WatchForm};
 use crate::report::chart::{Chart, Curve, MAX_CURVES, number_of};
 use crate::signals::interrupt_flag;
 use crate::trouble::Trouble;

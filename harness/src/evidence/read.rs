@@ -2,8 +2,8 @@
 //! place.
 
 use super::record::{RecordLine, SCHEMA};
-use crate::buses::rings::rig::named::rings;
 use crate::link::{Lead, LinkEvent, LinkFault, Moment, PlacedFault};
+use crate::rig::rings::rings;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 

@@ -2,7 +2,7 @@
 
 use super::check::{Rig, parse};
 use super::port_file::PortBus;
-use crate::buses::rings::rig::named::{simulated_rings, sizes_of_rings};
+use crate::rig::rings::{simulated_rings, sizes_of_rings};
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::source::{Source, SourceError};
 use include_dir::{Dir, include_dir};

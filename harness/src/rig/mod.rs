@@ -22,6 +22,7 @@ mod played;
 pub mod port_file;
 pub mod port_session;
 pub(crate) mod profile;
+pub mod rings;
 pub mod scan;
 pub(crate) mod segment;
 mod session_error;

@@ -1,18 +1,19 @@
 //! `drivebench start`, `exchange`, `on`, `off`, `quick-stop` and `acknowledge` on NORDAC inverters, and what other buses have too: `stop`,
 //! `block`, and `go` in a session.
 
-use super::args::{
-    AcknowledgeArguments, ExchangeArguments, OnArguments, StartArguments, StayArguments,
-};
 use super::bench::driver;
-use crate::buses::commands::{MoveArguments, OutputForm, SelectArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error, MASTER, Reached};
 use crate::buses::nordac::rig::{Inverters, Session};
-use crate::buses::nordac::value::{ExchangeStep, Setpoint, percentage, status, steps};
+use crate::buses::nordac::value::{ExchangeStep, percentage, status, steps};
+use crate::command::cyclic::{
+    AcknowledgeArguments, ExchangeArguments, OnArguments, Setpoint, StartArguments, StayArguments,
+};
+use crate::command::drive::{MoveArguments, OutputForm, SelectArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on as with, select, single};
+use crate::command::rig_name::Use;
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Image, ParameterRef};
@@ -314,7 +315,7 @@ pub(super) fn acknowledge(
 /// Does it to every slave, and shows what came of it as far as there is a text. A slave that fails does not keep the others from it.
 fn each(
     session: &mut Session,
-    wanted: &[crate::buses::commands::Axes],
+    wanted: &[crate::command::axes::Axes],
     output: &mut Output,
     mut call: impl FnMut(&mut Driver<'_>, u8) -> Result<Option<String>, Error>,
 ) -> Result<Exit, Failure> {

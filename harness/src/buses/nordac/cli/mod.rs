@@ -1,6 +1,5 @@
 //! Commands on NORDAC inverters: one file a command, over the driver [`crate::buses::nordac::driver`].
 
-mod args;
 mod bench;
 pub(crate) mod cells;
 mod check;
@@ -12,13 +11,13 @@ mod read;
 mod watch;
 mod write;
 
-pub(crate) use args::CyclicCommand;
 pub(super) use bench::Parked;
 pub(crate) use check::check;
 
 use super::driver;
-use crate::buses::commands::{DriveCommand, ParamsCommand};
 use crate::buses::nordac::rig::Inverters;
+use crate::command::cyclic::CyclicCommand;
+use crate::command::drive::{DriveCommand, ParamsCommand};
 use crate::command::exit::Exit;
 use crate::command::failure::{Failure, exit_of_trouble};
 use crate::command::output::Output;

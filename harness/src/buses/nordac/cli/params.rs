@@ -8,15 +8,16 @@
 use super::bench::driver;
 use super::read::{Found, find};
 use super::write::refuse_denied;
-use crate::buses::commands::{LoadArguments, ParamsArguments, Use};
 use crate::buses::nordac::driver::{Driver, Error};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Assignment, Cell, every, parameter, shown};
+use crate::command::drive::{LoadArguments, ParamsArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::file;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, single};
+use crate::command::rig_name::Use;
 use crate::counted::counted;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;

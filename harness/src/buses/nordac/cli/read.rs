@@ -1,14 +1,16 @@
 //! `drivebench read` on NORDAC inverters: process words and parameters, with their units.
 
 use super::bench::driver;
-use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::nordac::driver::{Driver, Error, percent};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, ReplyWord, cells, shown};
+use crate::command::drive::{OutputForm, ReadArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::output::columns;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use crate::command::watch::{HEX, decimal};
 use harness_proto::nordac::PkwError;
 use serde_json::json;

@@ -2,13 +2,14 @@
 
 use super::bench::{Master, driver};
 use super::read::{Found, find};
-use crate::buses::commands::{Use, WatchArguments};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Cell, cells};
+use crate::command::drive::WatchArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use crate::command::watch::{WatchBench, WatchedCell, watch as show};
 use harness_proto::time::{Instant, Span};
 

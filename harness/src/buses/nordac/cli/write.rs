@@ -1,14 +1,15 @@
 //! `drivebench write` on NORDAC inverters: parameters are written, and the value that the inverter answers is shown.
 
 use super::bench::driver;
-use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::nordac::driver::{Driver, Error, Written};
 use crate::buses::nordac::rig::Inverters;
 use crate::buses::nordac::value::{Assignment, assignments, shown};
+use crate::command::drive::WriteArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, Task};
 
 /// The parameters that are the address, and that load factory settings.

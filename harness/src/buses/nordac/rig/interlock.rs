@@ -7,7 +7,8 @@
 use super::known::Known;
 use super::talk::Talk;
 use super::{MASTER, RigSlave};
-use crate::buses::nordac::value::{Cell, ReplyWord, Setpoint, cells, percentage, setpoint};
+use crate::buses::nordac::value::{Cell, ReplyWord, cells, percentage};
+use crate::command::cyclic::{Setpoint, setpoint};
 use crate::guard::Watch;
 use crate::link::{Line, Trouble};
 use crate::medium::Heard;

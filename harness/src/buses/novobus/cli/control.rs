@@ -1,12 +1,13 @@
 //! `drivebench go`, `stop`, `block`, `reset`, `delete-error`: the modes of drives (ND21 11.8, 14.10).
 
-use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
-use super::rig::{self, OpenBench, RigName, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, State};
+use crate::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::rig_name::{RigName, Use};
 use crate::link::Line;
 use crate::rig::Session;
 use crate::scenario::run::reset_drives;

@@ -1,13 +1,14 @@
 //! Rings that a session holds.
 
-use super::args::DriveCommand;
-use super::rig::{OpenBench, Use};
+use super::rig::OpenBench;
 use crate::buses::novobus::language::plan::RingAct;
 use crate::buses::novobus::link::BesideTheBus;
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::held::{HeldBench, HeldRecord, record_from_now};
 use crate::command::output::Output;
+use crate::command::rig_name::Use;
 use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, PlayedScenario, Rig, Run, Session, SessionError, Shared, UseOptions};

@@ -1,16 +1,17 @@
 //! `drivebench info`: which drives there are, and how they are.
 
-use super::args::{InfoArguments, OutputForm};
 use super::axes;
-use super::read::columns;
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::buses::novobus::language::scale::shown;
+use crate::command::drive::{InfoArguments, OutputForm};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::output::columns;
 use crate::command::play::progress_bar;
+use crate::command::rig_name::Use;
 use crate::counted::counted;
 use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::{Date, Scale, Value};

@@ -1,6 +1,5 @@
 //! Commands on a bus: one file a command, over the driver [`crate::buses::novobus::driver`].
 
-mod args;
 mod axes;
 pub(crate) mod cells;
 mod control;
@@ -26,16 +25,8 @@ mod top_page;
 mod watch;
 mod write;
 
-pub(crate) use args::{
-    DeleteErrorArguments, DriveCommand, InfoArguments, LoadArguments, MoveArguments, OutputForm,
-    ParamsArguments, ParamsCommand, PositionArguments, ReadArguments, RigArguments,
-    SelectArguments, TopArguments, WatchArguments, WatchForm, WriteArguments,
-};
-pub(crate) use axes::Axes;
-pub(crate) use read::columns;
-pub(crate) use rig::{RigName, Use};
-
 use crate::buses::novobus::driver;
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::{Failure, exit_of_trouble};
 use crate::command::output::Output;

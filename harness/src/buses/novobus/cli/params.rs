@@ -1,15 +1,16 @@
 //! `drivebench params`: the parameters of a drive are saved, loaded and compared.
 
-use super::args::{LoadArguments, ParamsArguments, ParamsCommand};
 use super::axes;
 use super::params_file::{self, FileParameter, parameters};
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
+use crate::command::drive::{LoadArguments, ParamsArguments, ParamsCommand};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::file;
 use crate::command::output::Output;
+use crate::command::rig_name::Use;
 use crate::counted::counted;
 use crate::scenario::argument::{MemoryKind, MemoryRange};
 use crate::scenario::source::Source;

@@ -1,13 +1,14 @@
 //! `drivebench position`: a referencing run, a positioning, or both (ND21 13.2).
 
-use super::args::PositionArguments;
 use super::axes;
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::cell::find;
 use crate::buses::novobus::driver::{Axis, Error, OpenRings};
+use crate::command::drive::PositionArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::rig_name::Use;
 use crate::scenario::argument::{MemoryRange, cells};
 use crate::scenario::quantity::Quantity;
 use harness_proto::nd21::bits::{self, ps_status};

@@ -1,12 +1,13 @@
 //! `drivebench read`: cells of drives, with their units and bits.
 
-use super::args::{OutputForm, ReadArguments};
 use super::axes;
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::cell::{CellFound, find};
+use crate::command::drive::{OutputForm, ReadArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
-use crate::command::output::Output;
+use crate::command::output::{Output, columns};
+use crate::command::rig_name::Use;
 use crate::scenario::argument::{MemoryKind, MemoryRange, cells};
 use serde_json::json;
 
@@ -87,26 +88,4 @@ fn object(found: &CellFound<'_>) -> serde_json::Value {
         "bits": found.bits(),
         "section": found.location.cell().map(|cell| cell.section),
     })
-}
-
-/// A table with a heading; each column is as wide as what stands in it.
-pub(crate) fn columns(heading: &[&str], rows: &[impl AsRef<[String]>]) -> String {
-    let mut widths: Vec<_> = heading.iter().map(|own| own.len()).collect();
-    for row in rows {
-        for (width, cell) in widths.iter_mut().zip(row.as_ref()) {
-            *width = cell.chars().count().max(*width);
-        }
-    }
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let padded: Vec<_> = cells
-            .zip(&widths)
-            .map(|(cell, width)| format!("{cell:width$}"))
-            .collect();
-        format!("{}\n", padded.join("  ").trim_end())
-    };
-    let mut text = line(&mut heading.iter().copied());
-    for row in rows {
-        text.push_str(&line(&mut row.as_ref().iter().map(String::as_str)));
-    }
-    text
 }

@@ -1,13 +1,14 @@
 //! `drivebench recover`: a ring is brought back from the error mode (ND21 9.7, 9.8) and its drives are counted
 //! (9.3).
 
-use super::args::{OutputForm, RecoverArguments};
-use super::rig::{self, RigName, Use};
+use super::rig;
 use crate::buses::novobus::driver::{self, Axis, Recovery, SpelledOut, SpellingCause};
+use crate::command::drive::{OutputForm, RecoverArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::rig_failure::tell_end;
+use crate::command::rig_name::{RigName, Use};
 use crate::counted::counted;
 use crate::link::Line;
 use harness_proto::novobus::address::MAX_DRIVES;

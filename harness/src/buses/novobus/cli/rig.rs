@@ -1,20 +1,19 @@
 //! The benches that commands on drives work on. `sim:3`, or `sim:2,3` with two rings, is created for each command. A rig, given by its
 //! file or name, is taken and given back as by `run --rig`.
 
-use super::args::RigArguments;
 use super::axes;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
-use crate::buses::novobus::rig::named::sizes_of_rings;
+use crate::command::drive::RigArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_rig, tell_end};
+use crate::command::rig_name::{RigName, Use};
 use crate::counted::counted;
 use crate::link::{Line, Link};
 use crate::medium::{Heard, Medium, Out};
-use crate::rig::find::{or_meant, simulated_port};
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::Plan;
@@ -28,7 +27,6 @@ use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -37,60 +35,6 @@ const WARM: Span = Span::from_millis(200);
 
 /// How long a drive may take to process a confirmation: some of its cycles of 432 us (4.1).
 const CYCLES: Span = Span::from_millis(5);
-
-/// The name of a bench.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RigName {
-    /// Simulated rings with these numbers of drives.
-    Simulated(Vec<u8>),
-    /// A file, or a name that `rig list` shows.
-    Named(String),
-}
-
-impl FromStr for RigName {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let port = text.strip_prefix("sim:").and_then(simulated_port);
-        if let Some((_, drives)) = port {
-            return drives.map(|_| Self::Named(text.to_owned()));
-        }
-        match text.strip_prefix("sim:") {
-            Some(sizes) => match sizes_of_rings(sizes) {
-                Ok(sizes) => Ok(Self::Simulated(sizes)),
-                Err(reason) => Err(or_meant(sizes, reason)),
-            },
-            None => Ok(Self::Named(text.to_owned())),
-        }
-    }
-}
-
-/// What a command does with a bench.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Use {
-    /// The command's name, shown to other users who want the bench.
-    pub(crate) purpose: &'static str,
-    /// The command line allows motors to turn.
-    pub(crate) moves: bool,
-    /// The drives stay as they are after success: nothing was changed, or the user asked for it.
-    pub(crate) holds: bool,
-}
-
-impl Use {
-    /// For a command that changes nothing.
-    pub(crate) const fn look(purpose: &'static str) -> Self {
-        Self {
-            purpose,
-            moves: false,
-            holds: true,
-        }
-    }
-
-    /// Whether it changes nothing, so that a failure leaves the drives as they are.
-    pub(crate) const fn looks_only(&self) -> bool {
-        self.holds && !self.moves
-    }
-}
 
 /// A bench that has been opened.
 pub(crate) struct OpenBench {
@@ -274,7 +218,7 @@ pub(crate) fn on_after(
     first: impl FnOnce(&mut Session, &mut Output) -> Result<(), Failure>,
     act: impl FnOnce(&OpenBench, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    if let Some(bench) = &arguments.held {
+    if let Some(bench) = arguments.held.as_ref().and_then(|held| held.downcast_ref()) {
         return act(bench, output);
     }
     let Some(RigName::Named(name)) = &arguments.rig else {

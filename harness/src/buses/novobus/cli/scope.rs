@@ -1,18 +1,19 @@
 //! `drivebench scope`: the drive's oscilloscope is programmed, records and is plotted (ND21 14.10.6).
 
-use super::args::{Edge, ScopeArguments};
 use super::axes;
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use super::signal::Signal;
 use super::write::Orders;
 use crate::buses::novobus::driver::cell::CellFound;
 use crate::buses::novobus::driver::{Axis, Error, Measurement, ScopeSettings, Trigger};
 use crate::buses::novobus::language::syntax::Written;
 use crate::command::drawing::SCOPE_HEADING;
+use crate::command::drive::{Edge, ScopeArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::file;
 use crate::command::output::Output;
+use crate::command::rig_name::Use;
 use crate::report::chart::{Chart, Curve};
 use crate::report::plot::plot;
 use crate::scenario::argument::{MemoryRange, assignments};

@@ -1,14 +1,15 @@
 //! `drivebench top` on rings.
 
-use super::args::TopArguments;
 use super::axes;
-use super::rig::{self, OpenBench, RigName, Use};
+use super::rig::{self, OpenBench};
 use super::top_page::HeardLinks;
 use crate::buses::novobus::driver::{Axis, State, Width};
 use crate::buses::novobus::top::{DriveReading, FORM, RingReading};
+use crate::command::drive::TopArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::rig_name::{RigName, Use};
 use crate::command::top::{RateWindow, TopReader, TopScene, check, live, once};
 use crate::counted::counted;
 use crate::top::{HeadLine, Heading, Snapshot, Top, view};

@@ -1,13 +1,14 @@
 //! `drivebench watch` on a ring: the values of cells, again and again.
 
-use super::args::WatchArguments;
 use super::axes;
-use super::rig::{self, OpenBench, Use};
+use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{CellFound, find};
+use crate::command::drive::WatchArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::rig_name::Use;
 use crate::command::watch::{HEX, WatchBench, WatchedCell, watch as show};
 use crate::counted::counted;
 use crate::scenario::argument::{MemoryRange, cells};

@@ -11,7 +11,6 @@ pub(crate) mod interlock;
 pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
-pub mod named;
 mod put_back;
 pub(crate) mod run;
 pub(crate) mod session;

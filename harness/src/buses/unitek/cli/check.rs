@@ -1,7 +1,7 @@
 //! `drivebench rig check` of UNITEK drives: the bench is opened, and every drive is asked.
 
-use crate::buses::commands::Axes;
 use crate::buses::unitek::rig::Session;
+use crate::command::axes::Axes;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;

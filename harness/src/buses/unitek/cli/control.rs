@@ -1,13 +1,14 @@
 //! `drivebench go`, `stop`, `block` and `delete-error` on UNITEK drives.
 
 use super::write::{Order, refuse_denied};
-use crate::buses::commands::{DeleteErrorArguments, MoveArguments, SelectArguments, Use};
 use crate::buses::unitek::driver::{Driver, Error, Stopped};
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
+use crate::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use crate::rig::port_session::PortDrives as _;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;

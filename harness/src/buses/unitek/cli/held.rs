@@ -1,8 +1,8 @@
 //! Drives of a port that a session holds.
 
-use crate::buses::commands::DriveCommand;
 use crate::buses::unitek::rig::Player;
 use crate::buses::unitek::rig::UnitekDrives;
+use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::held::HeldDrives;

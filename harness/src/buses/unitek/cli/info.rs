@@ -2,16 +2,18 @@
 
 use super::control::how;
 use super::read::{Found, find};
-use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::unitek::live;
 use crate::buses::unitek::rig::UnitekDrives;
 use crate::buses::unitek::value::hex;
 use crate::capture::Piece;
+use crate::command::drive::{InfoArguments, OutputForm, TopArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::line_top::LineTop;
 use crate::command::output::Output;
+use crate::command::output::columns;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use crate::command::top::check as check_top;
 use crate::top::{TopColumn, TopForm, TopRow};
 use harness_proto::unitek::Register;

@@ -16,8 +16,8 @@ mod write;
 pub(crate) use check::check;
 
 use super::driver;
-use crate::buses::commands::{DriveCommand, ParamsCommand};
 use crate::buses::unitek::rig::UnitekDrives;
+use crate::command::drive::{DriveCommand, ParamsCommand};
 use crate::command::exit::Exit;
 use crate::command::failure::{Failure, exit_of_trouble};
 use crate::command::output::Output;

@@ -8,14 +8,16 @@
 
 use super::read::{Found, find};
 use super::write::{Order, refuse_denied};
-use crate::buses::commands::{Axes, LoadArguments, ParamsArguments, Use};
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{hex, is_parameter, register};
+use crate::command::axes::Axes;
+use crate::command::drive::{LoadArguments, ParamsArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::file;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, single};
+use crate::command::rig_name::Use;
 use crate::counted::counted;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;

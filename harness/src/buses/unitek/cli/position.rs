@@ -2,13 +2,14 @@
 
 use super::control::start_up;
 use super::write::refuse_denied;
-use crate::buses::commands::{PositionArguments, Use};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::rig::{Axis, UnitekDrives};
+use crate::command::drive::PositionArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, single};
+use crate::command::rig_name::Use;
 use crate::scenario::quantity::Quantity;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;

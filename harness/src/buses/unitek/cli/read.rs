@@ -1,13 +1,15 @@
 //! `drivebench read` on UNITEK drives: registers with their units and bits.
 
 use super::bench::scaling;
-use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers, words};
+use crate::command::drive::{OutputForm, ReadArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::output::columns;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use harness_proto::unitek::frame::Reply;
 use harness_proto::unitek::units::{Scaling, usual};
 use harness_proto::unitek::words::set_bits;

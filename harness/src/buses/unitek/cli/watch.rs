@@ -1,13 +1,14 @@
 //! `drivebench watch` on UNITEK drives: the values of registers, again and again.
 
 use super::read::{Found, find};
-use crate::buses::commands::{Use, WatchArguments};
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers};
+use crate::command::drive::WatchArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use crate::command::watch::{HEX, WatchBench, WatchedCell, decimal, watch as show};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Register;

@@ -1,14 +1,15 @@
 //! `drivebench write` on UNITEK drives: registers are set, read back and shown.
 
 use super::bench::scaling;
-use crate::buses::commands::{Use, WriteArguments};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::buses::unitek::value::{assignment, hex, words};
+use crate::command::drive::WriteArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::port_bench::{PortBench, on, select};
+use crate::command::rig_name::Use;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::master::Job;

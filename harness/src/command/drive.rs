@@ -1,14 +1,15 @@
 //! The arguments of the commands on a bus.
 
 use super::axes::Axes;
-use super::rig::{OpenBench, RigName};
+use super::cyclic::CyclicCommand;
+use super::drawing::DrawingArguments;
+use super::rig_name::RigName;
 use super::sim::{SIM_HELP, SimArguments};
-use crate::buses::CyclicCommand;
-use crate::command::drawing::DrawingArguments;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
 use harness_proto::time::Span;
+use std::any::Any;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -159,9 +160,9 @@ pub struct RigArguments {
     /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = duration, default_value = "0ms")]
     pub patience: Span,
-    /// The bench of a session, in place of one that is opened for the command.
+    /// The bench of a session, in place of one that is opened for the command: what the bus of its drives holds.
     #[arg(skip)]
-    pub(crate) held: Option<Rc<OpenBench>>,
+    pub(crate) held: Option<Rc<dyn Any>>,
 }
 
 /// For commands that change something on drives with ports.

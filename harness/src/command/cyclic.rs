@@ -1,9 +1,10 @@
-//! The arguments of the commands that only this bus has.
+//! The arguments of the commands on slaves with a cyclic master, and the setpoints that they take.
 
-use super::super::value;
-use crate::buses::commands::{Axes, OutputForm, RigArguments, SelectArguments};
+use super::axes::Axes;
+use super::drive::{OutputForm, RigArguments, SelectArguments};
 use crate::scenario::argument::duration;
 use clap::{Args, Subcommand};
+use harness_proto::nordac::words::FULL;
 use harness_proto::time::Span;
 
 const EXCHANGE_HELP: &str = "\
@@ -123,8 +124,8 @@ pub struct OnArguments {
     #[command(flatten)]
     pub select: SelectArguments,
     /// The setpoint: 50%, 20Hz, or four hexadecimal digits (4000 is the maximum frequency, 1205).
-    #[arg(long, value_name = "SPEED", default_value = "0%", value_parser = value::setpoint, allow_hyphen_values = true)]
-    pub setpoint: value::Setpoint,
+    #[arg(long, value_name = "SPEED", default_value = "0%", value_parser = setpoint, allow_hyphen_values = true)]
+    pub setpoint: Setpoint,
     /// How long.
     #[command(flatten)]
     pub stay: StayArguments,
@@ -142,4 +143,80 @@ pub struct AcknowledgeArguments {
     /// Acknowledge even if terminals may start a motor then.
     #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
+}
+
+/// A setpoint as it was given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setpoint {
+    /// As it travels: 4000h is the maximum frequency.
+    Raw(u16),
+    /// In 0.1 Hz.
+    Tenths(i32),
+}
+
+impl Setpoint {
+    /// The word, where the maximum frequency (1205) is `maximum` x 0.1 Hz; `None` where it does not fit a word.
+    #[must_use]
+    pub fn word(self, maximum: i64) -> Option<u16> {
+        match self {
+            Self::Raw(word) => Some(word),
+            Self::Tenths(0) => Some(0),
+            Self::Tenths(tenths) => {
+                let size = i64::from(tenths.unsigned_abs()) * i64::from(FULL);
+                // Half a step is rounded away from 0.
+                let raw = (2 * size + maximum).checked_div(2 * maximum)?;
+                let signed = raw * i64::from(tenths.signum());
+                i16::try_from(signed).ok().map(i16::cast_unsigned)
+            }
+        }
+    }
+}
+
+/// Reads one HSW: `50%`, `-20.5Hz`, `2000`.
+///
+/// # Errors
+/// What is wrong and what is expected, in a sentence.
+pub(crate) fn setpoint(text: &str) -> Result<Setpoint, String> {
+    let text = text.trim();
+    let wrong = |why: &str| format!("`{text}` is no setpoint: {why}");
+    let ends = |unit: &str| {
+        let split = text.len().checked_sub(unit.len())?;
+        let (number, end) = (text.get(..split)?, text.get(split..)?);
+        end.eq_ignore_ascii_case(unit).then_some(number.trim())
+    };
+    let number = |text: &str| text.parse::<f64>().ok().filter(|own| own.is_finite());
+    if let Some(number) = ends("%").map(number) {
+        let raw = number.map(|own| (own * f64::from(FULL) / 100.0).round());
+        let fits = raw.filter(|raw| (-32_768.0..=32_767.0).contains(raw));
+        return fits
+            .map(|raw| Setpoint::Raw((raw as i16).cast_unsigned()))
+            .ok_or_else(|| wrong("a number from -200% to 199.99% expected"));
+    }
+    if let Some(number) = ends("Hz").map(number) {
+        let fits = number.filter(|own| own.abs() <= 2_000.0);
+        return fits
+            .map(|own| Setpoint::Tenths((own * 10.0).round() as i32))
+            .ok_or_else(|| wrong("a number up to 2000Hz expected"));
+    }
+    match word(text) {
+        Ok(raw) => Ok(Setpoint::Raw(raw)),
+        Err(_) => Err(wrong("50%, 20.0Hz or four hexadecimal digits expected")),
+    }
+}
+
+/// Four hexadecimal digits, with or without `0x`.
+///
+/// # Errors
+/// What is expected, in a sentence.
+pub(crate) fn word(text: &str) -> Result<u16, String> {
+    let digits = text.trim();
+    let digits = digits
+        .strip_prefix("0x")
+        .or_else(|| digits.strip_prefix("0X"))
+        .unwrap_or(digits);
+    let plain = digits.len() == 4 && digits.bytes().all(|own| own.is_ascii_hexdigit());
+    u16::from_str_radix(digits, 16)
+        .ok()
+        .filter(|_| plain)
+        .ok_or_else(|| format!("`{text}` is no word: four hexadecimal digits expected"))
 }
