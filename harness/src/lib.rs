@@ -46,6 +46,8 @@ mod signals;
 mod trouble;
 
 #[doc(hidden)]
+pub mod bus;
+#[doc(hidden)]
 pub mod buses;
 #[doc(hidden)]
 pub mod campaign;

@@ -1,6 +1,7 @@
 //! Where scenarios come from: the files and folders that are named, or the built-in ones.
 
-use crate::buses::{Bus, settle};
+use crate::bus::Bus;
+use crate::buses::settle;
 use crate::regular;
 use crate::scenario::parse::{self, parse};
 use crate::scenario::plan::{Plan, plan};

@@ -1,6 +1,7 @@
 //! The manuals' tables and examples, which scenario pins each, and the errata ledgers.
 
-use crate::buses::{Bus, MANUALS};
+use crate::bus::Bus;
+use crate::buses::MANUALS;
 use crate::library::Entry;
 use serde::Deserialize;
 

@@ -1,6 +1,7 @@
 //! What the drives of a bus hold, for lists and completions, and how they can deviate.
 
-use super::{Bus, nordac, novobus, unitek};
+use super::{nordac, novobus, unitek};
+use crate::bus::Bus;
 use crate::command::args::CellsArguments;
 use crate::command::deviations::DeviationRow;
 use crate::command::exit::Exit;

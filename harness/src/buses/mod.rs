@@ -30,8 +30,6 @@ pub mod run {
     pub use super::novobus::language::run::record::{CellRecord, MAX_SAMPLES, Sample};
 }
 
-pub(crate) use harness_proto::novobus::address::MAX_DRIVES as MOST_IN_A_RING;
-pub(crate) use harness_proto::novobus::guard::LimitSetting;
 pub(crate) use novobus::language::parse::header;
 
 /// The bus of a scenario without a `bus` line.
@@ -45,6 +43,7 @@ pub(crate) use unitek::dbc::dbc;
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 
+use crate::bus::Bus;
 use crate::campaign::line::LineCampaign;
 use crate::capture::live::LiveText;
 use crate::capture::{Carries, RecordedPlace, ends};
@@ -506,39 +505,6 @@ impl AnyStimulus {
     }
 }
 
-/// The buses of the product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Bus {
-    /// The ND21's ring.
-    Novobus,
-    /// UNITEK DS/BAMOCAR on CAN.
-    Unitek,
-    /// NORDAC vector on PROFIBUS DP.
-    Nordac,
-}
-
-impl Bus {
-    /// The names in a scenario.
-    pub const NAMES: [(&'static str, Self); 3] = [
-        ("novobus", Self::Novobus),
-        ("unitek", Self::Unitek),
-        ("nordac", Self::Nordac),
-    ];
-
-    /// The bus of a scenario without a `bus` line.
-    pub const DEFAULT: Self = Self::Novobus;
-
-    /// The name in a scenario, and of its folders in `corpora/scenarios` and `snapshots/scenarios`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Novobus => "novobus",
-            Self::Unitek => "unitek",
-            Self::Nordac => "nordac",
-        }
-    }
-}
-
 /// Serves simulated drives of a bus of frames: as many, with what a header says of them.
 ///
 /// # Errors
@@ -556,21 +522,6 @@ pub(crate) fn serve_frames(
         }
         Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
     }
-}
-
-/// Whether the drives of a bus stand in rings, whose number of drives a scenario takes from its bench.
-pub(crate) const fn has_rings(bus: Bus) -> bool {
-    matches!(bus, Bus::Novobus)
-}
-
-/// Whether a bus carries frames.
-pub(crate) const fn carries_frames(bus: Bus) -> bool {
-    matches!(bus, Bus::Unitek)
-}
-
-/// Whether the stations of a bus share a line of octets.
-pub(crate) const fn shares_octets(bus: Bus) -> bool {
-    matches!(bus, Bus::Nordac)
 }
 
 /// Serves simulated drives of a shared line of octets, those with these addresses and those of a header, to a master at each place of the options.

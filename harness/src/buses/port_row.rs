@@ -1,6 +1,7 @@
 //! What each bus knows of `[port.1]`, as a row of a table.
 
-use super::{Bus, PortBus};
+use super::PortBus;
+use crate::bus::Bus;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;

@@ -35,10 +35,10 @@ pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
 pub(crate) use tape::Tape;
 
-use crate::buses::MOST_IN_A_RING;
 use crate::counted::counted;
 use crate::regular::{self, Links};
 use harness_proto::line::Rate;
+use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Carried, Channel, Remark, Trace};
@@ -183,7 +183,7 @@ pub(crate) fn end(text: &str) -> Option<Option<u8>> {
     }
     let number: u16 = text.parse().ok()?;
     let drive = u8::try_from(number).ok()?;
-    (number < MOST_IN_A_RING).then_some(Some(drive))
+    (number < MAX_DRIVES).then_some(Some(drive))
 }
 
 /// Whether a link can have these ends (ND21 8.5).

@@ -5,7 +5,8 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use crate::buses::{Bus, carries_frames, example, has_rings};
+use crate::bus::Bus;
+use crate::buses::example;
 use crate::capture::{LiveRecorder, Tape};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -143,7 +144,7 @@ fn interfaces() -> String {
     let mut text = format!("extcap {{version={version}}}{{display=drivebench}}\n");
     for (name, bus) in Bus::NAMES {
         let value = simulated_interface(bus);
-        let what = match has_rings(bus) {
+        let what = match bus.has_rings() {
             true => "simulated ring".to_owned(),
             false => format!("simulated {name}"),
         };
@@ -171,7 +172,7 @@ fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
     let rig = rig.and_then(|name| find(name, &find::folder()).ok());
     let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
-    let frames = adapter || simulated_bus(interface).is_some_and(carries_frames);
+    let frames = adapter || simulated_bus(interface).is_some_and(Bus::carries_frames);
     let (number, name, display) = match frames {
         true => (pcapng_frames::LINK_TYPE, "CAN_SOCKETCAN", "CAN frames"),
         false => (LINK_TYPE, "RTAC_SERIAL", "Serial lines"),
@@ -185,7 +186,7 @@ fn config(interface: &str) -> String {
         return String::new();
     };
     let rig = "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n";
-    let rig = if has_rings(bus) { rig } else { "" };
+    let rig = if bus.has_rings() { rig } else { "" };
     format!(
         "{rig}arg {{number=1}}{{call=--scenario}}{{display=Scenario}}{{type=string}}{{default={}}}{{tooltip=drivebench list names them}}\n",
         example(bus)
@@ -232,13 +233,15 @@ fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, Strin
     let [source] =
         <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
     let drives = match &arguments.rig {
-        Some(rig) if !has_rings(bus) => {
+        Some(rig) if !bus.has_rings() => {
             return Err(format!(
                 "--rig {rig}: a scenario of {} says which drives it has; leave --rig out",
                 bus.name()
             ));
         }
-        rig => has_rings(bus).then(|| ring(rig.as_deref().unwrap_or(RING))),
+        rig => bus
+            .has_rings()
+            .then(|| ring(rig.as_deref().unwrap_or(RING))),
     };
     let drives = drives.transpose()?;
     let entry = Entry::fitting(source, drives).map_err(|problems| problems.to_string())?;

@@ -2,7 +2,8 @@
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
+use crate::bus::Bus;
+use crate::buses::{self, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, CaptureError, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings,

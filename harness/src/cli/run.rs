@@ -5,7 +5,7 @@ use super::junit::Cases;
 use super::run_rig::{PlayOrder, reports, state_size, work};
 use super::run_segment;
 use super::tally::{EarlierVerdicts, Tally};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{Page, writable};

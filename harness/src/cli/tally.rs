@@ -199,11 +199,11 @@ pub(crate) fn counts(verdicts: &[Verdict]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::LimitSetting;
     use crate::link::Capability;
     use crate::manual::Manual;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
+    use harness_proto::novobus::guard::LimitSetting;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();

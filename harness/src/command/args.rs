@@ -1,6 +1,6 @@
 //! Options that several commands have.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::file::values::{Time, ValueError};
 use clap::{Args, ValueEnum};
 use std::time::Duration;

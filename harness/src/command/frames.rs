@@ -1,6 +1,6 @@
 //! Where `sim` serves drives on a bus of frames, and the drives of a shared line.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::serve::ServedAt;
 use crate::serve::frames::{FramePlace, Protocol};
 use clap::Args;

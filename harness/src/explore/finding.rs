@@ -3,7 +3,7 @@
 use super::Case;
 use super::files::{read_text, write_whole};
 use super::{ExploreError, FuzzCase};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,8 @@
 
 use super::files::write_whole;
 use super::{Differing as _, ExploreError, Finding, FuzzCase};
-use crate::buses::{Bus, MANUALS};
+use crate::bus::Bus;
+use crate::buses::MANUALS;
 use crate::library::Entry;
 use crate::report::page::page;
 use crate::scenario::run::AtMismatch;

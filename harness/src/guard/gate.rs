@@ -1,8 +1,8 @@
 //! What one port may send.
 
-use crate::buses::LimitSetting;
 use crate::link::{Line, Moment, PlacedFault};
 use crate::medium::{Heard, Out};
+use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::time::Instant;
 use std::any::Any;
 use std::fmt;

@@ -2,12 +2,12 @@
 
 use super::Watch;
 use super::gate::{Denied, Gate};
-use crate::buses::LimitSetting;
 use crate::link::{
     Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble, wait_keeping,
 };
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
+use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;

@@ -12,7 +12,7 @@ use super::run::outcome::{ByteDifference, Mismatch, Stop};
 use super::run::player::{MAX_ROUND, Runner};
 use super::scanner::Scanner;
 use super::syntax::Scenario;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::link::{Capability, Link, LinkFault};
 use crate::traffic::SegmentReport;
 use harness_proto::time::{Instant, Span};

@@ -3,7 +3,8 @@
 //! Everything that makes a scenario, from a fuzzing run to a capture, makes the values of [`syntax`](super::syntax) and leaves the text to
 //! this file and to the buses' `write`.
 
-use super::syntax::{Action, Bus, Scenario, Step, When};
+use super::syntax::{Action, Scenario, Step, When};
+use crate::bus::Bus;
 use crate::buses;
 use crate::scenario::language::Language;
 use std::fmt::Write as _;

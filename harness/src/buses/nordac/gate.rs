@@ -1,10 +1,10 @@
 //! The gate of a segment of NORDAC inverters: every octet is judged by the telegrams that it can complete (NORDAC 3, EN 1, 2).
 
-use crate::buses::LimitSetting;
 use crate::guard::{Denied, Gate, Guarded};
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nordac::guard::{self, Denial, GuardedSlave, Limits, Missing};
+use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use std::any::Any;

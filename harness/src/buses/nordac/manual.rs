@@ -1,6 +1,6 @@
 //! The manual of PROFIBUS DP for NORDAC *vector*.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::manual::{Manual, Open};
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 

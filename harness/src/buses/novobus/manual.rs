@@ -1,6 +1,6 @@
 //! The ND21 User Manual.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::manual::{Manual, Open};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;

@@ -3,7 +3,7 @@
 use super::bench::Bench;
 use super::report::ValveReport;
 use super::valve::Said;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::link::{Capability, Link};
 use crate::medium::Out;
 use crate::scenario::expression::Scope;

@@ -1,10 +1,10 @@
 //! The gate of a segment of UNITEK drives: every frame is judged by what a drive would read out of it (UNITEK chapters 4 and 5).
 
-use crate::buses::LimitSetting;
 use crate::guard::{Denied, Gate, Guarded};
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, Frame};
+use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::time::Instant;
 use harness_proto::unitek::guard::{self, Denial, Limits, Missing};
 use std::any::Any;

@@ -1,6 +1,6 @@
 //! The UNITEK DS CAN-BUS manual.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::manual::{Manual, Open};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 

@@ -10,7 +10,8 @@ mod session;
 
 pub(crate) use request::schema;
 
-use crate::buses::{Bus, hold};
+use crate::bus::Bus;
+use crate::buses::hold;
 use crate::command::args::{ColourWhen, ShowProgress, duration};
 use crate::command::exit::Exit;
 use crate::command::output::{Output, Stream};

@@ -416,7 +416,7 @@ impl<P: ExternalPrinter> Write for AbovePrompt<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::Bus;
+    use crate::bus::Bus;
 
     fn line(text: &str) -> String {
         match read_line(text) {

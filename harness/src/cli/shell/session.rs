@@ -6,7 +6,7 @@ use super::inbox::{LineWriter, RequestReader, SessionItem};
 use super::people::{self, Turn};
 use super::people_output;
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::help::command;
 use crate::command::exit::Exit;

@@ -3,7 +3,8 @@
 use super::exit_of_cases;
 use super::rig::tell;
 use super::watch::{Telling, summary};
-use crate::buses::{Bus, deviations};
+use crate::bus::Bus;
+use crate::buses::deviations;
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;

@@ -3,7 +3,7 @@
 use super::generate::Maker;
 use super::text::text;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::explore::promote::Promotes;
 use crate::explore::smaller::Acts;
 use crate::explore::{

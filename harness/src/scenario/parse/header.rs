@@ -2,12 +2,13 @@
 
 use super::step;
 use super::words::named;
+use crate::bus::Bus;
 use crate::link::Capability;
 use crate::scenario::language::Language;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Action, Bus, Citation, Scenario, Step};
+use crate::scenario::syntax::{Action, Citation, Scenario, Step};
 use crate::scenario::times;
 
 /// The most lines of a scenario.

@@ -1,10 +1,10 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
-use crate::buses::LimitSetting;
+use crate::bus::Bus;
 use crate::link::{Capability, Link, is_wrong_parity};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
-use crate::scenario::syntax::Bus;
+use harness_proto::novobus::guard::LimitSetting;
 use std::collections::BTreeSet;
 use std::fmt;
 

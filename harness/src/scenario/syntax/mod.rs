@@ -2,5 +2,4 @@
 
 mod scenario;
 
-pub use crate::buses::Bus;
 pub use scenario::*;

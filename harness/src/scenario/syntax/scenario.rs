@@ -1,6 +1,7 @@
 //! The scenario, its header and its steps.
 
-use crate::buses::{Bus, DefaultBus};
+use crate::bus::Bus;
+use crate::buses::DefaultBus;
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::language::Language;

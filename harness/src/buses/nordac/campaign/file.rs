@@ -1,7 +1,7 @@
 //! What stands in a campaign file of this bus (`corpora/campaigns/nordac/*.toml`).
 
 use super::CLASSES;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::file::values::Time;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::parameter::ParameterRef;

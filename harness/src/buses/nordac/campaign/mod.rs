@@ -12,7 +12,7 @@ mod tests;
 pub use converse::{Conversation, SlaveState, StepEnd};
 pub use file::{CampaignStep, TelegramCampaignFile};
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};

@@ -6,7 +6,7 @@ use super::idiom::idiom;
 use super::oracle::{self, TelegramDifference};
 use super::play::{Done, TelegramsSeen, play};
 use super::text::steps;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::nordac::judge::Symptom;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::manual::MANUAL;

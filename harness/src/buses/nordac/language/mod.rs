@@ -12,7 +12,7 @@ pub use jobs::KnownSlaves;
 
 use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, TelegramStep};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::nordac::report::TelegramReport;
 use crate::buses::nordac::simulate;
 use crate::link::Link;

@@ -15,7 +15,7 @@
 //! | `bytes` of a telegram | its octets as they arrived |
 
 use super::telegrams::{octets, said};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use harness_sim::record::Trace;
 use serde::{Serialize, Serializer};
 use std::io::Write;

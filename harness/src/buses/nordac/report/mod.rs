@@ -18,7 +18,7 @@ pub(super) use telegrams::{octet_time, octets};
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::report::html::Html;
 use crate::traffic::{SegmentReport, SharedForm, drawn, no_form};
 use harness_sim::record::Trace;

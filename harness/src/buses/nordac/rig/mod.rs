@@ -19,7 +19,7 @@ pub use session::{Inverters, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::port_row::PortRow;
 use crate::command::fuzz::LineFuzz;
 use crate::command::held::HeldPort;

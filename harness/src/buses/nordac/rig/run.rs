@@ -5,7 +5,7 @@ use super::profile::Profiled;
 use super::qualify::{conversations, qualify};
 use super::session::{Inverters, patience_of};
 use super::{Session, limits, rate, setup, slaves};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::nordac::simulate::Bench;
 use crate::buses::nordac::stream::TOLERANCE;
 use crate::link::{Capability, Link, LinkEvent, Replay};

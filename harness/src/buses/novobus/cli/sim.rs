@@ -1,7 +1,8 @@
 //! `drivebench sim`: simulated rings for anyone's master.
 
 use super::rig;
-use crate::buses::{self, Bus};
+use crate::bus::Bus;
+use crate::buses::{self};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
@@ -72,7 +73,7 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
     }
     let end = match arguments.frames.bus {
         Bus::Novobus => rings(arguments, output)?,
-        bus if buses::shares_octets(bus) => octets(bus, arguments, output)?,
+        bus if bus.shares_octets() => octets(bus, arguments, output)?,
         bus => frames(bus, arguments, output)?,
     };
     let end = end.map_err(|error| match error {

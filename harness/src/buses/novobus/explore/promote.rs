@@ -1,6 +1,6 @@
 //! What is kept of a finding on a ring: an input of the fuzz targets beside its scenario.
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::explore::promote::Promotes;
 use crate::explore::{Act, ActKind, Case, ExploreError, Finding, Harm};
 

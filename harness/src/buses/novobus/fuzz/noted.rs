@@ -1,5 +1,6 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
+use crate::bus::Bus;
 use crate::capture::{self, CaptureError};
 use crate::evidence;
 use crate::fuzz::{rig as rig_body, scenario as scenario_body};
@@ -8,7 +9,7 @@ use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Bus, Scenario};
+use crate::scenario::syntax::Scenario;
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
 use harness_sim::fuzz::{Feature, Notebook};

@@ -13,7 +13,7 @@ use self::run::bytes;
 use self::run::record::CellRecord;
 use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::novobus::simulate;
 use crate::link::{Link, LinkFault, Octets as _};
 use crate::scenario::language::{Language, Opening};

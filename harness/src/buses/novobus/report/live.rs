@@ -1,11 +1,11 @@
 //! The bytes of a link as lines of text while they arrive: a line a telegram, its bytes and what they say.
 
 use super::meaning::{ByteRole, Meaning, Observer};
-use crate::buses::MOST_IN_A_RING;
 use crate::buses::novobus::locate::{FALSE, Location, locate};
 use crate::capture::Piece;
 use crate::capture::live::{LiveLine, LiveText};
 use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::MAX_DRIVES;
 use std::fmt::Write as _;
 
 /// The most bytes of a line that is no telegram.
@@ -161,7 +161,7 @@ impl LinkText {
 
     /// The drive that the first of the bytes since the last check sequence spell out.
     fn spelled(&self, bytes: usize) -> Option<Location> {
-        let drives = self.drives.unwrap_or(MOST_IN_A_RING as u8);
+        let drives = self.drives.unwrap_or(MAX_DRIVES as u8);
         locate(&self.heard[..bytes], drives)
     }
 

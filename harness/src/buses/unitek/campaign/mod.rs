@@ -10,7 +10,7 @@ pub mod file;
 pub use converse::{Conversation, JobEnd};
 pub use file::{CampaignStep, FrameCampaignFile};
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};

@@ -6,7 +6,7 @@ use super::idiom::idiom;
 use super::oracle::{self, FrameDifference};
 use super::play::{FramesSeen, play};
 use super::text::steps;
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::unitek::judge::FrameSymptom;
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::manual::MANUAL;

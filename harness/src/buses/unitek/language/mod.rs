@@ -13,7 +13,7 @@ pub(crate) use write::identifier;
 
 use self::plan::{Act, Planner, WantedFrame};
 use self::syntax::{FrameStep, Header, Message};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::unitek::report::FrameReport;
 use crate::buses::unitek::simulate;
 use crate::link::Link;

@@ -376,7 +376,7 @@ fn damaged_scenarios() {
             }
         }
         let source = source(&text);
-        if crate::scenario::parse::bus(&source) != crate::buses::Bus::Unitek {
+        if crate::scenario::parse::bus(&source) != crate::bus::Bus::Unitek {
             continue;
         }
         if let Ok(scenario) = parse::<Unitek>(&source) {

@@ -14,7 +14,7 @@
 //! | `from` | `"master"` or the drive's number |
 //! | `fault` | `null`, `"lost"`, or the error that ended the frame: `"error-frame"`, `"no-acknowledge"`, `"bus-off"` |
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use serde::{Serialize, Serializer};
 use std::io::Write;

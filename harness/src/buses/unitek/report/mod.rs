@@ -6,7 +6,7 @@ pub mod json;
 pub(crate) mod sequence;
 pub mod table;
 
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::report::html::Html;
 use crate::report::pcapng_frames;
 use crate::traffic::{SegmentReport, SharedForm, drawn};

@@ -20,7 +20,7 @@ pub use session::{Session, UnitekDrives};
 use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::port_row::PortRow;
 use crate::command::fuzz::LineFuzz;
 use crate::command::held::HeldPort;

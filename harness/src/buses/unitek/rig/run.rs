@@ -6,7 +6,7 @@ use super::qualify::{conversations, qualify};
 use super::session::UnitekDrives;
 use super::set_back::set_back;
 use super::{Session, axes, limits, rate};
-use crate::buses::Bus;
+use crate::bus::Bus;
 use crate::buses::unitek::simulate::Bench;
 use crate::link::frames::SLACK;
 use crate::link::{Link, LinkEvent, Replay};

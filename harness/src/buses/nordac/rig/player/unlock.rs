@@ -1,12 +1,12 @@
 //! What in the rig's file would let a scenario be played that is skipped.
 
 use super::{Own, Player};
-use crate::buses::LimitSetting;
 use crate::buses::nordac::rig::known::{INTERFACE, Known};
 use crate::buses::nordac::rig::{MASTER, RigSlave};
 use crate::scenario::run::Unlock;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::{Highest, Limits};
+use harness_proto::novobus::guard::LimitSetting;
 use std::collections::BTreeSet;
 
 /// A setting of `[limits]` that can keep a scenario from being played.
