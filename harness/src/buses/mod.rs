@@ -27,7 +27,6 @@ pub mod run {
         NotReady, play_over_bus, reset_drives, start_anew,
     };
     pub(crate) use super::novobus::language::run::over_bus::{come_home, read_byte};
-    pub use super::novobus::language::run::record::{CellRecord, MAX_SAMPLES, Sample};
 }
 
 pub(crate) use novobus::language::parse::header;
@@ -84,7 +83,6 @@ use harness_sim::record::{Carried, LineByte, Trace};
 use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -473,35 +471,6 @@ fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit
         Ok(exit) => Ok(exit),
         Err(Failure::Output(error)) => Err(error),
         Err(failure) => Ok(failure.tell(output)),
-    }
-}
-
-/// What happens to a drive from outside the bus, by the bus that it is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AnyStimulus {
-    /// To an ND21.
-    Novobus(harness_sim::nd21::Stimulus),
-    /// To a UNITEK drive.
-    Unitek(harness_sim::unitek::Stimulus),
-    /// To a NORDAC inverter, or on its line.
-    Nordac(nordac::simulate::Happening),
-}
-
-impl fmt::Display for AnyStimulus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Novobus(stimulus) => f.write_str(&novobus::language::write::stimulus(stimulus)),
-            Self::Unitek(stimulus) => stimulus.fmt(f),
-            Self::Nordac(stimulus) => stimulus.fmt(f),
-        }
-    }
-}
-
-impl AnyStimulus {
-    /// Whether it changes what the line carries.
-    #[must_use]
-    pub const fn is_on_line(self) -> bool {
-        matches!(self, Self::Nordac(nordac::simulate::Happening::Line(_)))
     }
 }
 

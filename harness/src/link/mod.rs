@@ -16,6 +16,7 @@ mod replay;
 pub(crate) mod stamp;
 #[cfg(test)]
 pub(crate) mod stands_still;
+mod stimulus;
 pub(crate) mod tamper;
 
 pub use crate::trouble::Trouble;
@@ -25,10 +26,10 @@ pub use inner::{Delay, InnerLink, InnerPorts};
 pub use octets::Octets;
 pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;
+pub use stimulus::AnyStimulus;
 pub(crate) use tamper::is_wrong_parity;
 pub use tamper::{needs_line_errors, only_simulated};
 
-use crate::buses::AnyStimulus;
 use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Switch};
 use harness_proto::line::Received;

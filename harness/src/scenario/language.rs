@@ -7,9 +7,9 @@
 use super::expression::Scope;
 use super::plan::{Plan, PlannedStep, Unroll};
 use super::problem::{Problem, Spanned, TextSpan};
-use super::run::CellRecord;
 use super::run::outcome::{ByteDifference, Mismatch, Stop};
 use super::run::player::{MAX_ROUND, Runner};
+use super::run::record::CellRecord;
 use super::scanner::Scanner;
 use super::syntax::Scenario;
 use crate::bus::Bus;

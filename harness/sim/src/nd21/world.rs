@@ -3,6 +3,11 @@
 
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::{Input, Inputs};
+use harness_proto::nd21::units::INCREMENTS_PER_TURN;
+use std::fmt;
+
+/// Digits behind the point of a position in turns: enough to tell one increment from the next.
+const TURN_DECIMALS: usize = 6;
 
 /// A change at a drive from outside the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +38,57 @@ pub enum Stimulus {
     Short(bool),
     /// The drive's own monitoring reports this error, whatever its reason.
     Error(ErrorCode),
+}
+
+impl fmt::Display for Stimulus {
+    /// As a scenario writes it: `analogue 500mV`, `error 0504`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let on = |on: bool| if on { "on" } else { "off" };
+        match *self {
+            Self::Input(input, high) => {
+                write!(
+                    f,
+                    "input {} {}",
+                    input.name(),
+                    if high { "high" } else { "low" }
+                )
+            }
+            Self::Cam(input, from, to) => {
+                write!(f, "cam {} {}..{}", input.name(), turns(from), turns(to))
+            }
+            Self::Analogue(millivolts) => write!(f, "analogue {millivolts}mV"),
+            Self::Frequency(hertz) => write!(f, "frequency {hertz}Hz"),
+            Self::Cooler(tenths) => {
+                let sign = if tenths < 0 { "-" } else { "" };
+                let tenths = tenths.unsigned_abs();
+                write!(f, "cooler {sign}{}.{}C", tenths / 10, tenths % 10)
+            }
+            Self::MotorSensor(ohms) => write!(f, "motor-sensor {ohms}ohm"),
+            Self::Rail(volts) => write!(f, "rail {volts}V"),
+            Self::Load(milliamperes) => write!(f, "load {milliamperes}mAeff"),
+            Self::Resolver(plugged) => write!(f, "resolver {}", on(plugged)),
+            Self::Jammed(held) => write!(f, "rotor {}", if held { "jammed" } else { "free" }),
+            Self::Short(short) => write!(f, "phases {}", if short { "shorted" } else { "sound" }),
+            // A step gives it as a fault; no line of this kind does.
+            Self::Error(error) => write!(f, "error {:04X}", error.code()),
+        }
+    }
+}
+
+/// A position in increments as turns.
+fn turns(increments: i64) -> String {
+    let per_turn = i64::from(INCREMENTS_PER_TURN);
+    let unit = 10_i64.pow(6);
+    let parts = (increments * unit * 2 + per_turn).div_euclid(per_turn * 2);
+    let sign = if parts < 0 { "-" } else { "" };
+    let parts = parts.unsigned_abs();
+    let unit = unit.unsigned_abs();
+    format!(
+        "{sign}{}.{:0width$}turns",
+        parts / unit,
+        parts % unit,
+        width = TURN_DECIMALS
+    )
 }
 
 /// The outputs of a drive outside the bus.

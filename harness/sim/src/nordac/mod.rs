@@ -22,7 +22,7 @@ pub mod slave;
 
 pub use drive::Drive;
 pub use inverter::Inverter;
-pub use setup::{History, InverterSetup};
+pub use setup::{History, InverterSetup, Stimulus};
 pub use slave::Slave;
 
 use crate::octet_segment::OctetSegment;

@@ -1,7 +1,8 @@
-//! How a simulated drive is set up before power-up.
+//! How a simulated drive is set up before power-up, and what happens to it from outside its bus.
 
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::Properties;
+use std::fmt;
 
 /// What an inverter keeps of the time before, where it was not just switched on, or had faults once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -24,4 +25,24 @@ pub struct InverterSetup {
     pub parameters: Vec<(u16, Index, i32)>,
     /// What it keeps of the time before.
     pub history: History,
+}
+
+/// What happens to a slave from outside its bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stimulus {
+    /// Inverter and module have found each other (true) or lost each other.
+    Link(bool),
+    /// The cause of a fault is there, or has gone.
+    Fault(u8, bool),
+}
+
+impl fmt::Display for Stimulus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(true) => f.write_str("link to the module found"),
+            Self::Link(false) => f.write_str("link to the module lost"),
+            Self::Fault(number, true) => write!(f, "fault {number} there"),
+            Self::Fault(number, false) => write!(f, "fault {number} gone"),
+        }
+    }
 }

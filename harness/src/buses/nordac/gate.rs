@@ -1,7 +1,7 @@
 //! The gate of a segment of NORDAC inverters: every octet is judged by the telegrams that it can complete (NORDAC 3, EN 1, 2).
 
 use crate::guard::{Denied, Gate, Guarded};
-use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nordac::guard::{self, Denial, GuardedSlave, Limits, Missing};
 use harness_proto::novobus::guard::LimitSetting;
@@ -113,7 +113,7 @@ impl Gate for LineGate {
                 self.gate.doubt();
                 Ok(())
             }
-            PlacedFault::Stimulus(_, own) if !own.is_on_line() => Ok(()),
+            PlacedFault::Stimulus(_, AnyStimulus::Nordac(_)) => Ok(()),
             _ if self.permits_faults() => {
                 self.gate.doubt();
                 Ok(())

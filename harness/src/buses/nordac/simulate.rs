@@ -1,21 +1,17 @@
 //! Simulated NORDAC inverters on one PROFIBUS segment, in virtual time.
 
-use crate::buses;
 use crate::link::bench_clock::BenchClock;
-use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Parameter, PpoType, Properties};
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use harness_sim::nordac::deviation::{Deviant, Deviation, MasterDeviation, MasterLine};
-use harness_sim::nordac::{self, Drive, History, Member};
-use harness_sim::octet_segment::{
-    LineFault, LineFaultAt, LineHost, LineStation, OctetSegment, Wish,
-};
+use harness_sim::nordac::{self, Drive, History, Member, Stimulus};
+use harness_sim::octet_segment::{LineFaultAt, LineHost, LineStation, OctetSegment, Wish};
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
-use std::fmt;
 
 /// The bench's own place on its segment.
 pub(super) const BENCH: usize = 0;
@@ -26,49 +22,6 @@ pub(super) const ANY_FAULT: u8 = 3;
 /// PNU of the bus address, and of the PPO type (5.5).
 const ADDRESS: u16 = 1624;
 const PPO: u16 = 1622;
-
-/// What happens on the bus or to a slave.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Happening {
-    /// A fault on the line.
-    Line(LineFaultAt),
-    /// To the slave, from outside its bus.
-    Outside(Stimulus),
-}
-
-impl fmt::Display for Happening {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Line(placed) => match placed.fault {
-                LineFault::Octet(fault) => fault.fmt(f),
-                LineFault::Telegram(fault) => fault.fmt(f),
-            },
-            Self::Outside(Stimulus::Link(found)) => {
-                write!(
-                    f,
-                    "link to the module {}",
-                    if *found { "found" } else { "lost" }
-                )
-            }
-            Self::Outside(Stimulus::Fault(number, there)) => {
-                write!(
-                    f,
-                    "fault {number} {}",
-                    if *there { "there" } else { "gone" }
-                )
-            }
-        }
-    }
-}
-
-/// What happens to a slave from outside its bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stimulus {
-    /// Inverter and module have found each other (true) or lost each other.
-    Link(bool),
-    /// The cause of a fault is there, or has gone.
-    Fault(u8, bool),
-}
 
 /// A slave as it is switched on.
 #[derive(Clone, Debug)]
@@ -292,10 +245,10 @@ impl Bench {
                     }
                 }
             }
-            PlacedFault::Stimulus(_, buses::AnyStimulus::Nordac(Happening::Line(placed))) => {
+            PlacedFault::Stimulus(_, AnyStimulus::Line(placed)) => {
                 self.line.inject(placed);
             }
-            PlacedFault::Stimulus(slave, buses::AnyStimulus::Nordac(Happening::Outside(own))) => {
+            PlacedFault::Stimulus(slave, AnyStimulus::Nordac(own)) => {
                 if let Some(drive) = self.drive_mut(slave) {
                     match own {
                         Stimulus::Link(found) => drive.set_link(now, !found),

@@ -1,7 +1,6 @@
 //! A link to simulated rings, in virtual time.
 
-use crate::buses;
-use crate::link::{Capability, Line, Link, Moment, Octets, PlacedFault, link_name};
+use crate::link::{AnyStimulus, Capability, Line, Link, Moment, Octets, PlacedFault, link_name};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::error::BusError;
@@ -296,7 +295,7 @@ impl SimulatedLink {
         match fault {
             PlacedFault::Link(link, fault) => ring.suffer_link(link, fault),
             PlacedFault::Drive(drive, fault) => ring.suffer_drive(drive, fault),
-            PlacedFault::Stimulus(drive, buses::AnyStimulus::Novobus(stimulus)) => {
+            PlacedFault::Stimulus(drive, AnyStimulus::Novobus(stimulus)) => {
                 if let Some(drive) = ring.drive_mut(drive) {
                     // Planning has refused drives without an outside.
                     let _happened = drive.stimulate(stimulus);
@@ -434,7 +433,7 @@ impl Link for SimulatedLink {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Frame(fault) => format!("{place} at {at}: {fault}"),
-                PlacedFault::Stimulus(_, buses::AnyStimulus::Novobus(Stimulus::Error(error))) => {
+                PlacedFault::Stimulus(_, AnyStimulus::Novobus(Stimulus::Error(error))) => {
                     format!("{place} at {at}: error {error}")
                 }
                 PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus}"),

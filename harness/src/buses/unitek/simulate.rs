@@ -1,8 +1,7 @@
 //! Simulated UNITEK drives on one CAN segment, in virtual time.
 
-use crate::buses;
 use crate::link::bench_clock::BenchClock;
-use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
@@ -187,7 +186,7 @@ impl Bench {
         match fault {
             PlacedFault::Frame(_) => self.arm(next, fault),
             PlacedFault::Drive(node, fault) => self.power(node, fault),
-            PlacedFault::Stimulus(node, buses::AnyStimulus::Unitek(stimulus)) => {
+            PlacedFault::Stimulus(node, AnyStimulus::Unitek(stimulus)) => {
                 self.stimulate(node, stimulus);
             }
             // Of another bus.
@@ -482,7 +481,7 @@ mod tests {
         ask(&mut bench, "201#520C00");
         ask(&mut bench, "201#511000");
         let limit = Stimulus::Input("limit1", true);
-        let fault = PlacedFault::Stimulus(1, buses::AnyStimulus::Unitek(limit));
+        let fault = PlacedFault::Stimulus(1, AnyStimulus::Unitek(limit));
         bench.inject(0, fault, Moment::At(at(30_500)));
         assert_eq!(bench.unused_faults().len(), 1);
         let came = wait(&mut bench, 20);

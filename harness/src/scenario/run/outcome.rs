@@ -1,6 +1,6 @@
 //! What comes of playing: outcome, finding, and why playing stops.
 
-use super::CellRecord;
+use super::record::CellRecord;
 use crate::counted::counted;
 use crate::link::Trouble;
 use crate::scenario::language::Language;

@@ -3,12 +3,12 @@
 mod any_slave;
 
 use super::*;
-use crate::buses::nordac::simulate::{Bench, Happening, Setup, SlaveSetup, Stimulus};
-use crate::buses::{self};
-use crate::link::{DriveFault, Link, Moment, PlacedFault};
+use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
+use crate::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::words::State;
 use harness_proto::nordac::{Parameter, ParameterRef, PkwError};
+use harness_sim::nordac::Stimulus;
 
 fn slave(address: u8, ppo: PpoType, more: &[(u16, i64)]) -> SlaveSetup {
     let usual = [(1621, 2), (1202, 10), (1203, 10)];
@@ -184,8 +184,8 @@ fn several_slaves() {
 fn a_fault_is_named_and_acknowledged() {
     let mut bench = bench(BusRate::K500, &[slave(8, PpoType::One, &[])]);
     let cause = |on| {
-        let own = Happening::Outside(Stimulus::Fault(3, on));
-        PlacedFault::Stimulus(8, buses::AnyStimulus::Nordac(own))
+        let own = Stimulus::Fault(3, on);
+        PlacedFault::Stimulus(8, AnyStimulus::Nordac(own))
     };
     bench.inject(
         0,

@@ -1,15 +1,15 @@
 //! Plays a case on a simulated line.
 
 use super::act::{Counts, OutgoingTelegram, TelegramActKind, TelegramTalk, slot};
-use crate::buses;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::language::plan::SentTelegram;
 use crate::buses::nordac::report::{Said, said};
-use crate::buses::nordac::simulate::{Bench, Happening, Setup, Stimulus};
+use crate::buses::nordac::simulate::{Bench, Setup};
 use crate::explore::line::LineSeen;
-use crate::link::{DriveFault, Line, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::scenario::language::Language as _;
 use harness_proto::time::{Instant, Span};
+use harness_sim::nordac::Stimulus;
 
 /// How long a case goes on behind its last act.
 const TAIL: Span = Span::from_millis(20);
@@ -75,9 +75,7 @@ fn send(bench: &mut Bench, setup: &Setup, sent: OutgoingTelegram) {
 
 /// What an act does to a slave from outside its bus.
 fn suffer(bench: &mut Bench, what: &TelegramActKind) {
-    let outside = |slave, own| {
-        PlacedFault::Stimulus(slave, buses::AnyStimulus::Nordac(Happening::Outside(own)))
-    };
+    let outside = |slave, own| PlacedFault::Stimulus(slave, AnyStimulus::Nordac(own));
     let faults = match *what {
         TelegramActKind::Link { slave, found } => vec![outside(slave, Stimulus::Link(found))],
         TelegramActKind::Fault { slave, number, on } => {

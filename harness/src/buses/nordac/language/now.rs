@@ -2,9 +2,8 @@
 
 use super::Nordac;
 use super::plan::PlannedAct;
-use crate::buses;
-use crate::buses::nordac::simulate::{Bench, Happening};
-use crate::link::{DriveFault, Link, Moment, PlacedFault};
+use crate::buses::nordac::simulate::Bench;
+use crate::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
 
 /// Why a step was not done.
@@ -30,11 +29,11 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), N
     let PlannedAction::Own(act) = &step.action else {
         return Err(NotNow::Refused(ONLY));
     };
-    let happen = |what| PlacedFault::Stimulus(0, buses::AnyStimulus::Nordac(what));
     match act {
         PlannedAct::Fault(placed) => {
             let placed = bench.not_passed(*placed);
-            bench.inject(0, happen(Happening::Line(placed)), Moment::Now);
+            let what = AnyStimulus::Line(placed);
+            bench.inject(0, PlacedFault::Stimulus(0, what), Moment::Now);
         }
         PlannedAct::Power(slave, on) => {
             let fault = if *on { DriveFault::On } else { DriveFault::Off };
@@ -46,7 +45,7 @@ pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Nordac>) -> Result<(), N
             }
         }
         PlannedAct::Outside(slave, stimulus) => {
-            let what = buses::AnyStimulus::Nordac(Happening::Outside(*stimulus));
+            let what = AnyStimulus::Nordac(*stimulus);
             bench.inject(0, PlacedFault::Stimulus(*slave, what), Moment::Now);
         }
         PlannedAct::Parameter(slave, parameter, raw) => {

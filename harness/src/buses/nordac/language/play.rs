@@ -3,9 +3,8 @@
 use super::Nordac;
 use super::jobs;
 use super::plan::{PlannedAct, PlannedParameter, SentTelegram, WantedOctet};
-use crate::buses::AnyStimulus;
 use crate::buses::nordac::simulate::{self, Bench};
-use crate::link::{DriveFault, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
 use crate::medium::Out;
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{PlannedAction, PlannedStep, PlannedWhen};
@@ -28,7 +27,7 @@ pub(super) fn begin(runner: &mut Runner<'_, Nordac>) {
 }
 
 fn inject(link: &mut dyn Link, placed: LineFaultAt) {
-    let what = AnyStimulus::Nordac(simulate::Happening::Line(placed));
+    let what = AnyStimulus::Line(placed);
     link.inject(0, PlacedFault::Stimulus(0, what), Moment::Now);
 }
 
@@ -57,7 +56,7 @@ pub(super) fn act(
             happen(runner, now, &faults);
         }
         PlannedAct::Outside(slave, stimulus) => {
-            let what = AnyStimulus::Nordac(simulate::Happening::Outside(*stimulus));
+            let what = AnyStimulus::Nordac(*stimulus);
             happen(runner, now, &[PlacedFault::Stimulus(*slave, what)]);
         }
         PlannedAct::Quiet => {

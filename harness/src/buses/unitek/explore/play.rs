@@ -1,10 +1,9 @@
 //! Plays a case on a simulated segment.
 
 use super::act::{FrameActKind, FrameTalk};
-use crate::buses::AnyStimulus;
 use crate::buses::unitek::simulate::{Bench, Setup};
 use crate::explore::line::LineSeen;
-use crate::link::{DriveFault, Line, Link, Moment, PlacedFault};
+use crate::link::{AnyStimulus, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::Out;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineFrame;

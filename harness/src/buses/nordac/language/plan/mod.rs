@@ -10,7 +10,7 @@ use super::syntax::{
     Bad, Damage, JobKind, JobStep, Message, OctetHarm, Outside, Sender, SetupKind, SlaveLine,
     TelegramHarm, TelegramStep, Wanted, WordKind, WordName, WordValue,
 };
-use crate::buses::nordac::simulate::{self, SlaveSetup, Stimulus};
+use crate::buses::nordac::simulate::{self, SlaveSetup};
 use crate::counted::counted;
 use crate::link::Capability;
 use crate::scenario::expression::{Located, Scope};
@@ -24,6 +24,7 @@ use harness_proto::line::LineError;
 use harness_proto::nordac::PpoType;
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::nordac::Stimulus;
 use harness_sim::octet_segment::{LineFault, LineFaultAt, TelegramFault};
 
 /// The most telegrams that a scenario sends.

@@ -3,13 +3,14 @@
 use super::drive::Running;
 use super::setup::model_unless_said;
 use super::types::{PlannedBench, PlannedCheck, RingAct};
-use crate::buses::AnyStimulus;
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{
     Check, DriveRange, FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
 };
-use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
+use crate::link::{
+    AnyStimulus, Capability, Moment, PlacedFault, needs_line_errors, only_simulated,
+};
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_BYTES, Pattern};

@@ -9,6 +9,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::scenario::pattern::Expected;
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
 use crate::scenario::run::player::Runner;
+use crate::scenario::run::record::{hex, physical};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{self, Scale, Value};
@@ -266,15 +267,6 @@ fn nearest(scale: Scale, number: Quantity, units: units::DriveUnits) -> Option<V
     Some(bytes[bytes.len() - usize::from(scale.size())..].to_vec())
 }
 
-/// The number that the bytes of a cell are; `None` where they are none.
-pub(crate) fn physical(scale: Scale, bytes: &[u8], units: units::DriveUnits) -> Option<f64> {
-    match scale.value(bytes, units)?.ok()? {
-        Value::Exact(ratio) => Some(ratio.to_f64()),
-        Value::Approximate(value) => Some(value),
-        Value::Off | Value::Date(_) => None,
-    }
-}
-
 /// The bytes of a cell as a number in a unit, and as they are.
 fn show(scale: Scale, bytes: &[u8], units: units::DriveUnits, unit: &Unit) -> String {
     match (physical(scale, bytes, units), scale.value(bytes, units)) {
@@ -356,11 +348,6 @@ fn mode(mode: Mode) -> &'static str {
 fn sign(relation: Relation) -> &'static str {
     let named = Relation::NAMES.iter().find(|(_, other)| *other == relation);
     named.map_or("", |(sign, _)| sign)
-}
-
-/// Bytes as written: `0652`.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
 
 /// Bytes as written, and the names of the bits that are set.

@@ -5,12 +5,8 @@ use crate::buses::novobus::language::parse::drive::DEVICES;
 use crate::buses::novobus::language::syntax::header::{
     DriveRange, Header, Influence, RingRange, Setup, SetupKind,
 };
-use harness_proto::nd21::units::INCREMENTS_PER_TURN;
 use harness_sim::nd21::Stimulus;
 use harness_sim::novobus::drive::Model;
-
-/// Digits behind the point of a position in turns: enough to tell one increment from the next.
-const TURN_DECIMALS: usize = 6;
 
 /// The lines of a header, each with the word that it begins with and the rest.
 pub(crate) fn header(header: &Header) -> Vec<(&'static str, String)> {
@@ -93,53 +89,7 @@ fn influence(influence: &Influence) -> String {
         let level = if *high { "high" } else { "low" };
         return format!("input {} {level}", names.join(" "));
     }
-    stimuli.first().map_or_else(String::new, stimulus)
-}
-
-/// `analogue 500mV`, `error 0504`
-pub(crate) fn stimulus(stimulus: &Stimulus) -> String {
-    let on = |on: bool| if on { "on" } else { "off" };
-    match *stimulus {
-        Stimulus::Input(input, high) => {
-            format!(
-                "input {} {}",
-                input.name(),
-                if high { "high" } else { "low" }
-            )
-        }
-        Stimulus::Cam(input, from, to) => {
-            format!("cam {} {}..{}", input.name(), turns(from), turns(to))
-        }
-        Stimulus::Analogue(millivolts) => format!("analogue {millivolts}mV"),
-        Stimulus::Frequency(hertz) => format!("frequency {hertz}Hz"),
-        Stimulus::Cooler(tenths) => {
-            let sign = if tenths < 0 { "-" } else { "" };
-            let tenths = tenths.unsigned_abs();
-            format!("cooler {sign}{}.{}C", tenths / 10, tenths % 10)
-        }
-        Stimulus::MotorSensor(ohms) => format!("motor-sensor {ohms}ohm"),
-        Stimulus::Rail(volts) => format!("rail {volts}V"),
-        Stimulus::Load(milliamperes) => format!("load {milliamperes}mAeff"),
-        Stimulus::Resolver(plugged) => format!("resolver {}", on(plugged)),
-        Stimulus::Jammed(held) => format!("rotor {}", if held { "jammed" } else { "free" }),
-        Stimulus::Short(short) => format!("phases {}", if short { "shorted" } else { "sound" }),
-        // A step gives it as a fault; no line of this kind does.
-        Stimulus::Error(error) => format!("error {:04X}", error.code()),
-    }
-}
-
-/// A position in increments as turns.
-fn turns(increments: i64) -> String {
-    let per_turn = i64::from(INCREMENTS_PER_TURN);
-    let unit = 10_i64.pow(6);
-    let parts = (increments * unit * 2 + per_turn).div_euclid(per_turn * 2);
-    let sign = if parts < 0 { "-" } else { "" };
-    let parts = parts.unsigned_abs();
-    let unit = unit.unsigned_abs();
-    format!(
-        "{sign}{}.{:0width$}turns",
-        parts / unit,
-        parts % unit,
-        width = TURN_DECIMALS
-    )
+    stimuli
+        .first()
+        .map_or_else(String::new, Stimulus::to_string)
 }
