@@ -152,7 +152,7 @@ fn hundred() -> Vec<Trace> {
     let source = Source::from_bytes("9.8".to_owned(), text.into()).expect("a text");
     let entry = Entry::new(source, None).expect("a scenario");
     let plan = entry.plan.expect("novobus");
-    let mut link = harness::scenario::simulate::simulated(&plan);
+    let mut link = harness::buses::novobus::simulate::simulated(&plan);
     harness::scenario::run::run(&plan, &mut link);
     vec![link.trace(0)]
 }

@@ -14,22 +14,9 @@ pub mod unitek;
 
 /// The bus whose drives stand in rings: what rooms take of it by type.
 pub use novobus as rings;
-pub use novobus::language::{argument, plan, syntax};
+pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
-pub use novobus::simulate;
 pub use novobus::stream::StreamLink;
-
-/// What of playing belongs to the one bus whose drives are played on over their bus today.
-pub mod run {
-    pub use super::novobus::language::run::bytes::show;
-    pub use super::novobus::language::run::now::{Now, now};
-    pub use super::novobus::language::run::over_bus::{
-        NotReady, play_over_bus, reset_drives, start_anew,
-    };
-    pub(crate) use super::novobus::language::run::over_bus::{come_home, read_byte};
-}
-
-pub(crate) use novobus::language::parse::header;
 
 /// The bus of a scenario without a `bus` line.
 pub use novobus::language::Novobus as DefaultBus;

@@ -3,6 +3,7 @@
 use super::fault::CaseFaults;
 use super::file::{CampaignFile, ExpectedCounts, read};
 use super::plan::{Shape, cases};
+use crate::buses::novobus::simulate::bench;
 use crate::buses::syntax::{Setup, SetupKind};
 use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, Said};
@@ -11,7 +12,6 @@ use crate::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::campaign::sharing::Sharing;
 use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
-use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,12 @@
 //! A scenario on simulated rings, from another program.
 
 use super::Error;
+use crate::buses::novobus::simulate::simulated;
 use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::link::Link;
 use crate::report::page::page;
 use crate::scenario::run::run;
-use crate::scenario::simulate::simulated;
 use crate::scenario::source::{Source, line_number};
 use crate::scenario::verdict::Verdict;
 use std::fmt;

@@ -4,7 +4,7 @@ use super::check::{FindProfile, RigCheck};
 use super::file::Sim;
 use super::port_file::Port;
 use super::profile::{KnownProfile, Profile, ProfileLines, ProfileSetup};
-use crate::buses::header::{for_other_rings, parse_lines};
+use crate::buses::novobus::language::parse::header::{for_other_rings, parse_lines};
 use crate::buses::syntax::Header;
 use crate::file::schema::PathStep;
 use crate::rig::sim::{mistakes, sizes};

@@ -5,6 +5,7 @@
 //! and refuses what cannot be, and [`run`] plays it on a [`Link`](crate::link::Link). The language is
 //! described in `LANGUAGE.md` beside this file.
 
+pub(crate) mod argument;
 pub mod expression;
 pub mod language;
 pub mod parse;
@@ -20,5 +21,3 @@ pub mod syntax;
 pub(crate) mod times;
 pub mod verdict;
 pub mod write;
-
-pub use crate::buses::{argument, simulate};

@@ -1,11 +1,12 @@
 //! The bench's own master on a computer that does something else meanwhile.
 
 use harness::buses::SimulatedLink;
+use harness::buses::novobus::language::run::over_bus::play_over_bus;
+use harness::buses::novobus::simulate::bench;
 use harness::library::Entry;
 use harness::link::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
 use harness::medium::{Heard, Medium, Out};
-use harness::scenario::run::{AtMismatch, play_over_bus};
-use harness::scenario::simulate::bench;
+use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Received;

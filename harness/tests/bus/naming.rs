@@ -6,6 +6,7 @@ mod eeprom;
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::language::syntax::Header;
+use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, LinkEvent, Octets, Recording};
@@ -16,7 +17,6 @@ use harness::qualify::{
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::lacks;
-use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::{Deviation, deviations, relatives};

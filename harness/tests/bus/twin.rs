@@ -1,6 +1,8 @@
 //! The twin: a ring beside its model, and what explains a ring that differs from it.
 
+use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
 use harness::buses::novobus::language::syntax::Header;
+use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Line as _, Link, LinkEvent, Octets, Recording, Replay};
@@ -8,8 +10,7 @@ use harness::qualify::{
     Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
 };
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, start_anew};
-use harness::scenario::simulate::bench;
+use harness::scenario::run::{AtMismatch, Outcome, lacks};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::time::Span;

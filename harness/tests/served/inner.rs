@@ -1,6 +1,8 @@
 //! Taps and interposers on a ring that another process serves, over sockets and pseudo terminals: the same bytes on
 //! the same links as in the simulator.
 
+use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
+use harness::buses::novobus::simulate;
 use harness::buses::{SimulatedLink, StreamLink};
 use harness::library::Entry;
 use harness::link::{
@@ -8,8 +10,7 @@ use harness::link::{
     Trouble,
 };
 use harness::port::{PortAddress, PortSettings, Wire, open};
-use harness::scenario::run::{AtMismatch, lacks, play_over_bus, start_anew};
-use harness::scenario::simulate;
+use harness::scenario::run::{AtMismatch, lacks};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::{LineError, Rate, Received};

@@ -3,11 +3,12 @@
 
 use crate::ring::Served;
 use harness::buses::StreamLink;
+use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
+use harness::buses::novobus::simulate::simulated;
 use harness::library::{Entry, sources};
 use harness::link::{Line, Octets, PortLink as _};
 use harness::port::{PortAddress, PortSettings, Wire, open};
-use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, run, start_anew};
-use harness::scenario::simulate::simulated;
+use harness::scenario::run::{AtMismatch, Outcome, lacks, run};
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;

@@ -9,7 +9,9 @@ use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use harness_sim::nordac::deviation::{Deviant, Deviation, MasterDeviation, MasterLine};
 use harness_sim::nordac::{self, Drive, History, Member, Stimulus};
-use harness_sim::octet_segment::{LineFaultAt, LineHost, LineStation, OctetSegment, Wish};
+use harness_sim::octet_segment::{
+    LineFault, LineFaultAt, LineHost, LineStation, OctetSegment, Wish,
+};
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
 

@@ -3,13 +3,13 @@
 use super::driver::cell::{CellFound, find, write};
 use super::driver::{self, Axis, OpenRings, State};
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::argument::{assignments, cells, encode};
+use crate::buses::novobus::language::parse::header::parse_setup;
+use crate::buses::novobus::simulate;
 use crate::embed::Error;
 use crate::rig::{self, Session, Shared};
-use crate::scenario::argument::{assignments, cells, encode};
-use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problem, Problems};
-use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::nd21::units;
 use harness_proto::time::Span;

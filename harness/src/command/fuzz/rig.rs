@@ -1,5 +1,6 @@
 //! Work on a rig with ports: opened as `run --rig` opens it, given back in its safe state.
 
+use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, give_back};
@@ -9,7 +10,6 @@ use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::wrong_parity;
 use crate::rig::{Rig, Run, Session, UseOptions};
-use crate::scenario::run::start_anew;
 use crate::signals::interrupt_flag;
 
 /// Tells why exploring ended early, and gives the exit code for it.

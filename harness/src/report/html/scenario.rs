@@ -2,11 +2,12 @@
 
 use super::page::{FoldedPart, Section};
 use super::summary::{Row, ShownScenario, colour};
+use crate::buses::novobus::language::run::bytes::show;
 use crate::html::Html;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
-use crate::scenario::run::{ByteDifference, Mismatch, Outcome, show};
+use crate::scenario::run::{ByteDifference, Mismatch, Outcome};
 use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;
 use crate::traffic::SegmentReport;

@@ -4,6 +4,5 @@ pub(crate) mod header;
 pub(crate) mod step;
 pub(crate) mod words;
 
-pub use crate::buses::header::parse_setup;
 pub(crate) use header::bus;
 pub use header::{parse, parse_step};

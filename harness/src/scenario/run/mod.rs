@@ -6,7 +6,6 @@ pub(crate) mod player;
 pub(crate) mod record;
 pub(crate) mod skip;
 
-pub use crate::buses::run::*;
 pub use outcome::{ByteDifference, Mismatch, Outcome, Stop, Unready};
 pub use player::{AtMismatch, PortState, Runner, needs, play, run};
 pub use record::{CellRecord, Sample};

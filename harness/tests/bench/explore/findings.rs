@@ -2,12 +2,12 @@
 
 use super::{Difference, bounds, explore, planted};
 use harness::buses::novobus::explore::shrink::{Shrunk, Subject, shrink};
+use harness::buses::novobus::simulate::simulated;
 use harness::explore::promote::{Naming, checkout, promote};
 use harness::explore::{ExploreError, Finding, OnSim, RingSetup, Target, against_reference, play};
 use harness::library::Entry;
 use harness::link::Link as _;
 use harness::scenario::run::run;
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use std::path::Path;

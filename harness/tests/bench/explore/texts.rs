@@ -2,13 +2,13 @@
 
 use super::{repeat, scope, scope_of, seed};
 use harness::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
+use harness::buses::novobus::simulate::simulated;
 use harness::explore::{
     Case, CaseScope, Dice, Generator, MasterView, RingSetup, Swarm, mutate, play,
 };
 use harness::library::Entry;
 use harness::link::Link;
 use harness::scenario::run::run;
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 

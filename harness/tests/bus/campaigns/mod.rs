@@ -5,6 +5,7 @@ mod cli;
 mod judge;
 
 use harness::buses::novobus::link::BesideTheBus as _;
+use harness::buses::novobus::simulate::simulated;
 use harness::campaign::find::{find, names};
 use harness::campaign::pairs::Apart;
 use harness::campaign::report::{json, table};
@@ -13,7 +14,6 @@ use harness::library::Entry;
 use harness::link::{Link, Octets};
 use harness::scenario::problem::Problems;
 use harness::scenario::run::{AtMismatch, play};
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

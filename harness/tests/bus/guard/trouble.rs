@@ -2,6 +2,8 @@
 //! notice it.
 
 use super::link;
+use harness::buses::novobus::language::run::over_bus::play_over_bus;
+use harness::buses::novobus::simulate::bench;
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{
@@ -9,8 +11,7 @@ use harness::link::{
 };
 use harness::medium::{Heard, Medium, Out};
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtMismatch, Outcome, play, play_over_bus};
-use harness::scenario::simulate::bench;
+use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};

@@ -1,11 +1,11 @@
 //! The scenario language: accepted lines, rejected lines with their messages, and the effect of each line.
 
+use harness::buses::novobus::simulate::simulated;
 use harness::library::Entry;
 use harness::link::Link;
 use harness::report::json;
 use harness::scenario::problem::Problem;
 use harness::scenario::run::{Outcome, run};
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use proptest::prelude::*;

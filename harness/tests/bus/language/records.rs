@@ -3,9 +3,9 @@
 use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};
 use crate::blind::Blind;
+use harness::buses::novobus::simulate::simulated;
 use harness::report::plot::plot;
 use harness::scenario::run::{Outcome, run};
-use harness::scenario::simulate::simulated;
 use harness::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 

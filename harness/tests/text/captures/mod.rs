@@ -12,11 +12,11 @@ mod routes;
 mod telegrams;
 mod tools;
 
+use harness::buses::novobus::simulate::simulated;
 use harness::capture::Capture;
 use harness::library::Entry;
 use harness::link::Link;
 use harness::scenario::run::{AtMismatch, play};
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 
 use std::path::{Path, PathBuf};

@@ -151,7 +151,7 @@ fn a_hostile_title_of_a_file() {
             continue;
         };
         let plan = entry.plan.as_ref().expect("novobus");
-        let mut link = harness::scenario::simulate::simulated(plan);
+        let mut link = harness::buses::novobus::simulate::simulated(plan);
         let outcome = harness::scenario::run::play(plan, &mut link, AtMismatch::Stop);
         assert_eq!(outcome.verdict.name(), "passed");
         sound(&parse(&super::page(&[("own", scenario)])));

@@ -9,11 +9,11 @@ mod pages;
 mod parser;
 mod program;
 
+use harness::buses::novobus::simulate::simulated;
 use harness::library::Entry;
 use harness::link::Link;
 use harness::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use harness::scenario::run::{AtMismatch, Outcome, play};
-use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};

@@ -3,6 +3,7 @@
 use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, State};
+use crate::buses::novobus::language::run::over_bus::reset_drives;
 use crate::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
@@ -10,7 +11,6 @@ use crate::command::output::Output;
 use crate::command::rig_name::{RigName, Use};
 use crate::link::Line;
 use crate::rig::Session;
-use crate::scenario::run::reset_drives;
 use harness_proto::nd21::bits::status;
 use harness_proto::time::Span;
 

@@ -2,6 +2,7 @@
 
 use super::rig::OpenBench;
 use crate::buses::novobus::language::plan::RingAct;
+use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
@@ -14,7 +15,6 @@ use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, PlayedScenario, Rig, Run, Session, SessionError, Shared, UseOptions};
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, plan_step};
-use crate::scenario::run::{Now, now};
 use crate::scenario::source::Source;
 use crate::serve::first;
 use harness_proto::time::Span;

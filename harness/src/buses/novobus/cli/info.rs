@@ -4,6 +4,7 @@ use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
+use crate::buses::novobus::language::argument::{MemoryRange, cells};
 use crate::buses::novobus::language::scale::shown;
 use crate::command::drive::{InfoArguments, OutputForm};
 use crate::command::exit::Exit;
@@ -13,7 +14,6 @@ use crate::command::output::columns;
 use crate::command::play::progress_bar;
 use crate::command::rig_name::Use;
 use crate::counted::counted;
-use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::{Date, Scale, Value};
 use serde_json::json;
 

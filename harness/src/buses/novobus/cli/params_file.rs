@@ -7,8 +7,8 @@
 //! ```
 
 use crate::buses::novobus::driver::cell::{CellFound, hex};
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange, value_at};
 use crate::buses::novobus::language::syntax::Written;
-use crate::scenario::argument::{MemoryKind, MemoryRange, value_at};
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use harness_proto::nd21::cells::{Access, Cell, RAM};

@@ -3,12 +3,12 @@
 use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::cell::{CellFound, find};
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange, cells};
 use crate::command::drive::{OutputForm, ReadArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::{Output, columns};
 use crate::command::rig_name::Use;
-use crate::scenario::argument::{MemoryKind, MemoryRange, cells};
 use serde_json::json;
 
 /// Reads cells and shows them.

@@ -1,7 +1,7 @@
 //! Signals of the oscilloscope: cells FFxx, of which one byte is recorded (ND21 14.10.6.1).
 
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange, cells, value_at};
 use crate::command::failure::Failure;
-use crate::scenario::argument::{MemoryKind, MemoryRange, cells, value_at};
 use crate::scenario::problem::Problems;
 use harness_proto::nd21::units::{DriveUnits, trigger_level_to_raw};
 

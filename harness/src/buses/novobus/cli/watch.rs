@@ -4,6 +4,7 @@ use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{CellFound, find};
+use crate::buses::novobus::language::argument::{MemoryRange, cells};
 use crate::command::drive::WatchArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
@@ -11,7 +12,6 @@ use crate::command::output::Output;
 use crate::command::rig_name::Use;
 use crate::command::watch::{HEX, WatchBench, WatchedCell, watch as show};
 use crate::counted::counted;
-use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::{Instant, Span};
 

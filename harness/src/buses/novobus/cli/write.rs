@@ -4,13 +4,13 @@ use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange, assignments, encode};
 use crate::buses::novobus::language::syntax::Written;
 use crate::command::drive::WriteArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::rig_name::Use;
-use crate::scenario::argument::{MemoryKind, MemoryRange, assignments, encode};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::ram;
 

@@ -1,8 +1,8 @@
 //! Cells of drives: read, written, shown.
 
 use super::{Axis, Error, OpenRings};
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange};
 use crate::buses::novobus::language::scale::shown;
-use crate::scenario::argument::{MemoryKind, MemoryRange};
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{DriveUnits, Value};
 use harness_proto::novobus::command::Kind;

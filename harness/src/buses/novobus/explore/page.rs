@@ -1,6 +1,7 @@
 //! The page of a run of fuzzing, made from its folder and nothing else: the same folder gives the same page.
 
 use super::html::{Explored, explored};
+use crate::buses::novobus::simulate::simulated;
 use crate::explore::Case;
 use crate::explore::ExploreError;
 use crate::explore::Finding;
@@ -11,7 +12,6 @@ use crate::link::Link;
 use crate::report::html::{ScenarioView, ShownScenario, section};
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::{self, AtMismatch, Outcome, Skip};
-use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};

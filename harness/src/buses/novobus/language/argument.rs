@@ -1,4 +1,4 @@
-//! Cells, values and numbers that stand outside a scenario, on a command line or in a file of parameters:
+//! Cells and values that stand outside a scenario, on a command line or in a file of parameters:
 //! in the same words.
 
 use super::plan::{in_memory, number_bytes};
@@ -7,12 +7,10 @@ use crate::buses::novobus::language::syntax::{CellPlace, Written};
 use crate::scenario::expression::{self, Scope};
 use crate::scenario::parse::words::equals;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
-use crate::scenario::quantity::{self, Dimension, Quantity};
+use crate::scenario::quantity::{self, Dimension};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
-use harness_proto::time::Span;
 
 /// Maximum number of bytes read from an address on.
 const MAX_LENGTH: i64 = 256;
@@ -232,23 +230,6 @@ pub fn value_at(text: &str, offset: usize, location: &MemoryRange) -> Result<Wri
     Ok(value)
 }
 
-/// A number with a unit of this dimension.
-///
-/// # Errors
-/// It is none, in a sentence.
-pub fn number(text: &str, dimension: Dimension) -> Result<Quantity, String> {
-    one(text, |scanner| quantity::quantity(scanner, Some(dimension)))
-}
-
-/// A length of time on the line: `100ms`.
-///
-/// # Errors
-/// It is none, in a sentence.
-pub fn duration(text: &str) -> Result<Span, String> {
-    let found = one(text, times::duration)?;
-    Ok(found.on(harness_proto::line::Rate::default().byte_time()))
-}
-
 fn location(scanner: &mut Scanner<'_>) -> Result<MemoryRange, Problem> {
     let start = scanner.here();
     let prefixed = scanner.eat("ee:");
@@ -297,13 +278,6 @@ fn location(scanner: &mut Scanner<'_>) -> Result<MemoryRange, Problem> {
         scale: scales.find(|scale| scale.size() == size),
         place,
     })
-}
-
-/// Reads a text as a whole; what is wrong with it as a sentence.
-fn one<T>(text: &str, read: impl Fn(&mut Scanner<'_>) -> Result<T, Problem>) -> Result<T, String> {
-    let mut scanner = Scanner::new(text, 0);
-    let found = read(&mut scanner).and_then(|found| scanner.expect_end().map(|()| found));
-    found.map_err(|problem| problem.sentence())
 }
 
 /// Reads each of several texts as a whole.

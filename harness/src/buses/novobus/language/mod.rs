@@ -3,14 +3,14 @@
 pub mod argument;
 pub(crate) mod parse;
 pub mod plan;
-pub(crate) mod run;
+pub mod run;
 pub(crate) mod scale;
 pub mod syntax;
 pub(crate) mod write;
 
 use self::plan::{PlannedBench, Planner, RingAct, planner};
 use self::run::bytes;
-use self::run::record::CellRecord;
+
 use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
 use crate::bus::Bus;
@@ -22,6 +22,7 @@ use crate::scenario::plan::{Plan, PlannedStep};
 use crate::scenario::problem::{Problem, Spanned};
 use crate::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
 use crate::scenario::run::player::Runner;
+use crate::scenario::run::record::CellRecord;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use harness_proto::line::Received;

@@ -208,11 +208,11 @@ mod tests {
     use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options, SpellingCause};
     use crate::buses::novobus::link::BesideTheBus as _;
+    use crate::buses::novobus::simulate;
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
     use crate::link::{Line, LinkFault, Moment, PlacedFault};
     use crate::medium::{Heard, Medium, Out};
-    use crate::scenario::simulate;
     use crate::scenario::source::Source;
     use harness_proto::line::Rate;
     use harness_proto::novobus::sync::SYNCO;

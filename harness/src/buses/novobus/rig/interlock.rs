@@ -1,12 +1,12 @@
 //! Interlocks: what must hold of drives throughout a run, asked over the bus while nothing else is under way.
 
 use super::condition::InterlockCondition;
+use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::buses::novobus::language::scale::shown;
 use crate::guard::Watch;
 use crate::link::{Line, Trouble};
 use crate::rig::file::Level;
 use crate::rig::{Rig, file};
-use crate::scenario::run::read_byte;
 use harness_proto::nd21::cells::Cell;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;
@@ -201,10 +201,10 @@ impl Entry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::novobus::simulate::bench;
     use crate::library::Entry;
     use crate::link::{DriveFault, Link as _, Moment, PlacedFault};
     use crate::rig::check::parse;
-    use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
 
     fn source(text: &str) -> Source {

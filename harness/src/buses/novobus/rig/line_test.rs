@@ -195,8 +195,8 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> RingPace {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::buses::novobus::simulate;
     use crate::library::Entry;
-    use crate::scenario::simulate;
     use crate::scenario::source::Source;
 
     fn source(name: &str, text: String) -> Source {

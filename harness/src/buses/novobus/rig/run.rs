@@ -7,7 +7,9 @@ use super::judge::{AttemptFacts, judge, known};
 use super::put_back::within;
 use super::session::Session;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::run::over_bus::{come_home, play_over_bus, start_anew};
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
 use crate::counted::counted;
 use crate::guard::Guarded;
@@ -17,11 +19,7 @@ use crate::link::{
 use crate::rig::{Again, Attempt, PlayedScenario, Rig, SessionError, attempts_of};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
-use crate::scenario::run::{
-    AtMismatch, Outcome, Skip, Unlock, Why, come_home, lacks, lacks_as_well, play_over_bus,
-    start_anew,
-};
-use crate::scenario::simulate;
+use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::{LimitSetting, Limits, Touched};
 use harness_proto::time::Span;

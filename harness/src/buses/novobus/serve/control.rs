@@ -2,10 +2,10 @@
 
 use super::server::Server;
 use super::state::state_of;
-use crate::scenario::argument;
+use crate::buses::novobus::language::argument;
+use crate::buses::novobus::language::run::now::{Now, now};
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::plan_step;
-use crate::scenario::run::{Now, now};
 use crate::scenario::source::Source;
 use crate::serve::{ControlAnswer, first};
 

@@ -1,8 +1,8 @@
 //! What a served drive shows beside the bus, for a line of control.
 
+use crate::buses::novobus::language::argument::{MemoryKind, MemoryRange};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::link::Link;
-use crate::scenario::argument::{MemoryKind, MemoryRange};
 use harness_sim::nd21::{Mode, OutputLevels};
 
 /// The state of a drive: what these cells of its memory hold, in hexadecimal digits, or without cells its error on the bus and what it

@@ -1,10 +1,10 @@
 //! Served rings in virtual time: the clock is a number.
 
 use super::*;
+use crate::buses::novobus::language::parse::header::parse_setup;
+use crate::buses::novobus::simulate;
 use crate::medium::ErrorMarks;
-use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::plan;
-use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use crate::web::{LiveCell, LiveNews, LiveOrder, MAX_ROWS};
 use proptest::prelude::*;

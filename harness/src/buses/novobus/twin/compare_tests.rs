@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::simulate::bench;
 use crate::link::{Line, Octets};
-use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use harness_proto::line::LineError;
 use harness_proto::novobus::role::roles;

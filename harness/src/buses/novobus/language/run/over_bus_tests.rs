@@ -1,8 +1,8 @@
 //! Rings whose drives have missed their master, brought back.
 
 use super::*;
+use crate::buses::novobus::simulate;
 use crate::library::Entry;
-use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 

@@ -6,7 +6,7 @@ mod fault;
 mod header;
 mod job;
 
-pub(crate) use header::{devices, header, lines, setup, stimulus};
+pub(crate) use header::{devices, header, lines, setup};
 
 use super::syntax::{DriveRange, LinkEnds, RingStep};
 

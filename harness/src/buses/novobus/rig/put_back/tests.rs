@@ -4,8 +4,8 @@ use super::super::busy::line::Stalls;
 use super::super::busy::{entry, rig, session};
 use super::super::run::Run;
 use super::*;
+use crate::buses::novobus::language::argument::{MemoryKind, assignments};
 use crate::link::{DriveFault, Link as _, LinkFault, Moment, PlacedFault};
-use crate::scenario::argument::{MemoryKind, assignments};
 use crate::scenario::verdict::Verdict;
 use harness_proto::novobus::sync::SYNCO;
 
