@@ -5,7 +5,7 @@
 //! and refuses what cannot be, and [`run`] plays it on a [`Link`](crate::link::Link). The language is
 //! described in `LANGUAGE.md` beside this file.
 
-pub(crate) mod argument;
+pub mod argument;
 pub mod expression;
 pub mod language;
 pub mod parse;

@@ -3,7 +3,7 @@
 pub(crate) mod halt;
 pub(crate) mod outcome;
 pub(crate) mod player;
-pub(crate) mod record;
+pub mod record;
 pub(crate) mod skip;
 
 pub use outcome::{ByteDifference, Mismatch, Outcome, Stop, Unready};

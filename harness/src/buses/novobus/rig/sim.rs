@@ -42,7 +42,7 @@ impl Rig {
             && self.setup.only(|own| !is_input(own)).is_empty()
     }
 
-    /// The setup of a simulated rig, as `scenario::simulate::bench` takes it: whole ND21s where its file names
+    /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
     /// no model.
     ///
     /// # Errors

@@ -147,7 +147,7 @@ fn order_by_plc(line: &mut Guarded<SimulatedLink>, left: &Left) {
         return;
     }
     for high in [false, true] {
-        let input = harness::buses::AnyStimulus::Novobus(Stimulus::Input(Input::Gpin3, high));
+        let input = harness::link::AnyStimulus::Novobus(Stimulus::Input(Input::Gpin3, high));
         line.inject(0, PlacedFault::Stimulus(0, input), Moment::Now);
         watch(line, 4);
     }

@@ -105,7 +105,7 @@ fn deviating_master(
 ///
 /// # Errors
 /// As of [`parse`](crate::scenario::parse::parse).
-pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
+pub(crate) fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
     let mut scenario: Scenario = read(source, Part::Header)?;
     if scenario.header.rings.is_empty() {
         scenario.header.rings = rings.iter().copied().map(RingRange::of).collect();

@@ -32,7 +32,7 @@ pub(crate) fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Exp
 
 /// A received byte as reports show it: `88`, or `12 (parity)`.
 #[must_use]
-pub fn show(received: Received) -> String {
+pub(crate) fn show(received: Received) -> String {
     let mut text = format!("{:02X}", received.byte);
     if let Some(error) = received.error {
         // Writing to a String cannot fail.

@@ -7,7 +7,7 @@ use crate::scenario::run::player::{AtMismatch, Runner};
 
 /// The outcome of a step that is done at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Now {
+pub(crate) enum Now {
     /// The step is done, or the check holds.
     Done,
     /// The check does not hold: what was found, in a sentence.
@@ -18,7 +18,7 @@ pub enum Now {
 
 /// Does a step at once. No time passes and nothing is sent: faults, what happens to drives from outside the bus,
 /// and checks that look at drives or at the error mode.
-pub fn now(plan: &Plan, link: &mut dyn Link, step: &PlannedStep) -> Now {
+pub(crate) fn now(plan: &Plan, link: &mut dyn Link, step: &PlannedStep) -> Now {
     if step.when != PlannedWhen::Now {
         return Now::Refused(
             "a line is carried out at once: no time is allowed in front of it (a fault may have one after its place)",
