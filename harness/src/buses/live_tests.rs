@@ -1,10 +1,11 @@
 //! What a capture shows while it goes on, in the words of each bus.
 
-use super::{TelegramCutter, judge_shared, live_text, share_a_line};
+use super::novobus::capture::judge::judge;
+use super::novobus::capture::scenario::JudgeOptions;
+use super::{judge_shared, live_text};
 use crate::capture::live::{LiveLine, seconds};
-use crate::capture::{
-    Capture, Carries, JudgeOptions, LiveRecorder, Piece, RecordedPlace, Tape, judge, read,
-};
+use crate::capture::senders::TelegramCutter;
+use crate::capture::{Capture, Carries, LiveRecorder, Piece, RecordedPlace, Tape, read};
 use crate::library::{Entry, sources};
 use crate::medium::Medium;
 use crate::scenario::run::AtMismatch;
@@ -221,11 +222,11 @@ fn verdict(capture: &Capture) -> Option<Verdict> {
         setup: None,
         tolerance: Span::from_millis(10),
     };
-    match share_a_line(&capture.traces) {
-        true => judge_shared(&capture.traces, None, (&[], Span::ZERO))
+    match Carries::of(&capture.traces) {
+        Carries::Link => judge(capture, &options).ok().map(|own| own.verdict),
+        Carries::Line | Carries::Frames => judge_shared(&capture.traces, None, (&[], Span::ZERO))
             .ok()
             .map(|own| own.verdict),
-        false => judge(capture, &options).ok().map(|own| own.verdict),
     }
 }
 

@@ -23,7 +23,6 @@ pub use novobus::language::Novobus as DefaultBus;
 
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
-pub(crate) use nordac::senders::{LineRead, TelegramCutter};
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
@@ -32,7 +31,7 @@ pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 use crate::bus::Bus;
 use crate::campaign::line::LineCampaign;
 use crate::capture::live::LiveText;
-use crate::capture::{Carries, RecordedPlace, ends};
+use crate::capture::{Carries, JudgedFrames, RecordedPlace, ends};
 use crate::command::args::ListFormat;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
@@ -55,18 +54,15 @@ use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
-use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FramePlace;
 use crate::serve::{ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt, serve};
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
-use harness_proto::can::Frame;
-use harness_proto::line::{Format, Rate};
-use harness_proto::profibus::BusRate;
+use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
-use harness_sim::record::{Carried, LineByte, Trace};
+use harness_sim::record::Trace;
 use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -186,49 +182,18 @@ pub(crate) fn judge_of(
     Some(judge(rig, allow_motion, qualifies))
 }
 
-/// Whether these are traces of a bus of frames.
-pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
-    let mut channels = traces.iter().flat_map(|trace| &trace.channels);
-    channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
-}
-
 /// How traces of a shared line are shown, by what the channels carried; `None` for a ring.
 pub(crate) fn report_of(traces: &[Trace]) -> Option<&'static dyn SegmentReport> {
-    match shared(traces)? {
-        Bus::Unitek => Some(&unitek::report::FrameReport),
-        Bus::Nordac => Some(&nordac::report::TelegramReport),
-        Bus::Novobus => None,
+    match Carries::of(traces) {
+        Carries::Frames => Some(&unitek::report::FrameReport),
+        Carries::Line => Some(&nordac::report::TelegramReport),
+        Carries::Link => None,
     }
 }
 
 /// What these are traces of.
 pub(crate) fn carried(traces: &[Trace]) -> &'static str {
     report_of(traces).map_or("bytes of a ring", SegmentReport::carries)
-}
-
-/// The bus whose stations share one line, by what the channels carried: frames, or octets for all stations. `None` for a ring.
-fn shared(traces: &[Trace]) -> Option<Bus> {
-    if carry_frames(traces) {
-        return Some(Bus::Unitek);
-    }
-    let mut channels = traces.iter().flat_map(|trace| &trace.channels);
-    let to_all = channels.any(|channel| channel.from.is_none() && channel.to.is_none());
-    to_all.then_some(Bus::Nordac)
-}
-
-/// The formats that a line of octets may have: that of a bus whose stations share it, or that of a ring. The usual one first.
-pub(crate) fn line_formats(shared: bool) -> Vec<Format> {
-    match shared {
-        true => {
-            let usual = BusRate::default();
-            let others = BusRate::ALL.into_iter().filter(|own| *own != usual);
-            std::iter::once(usual)
-                .chain(others)
-                .map(BusRate::format)
-                .collect()
-        }
-        false => Rate::ALL.into_iter().map(Format::from).collect(),
-    }
 }
 
 /// Text of what a place of a capture carries, while it arrives. Of a link of a ring, its rate, and the number of drives where it is known.
@@ -243,11 +208,6 @@ pub(crate) fn live_text(place: &RecordedPlace, drives: Option<u8>) -> Box<dyn Li
     }
 }
 
-/// Whether these are traces of a bus whose stations share one line; those of a ring have tables and pictures of their own.
-pub(crate) fn share_a_line(traces: &[Trace]) -> bool {
-    shared(traces).is_some()
-}
-
 /// The frames or telegrams of a shared line, a row each: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a
 /// ring, which has tables of its own.
 pub(crate) fn rows(
@@ -259,11 +219,6 @@ pub(crate) fn rows(
     Some(report.rows(trace, wanted, at_most))
 }
 
-/// The drive that sends a frame, by its identifier; `None` for a frame of a host.
-pub(crate) fn sender_of(frame: &Frame) -> Option<u8> {
-    unitek::report::sender_of(frame)
-}
-
 /// A scenario that replays a capture of a shared line; `setup` describes the drives. `None` for a ring.
 ///
 /// # Errors
@@ -273,26 +228,11 @@ pub(crate) fn shared_scenario(
     title: &str,
     setup: Option<&Source>,
 ) -> Option<Result<String, String>> {
-    match shared(traces)? {
-        Bus::Unitek => Some(unitek::capture::scenario(traces, title, setup)),
-        Bus::Nordac => Some(nordac::capture::scenario(traces, title, setup)),
-        Bus::Novobus => None,
+    match Carries::of(traces) {
+        Carries::Frames => Some(unitek::capture::scenario(traces, title, setup)),
+        Carries::Line => Some(nordac::capture::scenario(traces, title, setup)),
+        Carries::Link => None,
     }
-}
-
-/// What came of judging a capture of a shared line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct JudgedFrames {
-    /// Passed, failed, or inconclusive where nothing was compared.
-    pub(crate) verdict: Verdict,
-    /// How many frames or telegrams of drives were compared.
-    pub(crate) compared: usize,
-    /// How many could be compared.
-    pub(crate) replies: usize,
-    /// What differs, a sentence each.
-    pub(crate) differences: Vec<String>,
-    /// What was not compared, a sentence each.
-    pub(crate) remarks: Vec<String>,
 }
 
 /// Judges a capture of a shared line; `setup` describes the drives, `named` are those that are judged, where the user names some, and
@@ -305,21 +245,21 @@ pub(crate) fn judge_shared(
     setup: Option<&Source>,
     (named, tolerance): (&[u8], Span),
 ) -> Result<JudgedFrames, String> {
-    match shared(traces) {
-        Some(Bus::Nordac) if setup.is_some() => Err(
+    match Carries::of(traces) {
+        Carries::Line if setup.is_some() => Err(
             "--setup changes nothing where telegrams are judged: a slave is accused only of what no right slave does, whatever its settings; \
              leave it out"
                 .to_owned(),
         ),
-        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces, (named, tolerance))),
+        Carries::Line => Ok(nordac::capture::judged(traces, (named, tolerance))),
         _ => unitek::capture::judged(traces, setup, (named, tolerance)),
     }
 }
 
 /// How many frames or telegrams a capture of a shared line has, and what they are called.
 pub(crate) fn counted_pieces(traces: &[Trace]) -> (usize, &'static str) {
-    match shared(traces) {
-        Some(Bus::Nordac) => (nordac::report::count(traces), "telegram"),
+    match Carries::of(traces) {
+        Carries::Line => (nordac::report::count(traces), "telegram"),
         _ => {
             let channels = traces.iter().flat_map(|trace| &trace.channels);
             (
@@ -351,12 +291,6 @@ pub(crate) fn write_shared(
     report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
-/// The telegrams of a shared line of octets, each with the slave that sent it; `None` is a master.
-pub(crate) fn telegrams(traces: &[Trace]) -> Vec<(Option<u8>, Vec<LineByte>)> {
-    let all = traces.iter().flat_map(nordac::report::runs);
-    all.map(|own| (own.from, own.octets)).collect()
-}
-
 /// The built-in scenario that shows a bus at work.
 pub(crate) const fn example(bus: Bus) -> &'static str {
     match bus {
@@ -366,12 +300,6 @@ pub(crate) const fn example(bus: Bus) -> &'static str {
     }
 }
 
-/// The bit rate of octets on a shared line, by their times; the usual one where they do not show it.
-pub(crate) fn bits_per_second(traces: &[Trace]) -> u32 {
-    let rate = traces.iter().find_map(nordac::report::pcapng::rate);
-    rate.unwrap_or_default().bits_per_second()
-}
-
 /// Compares the telegrams of two runs, and says whether they are the same, and how they differ; `None` unless both are octets of a shared
 /// line. Times may differ by `tolerance`.
 pub(crate) fn telegram_difference(
@@ -379,7 +307,7 @@ pub(crate) fn telegram_difference(
     tolerance: Span,
     names: [&str; 2],
 ) -> Option<(bool, String)> {
-    let telegrams = [left, right].map(|own| shared(own) == Some(Bus::Nordac));
+    let telegrams = [left, right].map(|own| Carries::of(own) == Carries::Line);
     let found = nordac::report::diff::difference(left, right, tolerance);
     (telegrams == [true; 2]).then(|| (found.is_none(), found.show(names)))
 }

@@ -1,7 +1,8 @@
 //! Captures as other people's adapters, analysers and programs write them: a master 3, a NORDAC inverter 5, and other devices.
 
 use super::{Imported, ReadSettings, read_with};
-use crate::buses::{JudgedFrames, judge_shared};
+use crate::buses::judge_shared;
+use crate::capture::JudgedFrames;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 

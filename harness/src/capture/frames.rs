@@ -3,12 +3,12 @@
 use super::import::candump_time;
 use super::order::{Counts, Place, ordered};
 use super::{Capture, CaptureError, ChannelTarget, Imported, NamedLink};
-use crate::buses::sender_of;
 use crate::counted::counted;
 use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
 use harness_proto::can::{BitRate, CanError, Frame, Id};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use harness_proto::unitek::sender_of;
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use serde::Deserialize;
 use std::collections::BTreeSet;

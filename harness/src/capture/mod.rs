@@ -1,14 +1,10 @@
 //! Captures: what the links of a ring carried, read from a file of any program.
 //!
-//! [`read`] takes the files of many programs (`import` has the table of formats). A capture can be shown in every form that a run can, compared with another ([`diff()`]), turned into a scenario ([`scenario`]), and so be judged against the model
-//! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
-//! compared.
+//! [`read`] takes the files of many programs (`import` has the table of formats). Its bus shows, compares and judges it, and turns it into a scenario.
 //!
 //! Every file gives a capture or an error that names the place. The memory of a capture is bounded by the size of its file, and
 //! that by [`MAX_FILE`].
 
-pub(crate) mod diff;
-pub(crate) mod faults;
 #[cfg(test)]
 mod field_levels_tests;
 #[cfg(test)]
@@ -16,20 +12,19 @@ mod field_tests;
 pub(crate) mod files;
 pub mod frame_diff;
 mod frames;
-pub mod fuzz;
 pub(crate) mod gap;
 mod import;
+pub(crate) mod json;
 pub(crate) mod live;
 mod order;
 mod pcap;
 mod pcapng;
 mod recorder;
+pub mod runs;
+pub(crate) mod senders;
 mod tape;
 mod telegrams;
 
-pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
-pub use crate::buses::rings::capture::scenario::{JudgeOptions, SketchError, scenario};
-pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
 pub(crate) use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
@@ -37,8 +32,10 @@ pub(crate) use tape::Tape;
 
 use crate::counted::counted;
 use crate::regular::{self, Links};
-use harness_proto::line::Rate;
+use crate::scenario::verdict::Verdict;
+use harness_proto::line::{Format, Rate};
 use harness_proto::novobus::address::MAX_DRIVES;
+use harness_proto::profibus::BusRate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Carried, Channel, Remark, Trace};
@@ -331,9 +328,9 @@ impl Capture {
         };
         let lines = self.traces.iter().flat_map(|trace| {
             let all: Vec<&Channel> = trace.channels.iter().collect();
-            match crate::buses::share_a_line(std::slice::from_ref(trace)) {
-                true => vec![line(&all)],
-                false => all.into_iter().map(|own| line(&[own])).collect(),
+            match Carries::of(std::slice::from_ref(trace)) {
+                Carries::Link => all.into_iter().map(|own| line(&[own])).collect(),
+                Carries::Line | Carries::Frames => vec![line(&all)],
             }
         });
         let mut bad = lines.filter(|(damaged, all)| damaged * 4 > *all);
@@ -354,6 +351,36 @@ impl Capture {
             Carried::Frames(frames) => frames.last().map(|own| own.at),
         });
         last.max().unwrap_or(Instant::START)
+    }
+}
+
+/// What came of judging a capture of a shared line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct JudgedFrames {
+    /// Passed, failed, or inconclusive where nothing was compared.
+    pub(crate) verdict: Verdict,
+    /// How many frames or telegrams of drives were compared.
+    pub(crate) compared: usize,
+    /// How many could be compared.
+    pub(crate) replies: usize,
+    /// What differs, a sentence each.
+    pub(crate) differences: Vec<String>,
+    /// What was not compared, a sentence each.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// The formats that a line of octets may have: that of a bus whose stations share it, or that of a ring. The usual one first.
+pub(crate) fn line_formats(shared: bool) -> Vec<Format> {
+    match shared {
+        true => {
+            let usual = BusRate::default();
+            let others = BusRate::ALL.into_iter().filter(|own| *own != usual);
+            std::iter::once(usual)
+                .chain(others)
+                .map(BusRate::format)
+                .collect()
+        }
+        false => Rate::ALL.into_iter().map(Format::from).collect(),
     }
 }
 

@@ -20,9 +20,9 @@ pub(super) use values::nanoseconds;
 use super::frames::{FrameRead, assemble};
 use super::import::unread_octets;
 use super::order::Counts;
+use super::senders::LineRead;
 use super::telegrams::{self, DAY};
 use super::{Assembly, Capture, CaptureError, Imported, NamedLink, line_byte};
-use crate::buses::LineRead;
 use crate::counted::counted;
 use crate::report::pcapng::{
     END, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, MAGIC, PACKET, SECTION,

@@ -4,7 +4,7 @@ use crate::report::pcapng::{Block, COMMENT, END, LINK_TYPE, PACKET, header, pack
 use crate::report::pcapng_telegrams::{self, MOST, octet_time};
 use crate::report::{pcapng_frames, pcapng_telegrams::RECEIVED};
 use harness_proto::time::{Instant, Span};
-use harness_sim::record::{LineByte, LineFrame};
+use harness_sim::record::{Carried, Channel, LineByte, LineFrame, Trace};
 use std::io::{self, Write};
 
 /// The event of a packet without a byte: a change of the state of the line.
@@ -22,6 +22,22 @@ pub(crate) enum Carries {
     Line,
     /// Frames.
     Frames,
+}
+
+impl Carries {
+    /// What these traces carried: frames, octets for all stations, or octets of links.
+    pub(crate) fn of(traces: &[Trace]) -> Self {
+        let channels = traces.iter().flat_map(|trace| &trace.channels);
+        let carries_frames = |own: &Channel| matches!(own.carried, Carried::Frames(_));
+        if channels.clone().any(carries_frames) {
+            return Self::Frames;
+        }
+        let mut channels = channels;
+        match channels.any(|own| own.from.is_none() && own.to.is_none()) {
+            true => Self::Line,
+            false => Self::Link,
+        }
+    }
 }
 
 /// An interface of a capture that is being written.

@@ -1,11 +1,12 @@
 //! What a run carried, in order of time, so that it is recorded again as if it were heard.
 
 use super::recorder::{Carries, Piece, RecordedPlace};
-use crate::buses::{TelegramCutter, bits_per_second, carry_frames, share_a_line, telegrams};
+use super::runs::{bits_per_second, telegrams};
+use super::senders::TelegramCutter;
 use crate::medium::Medium;
 use crate::report::pcapng::name;
 use crate::report::pcapng_frames::rate_of;
-use crate::report::walk::in_time;
+use crate::traffic::in_time;
 use harness_proto::can::BitRate;
 use harness_proto::line::Rate;
 use harness_proto::time::Instant;
@@ -26,12 +27,10 @@ pub(crate) struct Tape {
 impl Tape {
     /// What these traces carried; `rate` is that of the rings, where they are of rings.
     pub(crate) fn of(traces: &[Trace], rate: Rate) -> Self {
-        if carry_frames(traces) {
-            Self::of_frames(traces)
-        } else if share_a_line(traces) {
-            Self::of_telegrams(traces)
-        } else {
-            Self::of_links(traces, rate)
+        match Carries::of(traces) {
+            Carries::Frames => Self::of_frames(traces),
+            Carries::Line => Self::of_telegrams(traces),
+            Carries::Link => Self::of_links(traces, rate),
         }
     }
 
@@ -39,9 +38,11 @@ impl Tape {
     /// end where their own octets say so; what has not ended is left out.
     pub(crate) fn of_ports(traces: &[Trace], medium: Medium, now: Instant) -> Self {
         let bits = medium.bits_per_second();
-        let mut tape = match share_a_line(traces) && !carry_frames(traces) {
-            true => Self::of_line(Carries::Line, bits, cut(traces, medium, now).into_iter()),
-            false => Self::of(traces, Rate::from_bits_per_second(bits).unwrap_or_default()),
+        let mut tape = match Carries::of(traces) {
+            Carries::Line => {
+                Self::of_line(Carries::Line, bits, cut(traces, medium, now).into_iter())
+            }
+            _ => Self::of(traces, Rate::from_bits_per_second(bits).unwrap_or_default()),
         };
         // Where nothing was carried, nothing shows the rate.
         for place in &mut tape.places {

@@ -3,11 +3,13 @@
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::trace::{ShownRun, fits_bus, fits_output, show};
 use crate::bus::Bus;
-use crate::buses::{self, JudgedFrames, carry_frames, share_a_line, telegram_difference};
+use crate::buses::novobus::capture::diff::{ComparedRun, diff as compare};
+use crate::buses::novobus::capture::judge::{Judged, judge};
+use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
+use crate::buses::{self, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
-    Capture, CaptureError, ComparedRun, Imported, JudgeOptions, Judged, ReadSettings,
-    diff as compare, is_capture, judge, read_files, scenario,
+    Capture, CaptureError, Carries, Imported, JudgedFrames, ReadSettings, is_capture, read_files,
 };
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -86,7 +88,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     if is_silent(capture) && !arguments.scenario {
         return nothing(&title, output);
     }
-    if share_a_line(&capture.traces) {
+    if Carries::of(&capture.traces) != Carries::Link {
         return of_shared_line(&imported, &title, setup.as_ref(), arguments, output);
     }
     if !arguments.judge.is_empty() {
@@ -381,7 +383,7 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         ));
         return Ok(Exit::Usage);
     }
-    if carry_frames(&left.traces) {
+    if Carries::of(&left.traces) == Carries::Frames {
         let summary = frame_diff(&left, &right, span(arguments.tolerance));
         output.result(&summary.show([&names[0], &names[1]]))?;
         return Ok(match summary.same() {

@@ -2,7 +2,9 @@
 
 use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
 use super::run::details;
-use crate::buses::{SharedForm, bits_per_second, carry_frames, rows, share_a_line, write_shared};
+use crate::buses::{SharedForm, rows, write_shared};
+use crate::capture::Carries;
+use crate::capture::runs::bits_per_second;
 use crate::command::exit::Exit;
 use crate::command::output::{Output, unless_closed};
 use crate::command::page::writable;
@@ -124,7 +126,7 @@ fn write(
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
-    if share_a_line(shown.traces) {
+    if Carries::of(shown.traces) != Carries::Link {
         let signals = signals(showing);
         return of_shared_line(shown.traces, (format, signals), rows, out);
     }
@@ -199,14 +201,14 @@ pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Outpu
     const OF_RINGS: [TraceFormat; 2] = [TraceFormat::Svg, TraceFormat::Vcd];
     let name = format.to_possible_value();
     let name = name.as_ref().map_or("", |value| value.get_name());
-    let why = match (carry_frames(traces), share_a_line(traces), format) {
-        (true, _, format) if OF_RINGS.contains(&format) => {
+    let why = match (Carries::of(traces), format) {
+        (Carries::Frames, format) if OF_RINGS.contains(&format) => {
             format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json, csv, candump or pcapng")
         }
-        (false, true, TraceFormat::Svg) => {
+        (Carries::Line, TraceFormat::Svg) => {
             format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json, csv, vcd or pcapng")
         }
-        (false, _, TraceFormat::Candump) => {
+        (Carries::Line | Carries::Link, TraceFormat::Candump) => {
             "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()
         }
         _ => return true,

@@ -10,7 +10,8 @@ use super::part::SplitRun;
 use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
-use crate::buses::{SharedForm, share_a_line, write_shared};
+use crate::buses::{SharedForm, write_shared};
+use crate::capture::Carries;
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::regular;
 use crate::report::json;
@@ -340,9 +341,9 @@ impl Keeper for KeptAttempts<'_> {
 pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
     let mut capture = Vec::new();
     // Writing to a Vec cannot fail.
-    let _infallible = match share_a_line(traces) {
-        true => write_shared(traces, SharedForm::Json, &mut capture),
-        false => json::write(traces, &outcome.records, &mut capture),
+    let _infallible = match Carries::of(traces) {
+        Carries::Link => json::write(traces, &outcome.records, &mut capture),
+        Carries::Line | Carries::Frames => write_shared(traces, SharedForm::Json, &mut capture),
     };
     String::from_utf8_lossy(&capture).into_owned()
 }

@@ -21,7 +21,7 @@ use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
 pub const BENCH_TARGETS: [FuzzTarget; 4] = [
     ("scenario", scenario),
     ("rig", rig),
-    ("capture", crate::capture::fuzz::import),
+    ("capture", crate::buses::novobus::capture::fuzz::import),
     ("record", crate::evidence::fuzz::record),
 ];
 

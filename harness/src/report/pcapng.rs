@@ -14,7 +14,7 @@
 //! nothing`. So nothing of the bytes of a trace is lost, and [`crate::capture`] reads them back; what drives remarked is not
 //! in it.
 
-use crate::report::walk::in_time;
+use crate::traffic::in_time;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
 use harness_sim::record::LineByte;

@@ -18,6 +18,15 @@ pub const STOP: u8 = 0xFF;
 /// Most registers with a cycle (ex 9, App 8).
 pub const CYCLES: usize = 8;
 
+/// The drive that sends a frame where identifiers are those of 3.1: 180 + n is drive n. `None` for other frames.
+#[must_use]
+pub fn sender_of(frame: &Frame) -> Option<u8> {
+    let number = frame.id().number();
+    let of_drive =
+        (0x181..=0x1FF).contains(&number) && !frame.id().is_extended() && !frame.is_remote();
+    u8::try_from(number & 0x7F).ok().filter(|_| of_drive)
+}
+
 /// What a drive reads out of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Request {

@@ -20,7 +20,7 @@ mod table;
 pub mod units;
 pub mod words;
 
-pub use frame::{DEFAULT_RX, DEFAULT_TX, Data, Ignored, NoReply, Reply, Request};
+pub use frame::{DEFAULT_RX, DEFAULT_TX, Data, Ignored, NoReply, Reply, Request, sender_of};
 pub use register::{Access, BadName, Register, Unit, Width};
 pub use table::{ALIASES, REGISTERS};
 

@@ -1,9 +1,9 @@
 //! A scenario made of a capture: what the master sent is sent again at its time, and what slaves sent is expected.
 
 use super::judge::judge;
-use super::report::pcapng::rate;
-use super::report::{TelegramRun, octets, runs};
-use crate::buses::JudgedFrames;
+use crate::capture::JudgedFrames;
+use crate::capture::runs::rate;
+use crate::capture::runs::{TelegramRun, octets, runs};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::LineError;

@@ -1,7 +1,8 @@
 //! The live page of inverters on PROFIBUS: telegrams as arrows between stations, time down.
 
-use super::report::{Reader, TelegramRun, runs};
+use super::report::Reader;
 use super::serve::SegmentServer;
+use crate::capture::runs::{TelegramRun, runs};
 use crate::counted::counted;
 use crate::serve::{ControlAnswer, ServedBus};
 use crate::web::{

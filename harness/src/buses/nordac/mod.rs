@@ -15,7 +15,6 @@ pub(crate) mod manual;
 pub mod report;
 pub mod rig;
 pub mod safe_state;
-pub(crate) mod senders;
 pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;

@@ -4,7 +4,7 @@
 use super::judge::{Breach, FrameSymptom, HeardFrames, judge, judge_guessed};
 use super::language::{identifier, written};
 use super::serve::bench;
-use crate::buses::JudgedFrames;
+use crate::capture::JudgedFrames;
 use crate::report::pcapng_frames::rate_of;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -244,7 +244,7 @@ fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::unitek::report::sender_of;
+    use harness_proto::unitek::sender_of;
     use harness_sim::record::Channel;
 
     /// A trace of these frames, one each 100 ms.

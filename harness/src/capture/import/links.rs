@@ -6,7 +6,8 @@ use super::levels::Levels;
 use super::numbers::Time;
 use super::uart::{OctetRead, UartFormat, decode, find};
 use super::{Imported, ReadSettings};
-use crate::buses::{self, LineRead};
+use crate::capture::line_formats;
+use crate::capture::senders::LineRead;
 use crate::counted::counted;
 use crate::report::pcapng_telegrams::{PacketOctet, station};
 use harness_proto::line::{Format, Rate};
@@ -235,7 +236,7 @@ fn format(
     }
     let formats = match settings.rate.filter(|_| !shared) {
         Some(rate) => vec![Format::from(rate)],
-        None => buses::line_formats(shared),
+        None => line_formats(shared),
     };
     let lines: Vec<&Levels> = chosen
         .iter()

@@ -24,8 +24,7 @@ pub use links::{ChannelTarget, NamedLink};
 pub(super) use logs::candump_time;
 pub use uart::UartFormat;
 
-use super::{Capture, CaptureError, frames, pcap, pcapng, telegrams};
-use crate::buses;
+use super::{Capture, CaptureError, frames, json, pcap, pcapng, telegrams};
 use crate::scenario::verdict::Verdict;
 use cut::{Parts, whole_part};
 use harness_proto::line::Rate;
@@ -193,7 +192,7 @@ const FORMATS: [Format; 25] = [
     whole(
         "trace in JSON",
         |bytes| first(bytes) == Some(b'{'),
-        |bytes, settings| Ok(buses::rings::capture::json::read(bytes, settings.rate)?.into()),
+        |bytes, settings| Ok(json::read(bytes, settings.rate)?.into()),
     ),
     whole("bytes in csv", own::is_bytes, |bytes, settings| {
         Ok(own::bytes(bytes, settings.rate)?.into())

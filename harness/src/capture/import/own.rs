@@ -6,7 +6,7 @@ use super::super::telegrams::{self, LATEST};
 use super::super::{Assembly, Capture, CaptureError, ends, line_byte};
 use super::table::{Table, columns, first_line};
 use super::{Imported, ReadSettings};
-use crate::buses;
+use crate::capture::line_formats;
 use crate::report::pcapng_frames::{LOST, MASTER};
 use crate::report::pcapng_telegrams::PacketOctet;
 use harness_proto::can::{CanError, Frame};
@@ -162,7 +162,7 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Imported, CaptureError> {
 pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, _, data, error] = places(&table, TELEGRAMS)?;
-    let formats = buses::line_formats(true);
+    let formats = line_formats(true);
     let given = settings.uart.map(|own| own.format);
     let mut formats: Vec<_> = match given {
         Some(own) => vec![own],

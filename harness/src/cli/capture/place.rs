@@ -1,7 +1,6 @@
 //! The places of a capture: a link of a ring, a line that stations share, or a CAN adapter; and the port that listens there.
 
-use crate::buses::line_formats;
-use crate::capture::{Carries, RecordedPlace, ends};
+use crate::capture::{Carries, RecordedPlace, ends, line_formats};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;
 use crate::port::PortAddress;

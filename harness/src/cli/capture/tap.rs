@@ -2,8 +2,9 @@
 
 use super::CaptureArguments;
 use super::place::{TapAt, TapPort};
-use crate::buses::{TelegramCutter, live_text, sender_of};
+use crate::buses::live_text;
 use crate::capture::live::LiveText;
+use crate::capture::senders::TelegramCutter;
 use crate::capture::{AWAY, Piece, RecordedPlace};
 use crate::command::exit::Exit;
 use crate::counted::counted;
@@ -17,6 +18,7 @@ use crate::trouble::Trouble;
 use harness_proto::can::{CanError, CanEvent, Frame};
 use harness_proto::line::{Format, Received};
 use harness_proto::time::{Instant as LineInstant, Span};
+use harness_proto::unitek::sender_of;
 use harness_sim::record::{FrameEnd, LineByte, LineFrame};
 use rustix::event::{PollFd, PollFlags};
 use std::io;

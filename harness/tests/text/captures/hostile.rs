@@ -56,7 +56,8 @@ fn flipped_bits() {
                 _ => u8::try_from(random(256)).expect("a byte"),
             };
         }
-        let result = std::panic::catch_unwind(|| harness::capture::fuzz::import(&file));
+        let result =
+            std::panic::catch_unwind(|| harness::buses::novobus::capture::fuzz::import(&file));
         assert!(
             result.is_ok(),
             "case {case}; repeat with: DRIVEBENCH_SEED={seed} cargo test --test text flipped_bits"
@@ -71,13 +72,13 @@ fn kept_inputs() {
     let mut played = 0;
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("readable").path();
-        harness::capture::fuzz::import(&std::fs::read(&path).expect("readable"));
+        harness::buses::novobus::capture::fuzz::import(&std::fs::read(&path).expect("readable"));
         played += 1;
     }
     assert!(played > 1);
     for capture in [built_in("9.8-two-check-sequences"), run(DAMAGED)] {
-        harness::capture::fuzz::import(&pcapng(&capture));
-        harness::capture::fuzz::import(&json(&capture));
+        harness::buses::novobus::capture::fuzz::import(&pcapng(&capture));
+        harness::buses::novobus::capture::fuzz::import(&json(&capture));
     }
 }
 

@@ -1,7 +1,10 @@
 //! Captures beside the model, beside each other, and as scenarios.
 
 use super::{DAMAGED, built_in, pcapng, run, text};
-use harness::capture::{Capture, ComparedRun, JudgeOptions, diff, judge, read, scenario};
+use harness::buses::novobus::capture::diff::{ComparedRun, diff};
+use harness::buses::novobus::capture::judge::judge;
+use harness::buses::novobus::capture::scenario::{JudgeOptions, scenario};
+use harness::capture::{Capture, read};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::LineError;

@@ -1,7 +1,9 @@
 //! Captures of adapters that give bytes in portions, late, and that end in the middle of a conversation.
 
 use super::run;
-use harness::capture::{Capture, JudgeOptions, Judged, Listened, judge};
+use harness::buses::novobus::capture::judge::{Judged, judge};
+use harness::buses::novobus::capture::scenario::JudgeOptions;
+use harness::capture::{Capture, Listened};
 use harness::scenario::verdict::Verdict;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte};

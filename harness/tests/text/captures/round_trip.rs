@@ -1,7 +1,8 @@
 //! A written capture is read back unchanged: bytes, times, line status, on every link.
 
 use super::{DAMAGED, built_in, json, pcapng, root, run};
-use harness::capture::{Capture, ComparedRun, diff, read};
+use harness::buses::novobus::capture::diff::{ComparedRun, diff};
+use harness::capture::{Capture, read};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};

@@ -3,8 +3,8 @@
 use super::hex;
 use super::play::{Done, TelegramsSeen};
 use crate::buses::nordac::judge::{ReplySubject, Symptom};
-use crate::buses::nordac::report::Said;
 use crate::buses::nordac::simulate::Setup;
+use crate::capture::runs::Said;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
 use harness_proto::profibus::Telegram;
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,8 @@
 use super::act::{Counts, OutgoingTelegram, TelegramActKind, TelegramTalk, slot};
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::language::plan::SentTelegram;
-use crate::buses::nordac::report::{Said, said};
 use crate::buses::nordac::simulate::{Bench, Setup};
+use crate::capture::runs::{Said, said};
 use crate::explore::line::LineSeen;
 use crate::link::{AnyStimulus, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::scenario::language::Language as _;

@@ -3,7 +3,7 @@
 use super::act::{TelegramActKind, TelegramTalk};
 use super::hex;
 use super::play::{Done, TelegramsSeen};
-use crate::buses::nordac::report::Said;
+use crate::capture::runs::Said;
 use harness_proto::line::LineError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;

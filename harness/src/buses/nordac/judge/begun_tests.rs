@@ -17,7 +17,7 @@
 
 use super::judge;
 use super::tests::{begun_at, scenarios, trace};
-use crate::buses::nordac::report::runs;
+use crate::capture::runs::runs;
 use crate::scenario::source::Source;
 use harness_proto::profibus::fdl::check_sum;
 use harness_proto::time::Span;

@@ -1,6 +1,6 @@
 //! Telegrams of which a capture does not show who has sent them: only the octets of a telegram name its sender.
 
-use crate::buses::nordac::report::{TelegramRun, octet_time};
+use crate::capture::runs::{TelegramRun, octet_time};
 use harness_proto::decode::Decoded;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};

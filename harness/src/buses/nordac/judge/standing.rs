@@ -1,6 +1,6 @@
 //! Whose telegrams are judged: other devices stand on the same line.
 
-use crate::buses::nordac::report::TelegramRun;
+use crate::capture::runs::TelegramRun;
 use harness_proto::nordac::IDENT;
 use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Service, SetPrm};

@@ -1,7 +1,7 @@
 //! Right slaves are never accused, whatever the value of an open point; wrong ones are.
 
 use super::{JudgedSlaves, judge};
-use crate::buses::nordac::report::{octet_time, octets, runs};
+use crate::capture::runs::{octet_time, octets, runs};
 use crate::library::{Entry, sources};
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;

@@ -8,8 +8,8 @@
 //! | `error` | empty, or the first line error and the number of its octet: `parity 3` |
 //! | `service`, `meaning` | as in the table |
 
-use super::telegrams::said;
 use super::words::Reader;
+use crate::capture::runs::said;
 use harness_sim::record::Trace;
 use std::io::Write;
 

@@ -1,7 +1,7 @@
 //! Setpoint and actual value against time, and the states that a status word shows (3.2, 3.3).
 
-use super::telegrams::said;
 use super::words::Reader;
+use crate::capture::runs::said;
 use crate::report::chart::{Chart, Curve};
 use crate::report::html::Html;
 use harness_proto::nordac::words::{State, stw};

@@ -1,8 +1,8 @@
 //! Compares two traces telegram by telegram.
 
 use super::table::station;
-use super::telegrams::{Said, said};
 use super::words::Reader;
+use crate::capture::runs::{Said, said};
 use crate::counted::counted;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;

@@ -14,8 +14,8 @@
 //! | `error` | `null`, `"parity"`, `"framing"`, `"break"`, `"overrun"` or `"dropped"` |
 //! | `bytes` of a telegram | its octets as they arrived |
 
-use super::telegrams::{octets, said};
 use crate::bus::Bus;
+use crate::capture::runs::{octets, said};
 use harness_sim::record::Trace;
 use serde::{Serialize, Serializer};
 use std::io::Write;

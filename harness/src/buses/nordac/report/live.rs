@@ -1,10 +1,10 @@
 //! Telegrams as lines of text while they arrive: the rows of the table.
 
 use super::table::row;
-use super::telegrams::TelegramRun;
 use super::words::Reader;
 use crate::capture::Piece;
 use crate::capture::live::{LiveLine, LiveText};
+use crate::capture::runs::TelegramRun;
 
 /// Text of the telegrams of one line.
 #[derive(Debug, Default)]

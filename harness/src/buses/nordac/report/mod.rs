@@ -8,17 +8,13 @@ pub(crate) mod live;
 pub mod pcapng;
 pub(crate) mod sequence;
 pub mod table;
-mod telegrams;
 mod words;
 
-pub use telegrams::TelegramRun;
-pub(crate) use telegrams::runs;
-pub use telegrams::{Said, said};
-pub(super) use telegrams::{octet_time, octets};
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 
 use crate::bus::Bus;
+use crate::capture::runs::said;
 use crate::report::html::Html;
 use crate::traffic::{SegmentReport, SharedForm, drawn, no_form};
 use harness_sim::record::Trace;

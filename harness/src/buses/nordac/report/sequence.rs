@@ -2,8 +2,8 @@
 //!
 //! Exchanges that repeat the one before them are folded: the first has arrows of its own, and says how many came after it.
 
-use super::telegrams::{Said, said};
 use super::words::Reader;
+use crate::capture::runs::{Said, said};
 use crate::report::html::sequence::{Arrow, SequenceWords};
 use crate::report::html::{self, Html};
 use harness_sim::record::Trace;

@@ -1,7 +1,7 @@
 //! A trace as a table: a row a telegram.
 
-use super::telegrams::{Said, said};
 use super::words::{Reader, Words};
+use crate::capture::runs::{Said, said};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::ops::Range;

@@ -1,6 +1,6 @@
 //! What telegrams say, in words: service, diagnosis, process words, parameter channel.
 
-use super::telegrams::Said;
+use crate::capture::runs::Said;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::{State, ZSW, stw, zsw};
 use harness_proto::nordac::{Answer, Image, Parameter, Pkw, PpoType, Task};

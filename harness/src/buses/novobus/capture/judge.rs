@@ -3,6 +3,7 @@
 use super::begin::{
     Shown, after_silences, from, gaps, is_midway, is_one_telegram, parts, shown, without,
 };
+use super::diff::{ComparedRun, Summary, compare};
 use super::open::explanations;
 use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
@@ -10,7 +11,6 @@ use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::locate::locate;
 use crate::buses::novobus::simulate::simulated;
 use crate::capture::Capture;
-use crate::capture::diff::{ComparedRun, Summary, compare};
 use crate::capture::gap;
 use crate::library::Entry;
 use crate::link::{Link, link_name};

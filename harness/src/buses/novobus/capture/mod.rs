@@ -1,8 +1,10 @@
-//! Captures of a ring: their JSON, a scenario made of one, and one judged against the model.
+//! Captures of a ring: two side by side, a scenario made of one, and one judged against the model.
 
 mod begin;
-pub(crate) mod json;
-pub(crate) mod judge;
+pub mod diff;
+pub(crate) mod faults;
+pub mod fuzz;
+pub mod judge;
 mod open;
-pub(crate) mod scenario;
+pub mod scenario;
 pub(crate) mod stimuli;

@@ -1,11 +1,11 @@
 //! Converts a capture to a scenario: the bytes sent with their times, the faults on the way, and the bytes that came back.
 
+use super::faults::faults;
 use super::stimuli::{Told, told};
 use crate::buses::novobus::language::syntax::{
     CellPlace, DriveRange, Header, RingStep, Setup, SetupKind, Written,
 };
 use crate::capture::Capture;
-use crate::capture::faults::faults;
 use crate::scenario::parse::parse;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problems;

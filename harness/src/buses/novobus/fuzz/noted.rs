@@ -1,6 +1,7 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
 use crate::bus::Bus;
+use crate::buses::novobus::capture::scenario as sketch;
 use crate::capture::{self, CaptureError};
 use crate::evidence;
 use crate::fuzz::{rig as rig_body, scenario as scenario_body};
@@ -72,7 +73,7 @@ pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
 /// # Panics
 /// As the target.
 pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
-    capture::fuzz::import(data);
+    crate::buses::novobus::capture::fuzz::import(data);
     let form = match data.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{') => "JSON",
         _ => "pcapng",
@@ -100,12 +101,12 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     {
         note(arrival(byte).to_owned());
     }
-    let options = capture::JudgeOptions {
+    let options = sketch::JudgeOptions {
         title: "any",
         setup: None,
         tolerance: harness_proto::time::Span::ZERO,
     };
-    note(match capture::scenario(&read, &options) {
+    note(match sketch::scenario(&read, &options) {
         Ok(_) => "a scenario can be made of it".to_owned(),
         Err(error) => shape(&error.to_string()),
     });

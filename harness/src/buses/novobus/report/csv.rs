@@ -14,8 +14,9 @@
 //! | `section` | the section of the rule in the ND21 manual |
 //! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
 
-use super::walk::{ByteSeen, Reader, in_time};
+use super::walk::{ByteSeen, Reader};
 use crate::report::pcapng::name;
+use crate::traffic::in_time;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;

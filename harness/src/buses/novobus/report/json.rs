@@ -22,6 +22,7 @@
 //! | `samples` | what was found: `t_ns`, `raw` (the bytes in hexadecimal digits) and `value` (`null` where they have no meaning) |
 //! | `second` | the same object for the second ring, where there is one |
 
+use crate::capture::json::SCHEMA;
 use crate::scenario::run::CellRecord;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Span;
@@ -30,9 +31,6 @@ use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Remark, Trace};
 use serde::Serialize;
 use std::io::Write;
-
-/// The version of the form.
-pub const SCHEMA: u32 = 1;
 
 #[derive(Serialize)]
 struct Object<'a> {

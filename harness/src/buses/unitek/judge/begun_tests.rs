@@ -2,9 +2,9 @@
 //! one. Times that go back or leap forward, and times that are off.
 
 use super::{FrameSymptom, HeardFrames, JudgedDrives, judge, judge_guessed};
-use crate::buses::unitek::report::sender_of;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::sender_of;
 use harness_sim::record::{FrameEnd, LineFrame, Seam, SeamKind};
 
 /// Frames with their times in tenths of a millisecond.

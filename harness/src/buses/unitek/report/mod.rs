@@ -50,15 +50,6 @@ impl SegmentReport for FrameReport {
     }
 }
 
-/// The drive that sends a frame where identifiers are those of 3.1: 180 + n is drive n. `None` for other frames.
-#[must_use]
-pub fn sender_of(frame: &Frame) -> Option<u8> {
-    let number = frame.id().number();
-    let of_drive =
-        (0x181..=0x1FF).contains(&number) && !frame.id().is_extended() && !frame.is_remote();
-    u8::try_from(number & 0x7F).ok().filter(|_| of_drive)
-}
-
 /// What a frame says: of the bench to a drive, or of a drive.
 #[must_use]
 pub fn meaning(frame: &Frame, of_drive: bool) -> String {

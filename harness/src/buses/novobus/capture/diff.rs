@@ -1,11 +1,11 @@
 //! Two runs side by side: the first byte that differs, and how much does.
 
-use super::Capture;
+use crate::buses::novobus::report::csv::status;
+use crate::buses::novobus::report::meaning::Meaning;
+use crate::buses::novobus::report::walk::Reader;
+use crate::capture::Capture;
 use crate::counted::counted;
-use crate::report::csv::status;
-use crate::report::meaning::Meaning;
 use crate::report::pcapng::name;
-use crate::report::walk::Reader;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};

@@ -35,7 +35,7 @@ impl Said {
 }
 
 /// The octets of all stations with their senders, in order of time.
-pub(in crate::buses::nordac) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
+pub(crate) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
     let channels = trace.channels.iter();
     let all = channels.flat_map(|own| own.octets().iter().map(|octet| (own.from, *octet)));
     let mut all: Vec<_> = all.collect();
@@ -54,17 +54,17 @@ pub struct TelegramRun {
 
 impl TelegramRun {
     /// When the stop bit of its last octet had passed.
-    pub(in crate::buses::nordac) fn at(&self) -> Instant {
+    pub(crate) fn at(&self) -> Instant {
         self.octets.last().map_or(Instant::START, |own| own.at)
     }
 
     /// When the stop bit of its first octet had passed.
-    pub(in crate::buses::nordac) fn begin(&self) -> Instant {
+    pub(crate) fn begin(&self) -> Instant {
         self.octets.first().map_or(Instant::START, |own| own.at)
     }
 
     /// What the other stations read; `None` where nothing arrived.
-    pub(in crate::buses::nordac) fn said(&self) -> Option<Said> {
+    pub(crate) fn said(&self) -> Option<Said> {
         let arrived = self
             .octets
             .iter()
@@ -84,7 +84,7 @@ impl TelegramRun {
 /// The time between the ends of two octets that follow each other without a gap: that of the rate at which most octets of one station
 /// follow each other, since a port may give octets nearer to each other than they came; else their shortest distance. `None` where no two
 /// octets follow each other.
-pub(in crate::buses::nordac) fn octet_time<'t>(
+pub(crate) fn octet_time<'t>(
     octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>,
 ) -> Option<Span> {
     let mut last: Option<(Option<u8>, Instant)> = None;
@@ -140,6 +140,30 @@ pub(crate) fn runs(trace: &Trace) -> Vec<TelegramRun> {
 #[must_use]
 pub fn said(trace: &Trace) -> Vec<Said> {
     runs(trace).iter().filter_map(TelegramRun::said).collect()
+}
+
+/// The rate at which an octet takes as long as the shortest of a trace, give or take a hundredth.
+#[must_use]
+pub(crate) fn rate(trace: &Trace) -> Option<BusRate> {
+    let octets = octets(trace);
+    let shortest = octet_time(octets.iter().map(|(from, own)| (*from, own)))?.units();
+    let fits = |rate: &BusRate| {
+        let own: Span = rate.octet_time();
+        shortest.abs_diff(own.units()) * 100 <= own.units()
+    };
+    BusRate::ALL.into_iter().find(fits)
+}
+
+/// The bit rate of octets on a shared line, by their times; the usual one where they do not show it.
+pub(crate) fn bits_per_second(traces: &[Trace]) -> u32 {
+    let rate = traces.iter().find_map(rate);
+    rate.unwrap_or_default().bits_per_second()
+}
+
+/// The telegrams of a shared line of octets, each with the slave that sent it; `None` is a master.
+pub(crate) fn telegrams(traces: &[Trace]) -> Vec<(Option<u8>, Vec<LineByte>)> {
+    let all = traces.iter().flat_map(runs);
+    all.map(|own| (own.from, own.octets)).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What was damaged on a link, in the words of the scenario language.
 
-use crate::buses::syntax::{FaultStep, LinkEnds};
+use crate::buses::novobus::language::syntax::{FaultStep, LinkEnds};
 use crate::scenario::times::Duration;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Span;

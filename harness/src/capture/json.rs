@@ -1,4 +1,4 @@
-//! Captures in the JSON of `drivebench trace` (see [`crate::report::json`]); keys that are not known are passed over.
+//! Captures in the JSON of `drivebench trace`; keys that are not known are passed over.
 
 use crate::capture::{Assembly, Capture, CaptureError, adjacent, end, line_byte};
 use harness_proto::line::{LineError, Rate};
@@ -57,6 +57,9 @@ struct MarkObject {
     cause: Option<String>,
 }
 
+/// The version of the form.
+pub(crate) const SCHEMA: u32 = 1;
+
 /// The latest time, in nanoseconds, that a byte may have.
 const LATEST: u64 = u64::MAX / 4;
 
@@ -90,7 +93,7 @@ fn wrong<T>(place: impl Into<String>, what: impl Into<String>) -> Result<T, Capt
 
 fn read_ring(object: &Object, ring: usize, assembly: &mut Assembly) -> Result<u8, CaptureError> {
     let place = format!("ring {}", ring + 1);
-    if object.schema != crate::report::json::SCHEMA {
+    if object.schema != SCHEMA {
         let schema = object.schema;
         return wrong(
             place,

@@ -1,7 +1,10 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use super::{ComparedRun, JudgeOptions, ReadSettings, diff, read, read_with, scenario};
-use crate::report::{csv, json, pcapng, svg, vcd};
+use super::diff::{ComparedRun, diff};
+use super::scenario::{JudgeOptions, scenario};
+use crate::buses::novobus::report::{csv, json, svg};
+use crate::capture::{ReadSettings, read, read_with};
+use crate::report::{pcapng, vcd};
 use harness_proto::time::Span;
 
 /// The longest input that is looked at.
