@@ -348,7 +348,7 @@ fn keep(
                 plan.play(&mut recording, AtMismatch::Stop)
             };
             let traces = (0..plan.ports()).map(|port| link.trace(port)).collect();
-            let attempt = Attempt::on_own_rings(played, traces);
+            let attempt = Attempt::new(played, traces);
             kept.ends(1, &attempt);
             PlayedOnce {
                 outcome: attempt.outcome,

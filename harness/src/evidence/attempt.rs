@@ -3,6 +3,7 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
+use crate::buses::rings::rig::Beside;
 use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::LinkName;
 use crate::library::Entry;
@@ -20,6 +21,7 @@ use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use std::sync::Arc;
 
 /// How much longer a busy computer may have waited in one attempt; for records without looks.
 const WAITED: Span = Span::from_millis(1_000);
@@ -116,7 +118,7 @@ pub(super) fn again(
                 SessionError::Ill {
                     rig,
                     ring,
-                    ill,
+                    ill: Box::new(ill),
                     cause: None,
                 }
                 .to_string(),
@@ -149,17 +151,17 @@ pub(super) fn again(
         alive: &|| {},
     };
     let assumed = judge(&mut outcome, &heard);
-    let mut attempt = Attempt::on_own_rings(outcome, Vec::new());
+    let mut attempt = Attempt::new(outcome, Vec::new());
     (attempt.opening, attempt.unplaced) = (opening, unplaced);
     if header.qualified {
-        attempt = Attempt {
+        let beside = Beside {
             conversations,
             comparisons,
             driven,
-            master_is_right,
-            ..attempt
-        }
-        .beside(assumed);
+            assumed: Default::default(),
+        };
+        attempt.master_is_right = master_is_right;
+        attempt.own = Some(Arc::new(beside.with(assumed)));
     }
     Again {
         attempt,
@@ -203,7 +205,7 @@ pub(super) fn again_on_segment(
         attempt: Attempt {
             opening: judged.before,
             unplaced,
-            ..Attempt::on_own_rings(judged.outcome, Vec::new())
+            ..Attempt::new(judged.outcome, Vec::new())
         },
         stale: false,
         left: judged.left,
@@ -246,7 +248,7 @@ fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
         capture: Some(capture(&traces, &outcome)),
         exact: true,
         trouble: false,
-        attempt: Attempt::on_own_rings(outcome, traces),
+        attempt: Attempt::new(outcome, traces),
         stale: false,
         left: None,
         other: first_difference(&recorded.events, &events),
@@ -277,7 +279,7 @@ impl Again {
     /// Nothing could be played.
     fn impossible(why: String) -> Self {
         Self {
-            attempt: Attempt::on_own_rings(Outcome::rig_error(why), Vec::new()),
+            attempt: Attempt::new(Outcome::rig_error(why), Vec::new()),
             stale: false,
             left: None,
             other: None,

@@ -181,7 +181,7 @@ impl Settling<'_> {
 fn settled(attempts: &[Judged]) -> Vec<Attempt> {
     let outcomes = attempts.iter().filter_map(Judged::outcome);
     outcomes
-        .map(|outcome| Attempt::on_own_rings(outcome, Vec::new()))
+        .map(|outcome| Attempt::new(outcome, Vec::new()))
         .collect()
 }
 

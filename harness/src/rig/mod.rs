@@ -38,9 +38,9 @@ pub use find::{FindError, find};
 pub use in_use::{End, UseOptions};
 pub use open::OpenRigError;
 pub(crate) use open::{line_rate, stated_rate};
-pub(crate) use permitted::{limits, standing};
+pub(crate) use permitted::standing;
 pub(crate) use played::{Again, attempts_of};
-pub use played::{Attempt, PlayedScenario};
+pub use played::{Attempt, Keeper, PlayedScenario};
 pub use profile::{
     KnownProfile, Profile, ProfileError, ProfileLines, ProfileSetup, SettledProperty,
 };
@@ -50,7 +50,6 @@ pub use watchdog::Alarm;
 
 /// Rigs with rings in use, and how they are examined and judged.
 pub use crate::buses::rings::rig::{
-    Driven, Keeper, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures,
-    play_one,
+    Driven, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures, play_one,
 };
-pub(crate) use crate::buses::rings::rig::{judge, left_open, run, sim, wrong_parity};
+pub(crate) use crate::buses::rings::rig::{judge, run, sim, wrong_parity};

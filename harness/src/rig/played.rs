@@ -1,15 +1,13 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
-use super::Driven;
 use super::Rig;
-use crate::buses::syntax::Header;
-use crate::buses::twin::{Comparison, Conversation, Divergence};
-use crate::rig::left_open::Explanation;
+use crate::link::Sink;
 use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
-use harness_proto::time::Span;
 use harness_sim::record::Trace;
+use std::any::Any;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
@@ -34,52 +32,31 @@ const MOST_UNREADY: usize = 3;
 /// One attempt at a scenario.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// The outcome, after the comparison with the twin.
+    /// The outcome, after the comparison with the model where there is one.
     pub outcome: Outcome,
-    /// The conversations, those of the health check and of what is set up before among them.
-    pub conversations: Vec<Conversation>,
-    /// How they compare with the twin's.
-    pub comparisons: Vec<Comparison>,
     /// What the links carried in the scenario itself, ring by ring.
     pub traces: Vec<Trace>,
     /// Number of line errors that the transport reported without their bytes.
     pub unplaced: u64,
-    /// What the bench's own master did in it on a simulated rig, if it had a part.
-    pub driven: Option<Driven>,
     /// Whether that is what the master of the manual does.
     pub master_is_right: bool,
     /// How the bytes received before the drives were reset compare with a ring at rest; `None` where they are judged with the rest.
     pub opening: Option<String>,
-    /// The choices of the manual with which it was compared, where the model's defaults do not explain what came before the scenario.
-    pub assumed: Header,
+    /// What the bus keeps of it beside that.
+    pub own: Option<Arc<dyn Any + Send + Sync>>,
 }
 
 impl Attempt {
-    /// An attempt on simulated rings of its own, which no twin stands beside.
+    /// An attempt of which nothing else is known.
     #[must_use]
-    pub fn on_own_rings(outcome: Outcome, traces: Vec<Trace>) -> Self {
+    pub const fn new(outcome: Outcome, traces: Vec<Trace>) -> Self {
         Self {
             outcome,
             traces,
-            conversations: Vec::new(),
-            comparisons: Vec::new(),
             unplaced: 0,
-            driven: None,
             master_is_right: true,
             opening: None,
-            assumed: Header::default(),
-        }
-    }
-
-    /// The attempt, compared with drives of these choices.
-    pub(crate) fn beside(self, assumed: Option<Explanation>) -> Self {
-        match assumed {
-            None => self,
-            Some(found) => Self {
-                comparisons: found.comparisons,
-                assumed: found.header,
-                ..self
-            },
+            own: None,
         }
     }
 
@@ -87,18 +64,6 @@ impl Attempt {
     #[must_use]
     pub fn was_played(&self) -> bool {
         self.outcome.unready.is_none()
-    }
-
-    /// Whether the first byte that differs follows a silence or a delay of the bench, which may be its cause.
-    #[must_use]
-    pub fn is_silenced(&self) -> bool {
-        self.comparisons.iter().any(|own| own.silenced)
-    }
-
-    /// The attempt, if its steps were played and the bench's own lateness is no cause of a difference in it.
-    #[must_use]
-    pub fn sound(&self) -> Option<&Self> {
-        (self.was_played() && !self.is_silenced()).then_some(self)
     }
 
     /// Why the drives could not be made ready, where a drive gave no answer: the computer may have been the cause.
@@ -112,11 +77,15 @@ impl Attempt {
         let right = [Verdict::Passed, Verdict::Marginal, Verdict::Skipped];
         !right.contains(&self.outcome.verdict) && self.unanswered().is_none()
     }
+}
 
-    /// The first byte that came at another time than the model says.
-    pub(crate) fn untimely(&self) -> Option<&Divergence> {
-        self.comparisons.iter().find_map(|c| c.untimely.as_ref())
-    }
+/// Records attempts: events as they happen, and the outcome of each.
+pub trait Keeper: Sink {
+    /// An attempt begins; the first has the number 1.
+    fn begins(&mut self, attempt: usize);
+
+    /// It has ended.
+    fn ends(&mut self, number: usize, attempt: &Attempt);
 }
 
 /// A scenario that was played as often as the rig's file says.
@@ -172,25 +141,6 @@ impl PlayedScenario {
         played
     }
 
-    /// The last attempt played and its differences from the model, if they say something about the drives. A difference that was not seen
-    /// again may be due to the computer: drives that could not be made ready once, and, in real time, every byte that was late.
-    #[must_use]
-    pub fn telling(&self, real_time: bool) -> Option<(&Attempt, Vec<&Divergence>)> {
-        let last = self.last_played()?;
-        let divergences: Vec<_> = match self.outcome.verdict {
-            Verdict::Passed | Verdict::Flaky | Verdict::Inconclusive => Vec::new(),
-            // What the bench or its line could not do says nothing about a drive.
-            Verdict::Aborted | Verdict::RigError if real_time => Vec::new(),
-            Verdict::Marginal if real_time => Vec::new(),
-            Verdict::Marginal => last.untimely().into_iter().collect(),
-            _ => {
-                let all = last.comparisons.iter();
-                all.filter_map(|c| c.divergence.as_ref()).collect()
-            }
-        };
-        (!divergences.is_empty()).then_some((last, divergences))
-    }
-
     /// Whether the rig failed, and not the bench's own master: nothing more can be played.
     #[must_use]
     pub fn shows_an_ill_rig(&self) -> bool {
@@ -203,18 +153,6 @@ impl PlayedScenario {
     pub fn last_played(&self) -> Option<&Attempt> {
         let played = self.attempts.iter().rfind(|own| own.was_played());
         played.or(self.attempts.last())
-    }
-
-    /// The first byte of the last attempt that came late, if a byte was late at every attempt, at the same place and by the same time.
-    #[must_use]
-    pub fn late_each_time(&self, tolerance: Span) -> Option<&Divergence> {
-        let late = self.last_played()?.untimely()?;
-        let mut played = self.attempts.iter().filter(|own| own.was_played());
-        let like = |attempt: &Attempt| {
-            let there = attempt.untimely();
-            there.is_some_and(|there| there.is_like(late, tolerance))
-        };
-        (self.outcome.verdict == Verdict::Marginal && played.all(like)).then_some(late)
     }
 }
 
@@ -271,11 +209,7 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::twin::{Role, Symptom};
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
-    use harness_proto::line::Received;
-
-    use harness_proto::time::Instant;
 
     const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";
     const OTHER: &str = "cell FF00 of drive 0: it does not answer ResetH8";
@@ -283,25 +217,17 @@ mod tests {
 
     /// An attempt that ended like this; with one of the remarks above, before its first step.
     fn attempt(verdict: Verdict, remark: &str) -> Attempt {
-        Attempt {
-            driven: None,
-            master_is_right: true,
-            opening: None,
-            assumed: Header::default(),
-            outcome: Outcome {
-                verdict,
-                unready: match remark {
-                    SILENT | OTHER => Some(Unready::NoAnswer),
-                    DIFFERS => Some(Unready::Differs),
-                    _ => None,
-                },
-                ..Outcome::rig_error(remark.to_owned())
-            },
-            conversations: Vec::new(),
-            comparisons: Vec::new(),
-            traces: Vec::new(),
-            unplaced: 0,
-        }
+        let unready = match remark {
+            SILENT | OTHER => Some(Unready::NoAnswer),
+            DIFFERS => Some(Unready::Differs),
+            _ => None,
+        };
+        let outcome = Outcome {
+            verdict,
+            unready,
+            ..Outcome::rig_error(remark.to_owned())
+        };
+        Attempt::new(outcome, Vec::new())
     }
 
     fn of(ends: &[(Verdict, &str)]) -> Verdict {
@@ -373,35 +299,6 @@ mod tests {
         assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 
-    /// An attempt in which the byte at a place of the scenario differs: it is `late` milliseconds late, or has another value.
-    fn differing(attempt: Attempt, step: usize, late: Option<u64>) -> Attempt {
-        let byte = |at| Some((Instant::START + Span::from_millis(at), Received::good(0x80)));
-        let divergence = Divergence {
-            ring: 0,
-            byte: step + 7,
-            what: late.map_or(Symptom::Value, |_| Symptom::Time),
-            expected: byte(100),
-            received: byte(100 + late.unwrap_or(0)),
-            role: Role::Foreign,
-            rule: Role::Foreign.rule(),
-            step: Some(step),
-            drive: Some(1),
-        };
-        let comparison = Comparison {
-            divergence: late.is_none().then(|| divergence.clone()),
-            untimely: late.map(|_| divergence),
-            ..Comparison::default()
-        };
-        Attempt {
-            comparisons: vec![comparison],
-            ..attempt
-        }
-    }
-
-    fn tells(attempts: Vec<Attempt>) -> bool {
-        PlayedScenario::of(attempts).telling(true).is_some()
-    }
-
     #[test]
     fn nothing_disturbs_a_drive_where_time_is_virtual() {
         let again = &mut Again::new(false);
@@ -418,43 +315,5 @@ mod tests {
         let passed = vec![attempt(Failed, SILENT), attempt(Passed, "well")];
         let told = ["well", "2 attempts: failed, passed", SILENT];
         assert_eq!(PlayedScenario::of(passed).outcome.remarks, told);
-    }
-
-    #[test]
-    fn what_did_not_come_again_tells_nothing_of_the_drives() {
-        let failed = || differing(attempt(Failed, ""), 3, None);
-        assert!(tells(vec![failed()]));
-        assert!(tells(vec![failed(), failed()]));
-        assert!(!tells(vec![failed(), attempt(Passed, "")]));
-        assert!(!tells(vec![attempt(Failed, "")]));
-        assert!(!tells(vec![differing(attempt(Inconclusive, ""), 3, None)]));
-        let unready = || differing(attempt(Failed, SILENT), 0, None);
-        assert!(tells(vec![unready(), unready(), unready()]));
-        assert!(!tells(vec![unready(), attempt(Passed, "")]));
-        assert!(!tells(vec![unready(), attempt(Failed, OTHER)]));
-        assert!(tells(vec![unready(), failed()]));
-        assert!(tells(vec![differing(attempt(Failed, DIFFERS), 0, None)]));
-    }
-
-    /// A computer can be as late at every attempt: in real time that is no difference of the drives.
-    #[test]
-    fn bytes_that_are_late_each_time_are_told_and_blame_no_drive() {
-        let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
-        let each_time = |attempts: Vec<Attempt>| {
-            let played = PlayedScenario::of(attempts);
-            assert!(played.telling(true).is_none());
-            assert_eq!(
-                played.telling(false).is_some(),
-                played.outcome.verdict == Marginal
-            );
-            played.late_each_time(Span::from_millis(20)).is_some()
-        };
-        assert!(each_time(vec![late(3, 40), late(3, 45), late(3, 25)]));
-        assert!(!each_time(vec![late(3, 40), late(3, 90), late(3, 40)]));
-        assert!(!each_time(vec![late(3, 40), late(5, 40), late(3, 40)]));
-        let passed = attempt(Passed, "");
-        assert!(!each_time(vec![late(3, 40), late(3, 40), passed]));
-        let unready = differing(attempt(Failed, SILENT), 0, None);
-        assert!(each_time(vec![late(3, 40), unready, late(3, 40)]));
     }
 }

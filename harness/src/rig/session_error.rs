@@ -4,7 +4,10 @@ use super::hook::HookError;
 use super::in_use::End;
 use super::lock::LockError;
 use super::open::OpenRigError;
-use crate::rig::{LikelyCause, Unhealthy};
+use std::error::Error;
+
+/// What the bus of a rig says of it.
+type Finding = Box<dyn Error + Send + Sync>;
 
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -81,29 +84,29 @@ pub enum SessionError {
         end: Option<Box<End>>,
     },
     /// It is not healthy.
-    #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_ref()))]
+    #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_deref()))]
     Ill {
         /// Which.
         rig: String,
         /// Which ring, 1 or 2.
         ring: usize,
         /// What is wrong.
-        ill: Unhealthy,
+        ill: Finding,
         /// The likely cause, and what to do next; only known when a rig is opened.
-        cause: Option<LikelyCause>,
+        cause: Option<Finding>,
     },
 }
 
 impl SessionError {
     /// The same of a rig that is not healthy, with its likely cause.
-    pub(crate) fn because(mut self, likely: LikelyCause) -> Self {
+    pub(crate) fn because(mut self, likely: impl Error + Send + Sync + 'static) -> Self {
         if let Self::Ill { cause, .. } = &mut self {
-            *cause = Some(likely);
+            *cause = Some(Box::new(likely));
         }
         self
     }
 }
 
-fn likely(cause: Option<&LikelyCause>) -> String {
+fn likely(cause: Option<&(dyn Error + Send + Sync)>) -> String {
     cause.map_or(String::new(), |cause| format!(". Likely cause: {cause}"))
 }

@@ -6,6 +6,7 @@
 
 use crate::blind::Blind;
 use harness::buses::novobus::simulate::simulated;
+use harness::buses::rings::rig::OnRings as _;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
 use harness::qualify::deviating_masters;
@@ -273,7 +274,7 @@ fn every_wrong_master_is_named() {
         let driven: Vec<_> = played
             .attempts
             .iter()
-            .filter_map(|a| a.driven.clone())
+            .filter_map(|a| a.beside().driven.clone())
             .collect();
         assert!(!driven.is_empty(), "{}", deviation.name);
         let named = deviating_masters(&driven);

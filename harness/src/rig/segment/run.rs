@@ -252,7 +252,7 @@ impl<P: PortPlayer> PortRun<P> {
         Attempt {
             opening: Some(before),
             unplaced,
-            ..Attempt::on_own_rings(outcome, traces)
+            ..Attempt::new(outcome, traces)
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::blame::{Culprit, Meant, Sighting, Trial, agreed, culprit};
 use super::diagnose::{Named, RingSeen};
 use super::pinned::Pinned;
+use crate::buses::novobus::rig::{OnRings, PlayedOnRings};
 use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::counted::counted;
 use crate::rig::{Attempt, Driven, PlayedScenario};
@@ -82,7 +83,7 @@ impl Findings {
         };
         self.note_attempts(name, played);
         self.played += 1;
-        for comparison in &last.comparisons {
+        for comparison in &last.beside().comparisons {
             let own = comparison.measured + comparison.adopted.len() as u64;
             self.bytes += comparison.compared.saturating_sub(own);
             self.own += own;
@@ -90,7 +91,7 @@ impl Findings {
         match self.why_open(played, last) {
             None => {
                 self.equal += 1;
-                self.alike.push(last.conversations.clone());
+                self.alike.push(last.beside().conversations.clone());
             }
             Some(why) => self.note_unequal(name, why, played, last),
         }
@@ -104,7 +105,7 @@ impl Findings {
         };
         self.note_attempts(name, played);
         match self.why_open(played, last) {
-            None => self.alike.push(last.conversations.clone()),
+            None => self.alike.push(last.beside().conversations.clone()),
             Some(why) => self.note_unequal(name, why, played, last),
         }
     }
@@ -118,8 +119,9 @@ impl Findings {
     /// Why a scenario was not compared to its end, or not equal; `None` where it was both.
     fn why_open(&self, played: &PlayedScenario, last: &Attempt) -> Option<&'static str> {
         let differs = differs(last);
-        let left_out = last.comparisons.iter().any(|own| own.left_out);
-        let whole = last.comparisons.len() == last.conversations.len() && !left_out;
+        let left_out = last.beside().comparisons.iter().any(|own| own.left_out);
+        let whole =
+            last.beside().comparisons.len() == last.beside().conversations.len() && !left_out;
         Some(match played.outcome.verdict {
             Verdict::Skipped => "the drives could not be made ready",
             Verdict::Inconclusive if last.is_silenced() => {
@@ -148,7 +150,7 @@ impl Findings {
     pub(super) fn note_attempts(&mut self, name: &str, played: &PlayedScenario) {
         self.failed |= played.outcome.verdict == Verdict::Failed;
         for attempt in &played.attempts {
-            self.driven.extend(attempt.driven.clone());
+            self.driven.extend(attempt.beside().driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
             let sighting = self.sighting(attempt);
             self.sightings
@@ -157,11 +159,11 @@ impl Findings {
         let Some((attempt, divergences)) = played.telling(self.tolerance > Span::ZERO) else {
             return;
         };
-        let own = match attempt.driven {
+        let own = match attempt.beside().driven {
             Some(_) => &mut self.with_driver,
             None => &mut self.differing,
         };
-        own.push(attempt.conversations.clone());
+        own.push(attempt.beside().conversations.clone());
         for there in divergences {
             self.suspects
                 .extend(there.drive.into_iter().chain(there.role.drive()));
@@ -172,10 +174,15 @@ impl Findings {
 
     /// Where an attempt differed.
     fn sighting(&self, attempt: &Attempt) -> Option<Sighting> {
-        let mut comparisons = attempt.comparisons.iter().enumerate();
+        let mut comparisons = attempt.beside().comparisons.iter().enumerate();
         let found = comparisons.find(|(_, own)| own.divergence.is_some());
         let found = found.filter(|_| attempt.outcome.verdict == Verdict::Failed)?;
-        Sighting::of(&attempt.conversations, found, self.drives, self.byte_time)
+        Sighting::of(
+            &attempt.beside().conversations,
+            found,
+            self.drives,
+            self.byte_time,
+        )
     }
 
     /// Where attempts differed, each with the name of its scenario.
@@ -192,7 +199,7 @@ impl Findings {
             (true, None) => Some(Meant::Nobody),
             (false, _) => None,
         };
-        let conversations = last.conversations.clone();
+        let conversations = last.beside().conversations.clone();
         match played.telling(self.tolerance > Span::ZERO) {
             Some(_) => self.differing.push(conversations),
             None if found.is_none() => self.alike.push(conversations),
@@ -398,7 +405,7 @@ impl Findings {
 
 /// Whether a byte of an attempt differs from the model's.
 fn differs(attempt: &Attempt) -> bool {
-    let mut comparisons = attempt.comparisons.iter();
+    let mut comparisons = attempt.beside().comparisons.iter();
     comparisons.any(|own| own.divergence.is_some())
 }
 

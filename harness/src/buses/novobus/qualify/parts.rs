@@ -5,6 +5,7 @@
 
 use super::settle::{Answer, between};
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::rig::OnRings;
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::rig::PlayedScenario;
 use crate::scenario::verdict::Verdict;
@@ -69,7 +70,9 @@ impl Parts {
             return false;
         }
         let attempts = played.attempts.iter();
-        let heard = attempts.map(|own| Bytes::all(&own.conversations)).collect();
+        let heard = attempts
+            .map(|own| Bytes::all(&own.beside().conversations))
+            .collect();
         let heard = (played.outcome.verdict, heard);
         if self.other.is_some() {
             return self.conversations.get(name) == Some(&heard);

@@ -12,6 +12,7 @@ use super::pinned::questions;
 use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
 use super::settle::{Answer, answer, silence};
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::rig::OnRings;
 use crate::buses::novobus::twin::{Exactness, SILENCED, Twin};
 use crate::library::Entry;
 use crate::link::{Link as _, Octets as _};
@@ -167,7 +168,7 @@ impl Qualification {
     /// Takes over the choices with which a scenario was compared, for what is asked of the ring later.
     fn assume(&mut self, played: &PlayedScenario) {
         if self.assumed.setups.is_empty() {
-            let assumed = played.attempts.iter().map(|own| &own.assumed);
+            let assumed = played.attempts.iter().map(|own| &own.beside().assumed);
             let found = assumed.into_iter().find(|own| !own.setups.is_empty());
             found.into_iter().for_each(|own| self.assumed = own.clone());
         }
@@ -260,7 +261,7 @@ impl Qualification {
     /// Notes which drives hold bytes back. Where times are exact the model has judged them.
     fn measure(&mut self, played: &PlayedScenario) {
         let last = played.last_played().and_then(Attempt::sound);
-        let last = last.and_then(|own| own.conversations.last());
+        let last = last.and_then(|own| own.beside().conversations.last());
         let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
         let held = last.map(|own| held_back(self.drives, self.facts.byte_time, own));
         for own in held.into_iter().flatten() {
@@ -304,7 +305,7 @@ impl Qualification {
         let Some(last) = played.last_played().filter(|_| right) else {
             return Ok(false);
         };
-        for entry in marches(self.drives, drive, &last.conversations) {
+        for entry in marches(self.drives, drive, &last.beside().conversations) {
             if self.compare(bench, &entry)?.is_none() {
                 return Ok(true);
             }
@@ -324,7 +325,7 @@ impl Qualification {
             }
             let played = bench.play(&question.entry)?;
             let last = played.last_played().and_then(Attempt::sound);
-            let shown = last.and_then(|own| question.answer(&own.conversations));
+            let shown = last.and_then(|own| question.answer(&own.beside().conversations));
             shown
                 .into_iter()
                 .for_each(|own| self.findings.note_pinned(own));
@@ -538,7 +539,7 @@ impl Qualification {
                 };
                 silenced |= attempt.is_silenced();
                 late |= attempt.untimely().is_some();
-                conversations.push(attempt.conversations.clone());
+                conversations.push(attempt.beside().conversations.clone());
                 last.push((entry.short_name(), played));
             }
             if self.parts.repeats_probe(&conversations) {
@@ -578,7 +579,7 @@ impl Qualification {
         let Some(attempt) = played.last_played().and_then(Attempt::sound) else {
             return Ok(Err(played.outcome.remarks.join("; ")));
         };
-        let mut own = attempt.conversations.iter();
+        let mut own = attempt.beside().conversations.iter();
         let last = own.rfind(|own| own.has_steps());
         let place = (self.drives, drive);
         let answer = last.map(|own| silence(property, place, own, self.facts.byte_time));

@@ -1,5 +1,6 @@
 //! A ring with ports: in use, its scenarios, whether it is sound, what its line is like, and its figures.
 
+mod beside;
 #[cfg(test)]
 mod busy;
 mod cause;
@@ -11,15 +12,18 @@ pub(crate) mod interlock;
 pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
+mod permitted;
 mod put_back;
 pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;
 pub(crate) mod wrong_parity;
 
+pub use beside::{Beside, OnRings, PlayedOnRings};
 pub use cause::LikelyCause;
 pub use condition::InterlockCondition;
 pub use driven::Driven;
 pub use health::{RingHealth, Unhealthy, examine};
-pub use run::{Keeper, Run, Way, play_one};
+pub(crate) use permitted::limits;
+pub use run::{Run, Way, play_one};
 pub use session::Session;

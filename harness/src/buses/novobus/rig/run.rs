@@ -1,6 +1,7 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
+use super::beside::Beside;
 use super::driven::Driven;
 use super::health::{Unhealthy, examine};
 use super::judge::{AttemptFacts, judge, known};
@@ -16,7 +17,7 @@ use crate::guard::Guarded;
 use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
-use crate::rig::{Again, Attempt, PlayedScenario, Rig, SessionError, attempts_of};
+use crate::rig::{Again, Attempt, Keeper, PlayedScenario, Rig, SessionError, attempts_of};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well};
@@ -31,15 +32,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How long bytes are waited for that an attempt has not received, so that the next one does not take them for its own. A busy computer
 /// can hold them back for longer than a ring does.
 const LATEST: Span = Span::from_millis(250);
-
-/// Records attempts: events as they happen, and the outcome of each.
-pub trait Keeper: Sink {
-    /// An attempt begins; the first has the number 1.
-    fn begins(&mut self, attempt: usize);
-
-    /// It has ended.
-    fn ends(&mut self, number: usize, attempt: &Attempt);
-}
 
 /// A rig that scenarios are played on, and its twin.
 pub struct Run<'s> {
@@ -240,18 +232,19 @@ impl<'s> Run<'s> {
         };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
         let assumed = judge(&mut outcome, &facts);
-        Ok(Attempt {
-            driven,
-            master_is_right,
-            outcome,
+        let beside = Beside {
             conversations,
             comparisons,
-            traces,
+            driven,
+            assumed: Header::default(),
+        };
+        Ok(Attempt {
+            master_is_right,
             unplaced,
             opening,
-            assumed: Header::default(),
-        }
-        .beside(assumed))
+            own: Some(Arc::new(beside.with(assumed))),
+            ..Attempt::new(outcome, traces)
+        })
     }
 
     /// How attempts go on this rig.

@@ -3,6 +3,7 @@
 use super::cause::{self, LikelyCause};
 use super::health::{self, RingHealth, Unhealthy, examine};
 use super::interlock::Interlocks;
+use super::limits;
 use super::line_test::{self, RingPace};
 use super::put_back::Before;
 use crate::buses::novobus::driver::{Axis, count_behind};
@@ -16,7 +17,7 @@ use crate::rig::lock::{PortLock, RigLock};
 use crate::rig::open::{Opened, open};
 use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
-use crate::rig::{Alarm, Ends, Rig, SessionError, UseOptions, limits, state, stated_rate};
+use crate::rig::{Alarm, Ends, Rig, SessionError, UseOptions, state, stated_rate};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
@@ -130,10 +131,10 @@ impl Session {
             match Self::open_as_stated(other, &plain).map(Self::release) {
                 Ok(_) => Some(true),
                 Err(interrupted @ SessionError::Interrupted { .. }) => return Err(interrupted),
-                Err(SessionError::Ill { ill, .. }) => match ill {
+                Err(SessionError::Ill { ill, .. }) => match ill.downcast_ref() {
                     // Its drives have answered.
-                    Unhealthy::Slow { .. } | Unhealthy::Late { .. } => Some(true),
-                    Unhealthy::Trouble(_) => None,
+                    Some(Unhealthy::Slow { .. } | Unhealthy::Late { .. }) => Some(true),
+                    Some(Unhealthy::Trouble(_)) => None,
                     _ => Some(false),
                 },
                 Err(_) => None,
@@ -342,8 +343,8 @@ impl Session {
             Some(ring) => Err(SessionError::Ill {
                 rig: self.rig.id().to_owned(),
                 ring: ring + 1,
-                ill: Unhealthy::talking(&heard[ring]),
-                cause: Some(cause::unasked(&heard[ring])),
+                ill: Box::new(Unhealthy::talking(&heard[ring])),
+                cause: Some(Box::new(cause::unasked(&heard[ring]))),
             }),
             None => Ok(true),
         }
@@ -356,7 +357,8 @@ impl Session {
         }
         match self.examined() {
             Err(SessionError::Ill { ill, .. })
-                if self.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
+                if self.ill_as_well
+                    && !matches!(ill.downcast_ref(), Some(Unhealthy::Trouble(_))) => {}
             Err(error) => return Err(self.with_cause(error)),
             Ok(health) => self.opening = Some(health),
         }
@@ -390,15 +392,20 @@ impl Session {
                         let heard = line_test::listen(&mut self.link, ring - 1);
                         let drives = file.as_ref().map_or(0, |file| file.drives);
                         let of_marks = file.and_then(|file| cause::of_marks(&file, &heard));
-                        let other = || cause::cause(&ill, &heard, (drives, self.rate()));
+                        let ill = ill.downcast_ref().unwrap_or(&Unhealthy::Silent);
+                        let other = || cause::cause(ill, &heard, (drives, self.rate()));
                         Some(of_marks.unwrap_or_else(other))
                     }
                 };
-                SessionError::Ill {
+                let error = SessionError::Ill {
                     rig,
                     ring,
                     ill,
-                    cause,
+                    cause: None,
+                };
+                match cause {
+                    Some(cause) => error.because(cause),
+                    None => error,
                 }
             }
             other => other,
@@ -426,12 +433,7 @@ impl Session {
                 RingPace::Late(late) => (Unhealthy::Late { late }, LikelyCause::HeldUp),
                 RingPace::AsSent => continue,
             };
-            return Err(SessionError::Ill {
-                rig: self.rig.id().to_owned(),
-                ring: ring + 1,
-                ill,
-                cause: Some(cause),
-            });
+            return Err(self.ill(ring, ill).because(cause));
         }
         Ok(())
     }
@@ -540,7 +542,7 @@ impl Session {
         SessionError::Ill {
             rig: self.rig.id().to_owned(),
             ring: ring + 1,
-            ill,
+            ill: Box::new(ill),
             cause: None,
         }
     }

@@ -82,6 +82,14 @@ impl FromIterator<Setup> for Header {
 }
 
 impl Header {
+    /// A header without lines.
+    pub const NONE: Self = Self {
+        rings: Vec::new(),
+        rate: None,
+        setups: Vec::new(),
+        master: None,
+    };
+
     /// A header with rings of these sizes.
     #[must_use]
     pub fn of_rings(sizes: &[u8]) -> Self {
