@@ -18,12 +18,12 @@
 #[expect(dead_code, reason = "only tests write a rig file of it")]
 mod ring;
 
+use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::simulate;
 use harness::library::Entry;
 use harness::link::{Line, Link, Octets};
 use harness::port::PortAddress;
 use harness::rig::{Rig, Run, Session, UseOptions, parse};
-use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::source::Source;
 use harness_proto::time::Span;

@@ -1,14 +1,15 @@
 //! Where scenarios come from: the files and folders that are named, or the built-in ones.
 
 use crate::bus::Bus;
+use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::language::syntax::Scenario;
 use crate::buses::settle;
 use crate::regular;
 use crate::scenario::parse::{self, parse};
-use crate::scenario::plan::{Plan, plan};
+use crate::scenario::plan::plan;
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::settled::Settled;
 use crate::scenario::source::{Source, SourceError};
-use crate::scenario::syntax::Scenario;
 use crate::traffic::SegmentReport;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};

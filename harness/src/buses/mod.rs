@@ -18,9 +18,6 @@ pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
 pub use novobus::stream::StreamLink;
 
-/// The bus of a scenario without a `bus` line.
-pub use novobus::language::Novobus as DefaultBus;
-
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
@@ -49,11 +46,9 @@ use crate::medium::ErrorMarks;
 use crate::port::Wire;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Rig, SessionError, UseOptions};
-use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
 use crate::serve::frames::FramePlace;
 use crate::serve::{ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt, serve};
 use crate::traffic::SegmentReport;
@@ -63,6 +58,8 @@ use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::Trace;
+use novobus::language::plan::Plan;
+use novobus::language::syntax::Scenario;
 use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -435,7 +432,7 @@ macro_rules! languages {
         /// Reads and settles a scenario in the words of its bus.
         pub(crate) fn settle(bus: Bus, source: &Source, size: Option<u8>) -> Found {
             match bus {
-                $(Bus::$bus => settled::settle::<$language>(source, size),)+
+                $(Bus::$bus => settled::settle::<$language, _>(source, size),)+
             }
         }
     };

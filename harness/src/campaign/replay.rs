@@ -2,11 +2,11 @@
 
 use super::fault::CaseFaults;
 use super::run::{Campaign, Contradiction};
+use crate::buses::novobus::language::write::Text;
 use crate::buses::syntax::{FaultStep, Header, JobStep, LinkEnds, RingStep};
 use crate::link::link_name;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::syntax::{Action, Scenario};
-use crate::scenario::write::Text;
 use harness_proto::line::Rate;
 
 /// Maximum number of bytes, and of runs of equal ones, on a line.

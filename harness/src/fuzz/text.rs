@@ -1,5 +1,6 @@
 //! The bodies of the fuzz targets for texts: scenarios and rig files.
 
+use crate::buses::novobus::language::Novobus;
 use crate::rig;
 use crate::scenario::language::Language;
 use crate::scenario::parse::parse;
@@ -109,7 +110,7 @@ fn with_newline(text: &str) -> Option<Source> {
 }
 
 /// What a scenario is for each size, in one text.
-fn settled(scenario: &Scenario, source: &Source) -> String {
+fn settled(scenario: &Scenario<Novobus>, source: &Source) -> String {
     let mut shown = format!("{scenario:?}");
     for size in SIZES {
         shown += &match plan(scenario, source, size) {

@@ -84,14 +84,14 @@ impl<L: Language> Settled for Plan<L> {
     }
 }
 
-/// Reads and settles a scenario in the words of a bus. What it says in the words of every bus comes back as well.
+/// Reads and settles a scenario in the words of a bus. What it says in the words of every bus comes back as well, as a scenario of `C`.
 ///
 /// # Errors
 /// Its mistakes.
-pub(crate) fn settle<L: Language>(
+pub(crate) fn settle<L: Language, C: Language>(
     source: &Source,
     size: Option<u8>,
-) -> Result<(Scenario, Arc<dyn Settled>), Problems> {
+) -> Result<(Scenario<C>, Arc<dyn Settled>), Problems> {
     let scenario: Scenario<L> = parse(source)?;
     let plan = plan(&scenario, source, size)?;
     Ok((scenario.in_common(), Arc::new(plan)))

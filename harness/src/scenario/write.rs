@@ -5,7 +5,6 @@
 
 use super::syntax::{Action, Scenario, Step, When};
 use crate::bus::Bus;
-use crate::buses;
 use crate::scenario::language::Language;
 use std::fmt::Write as _;
 use std::marker::PhantomData;
@@ -30,7 +29,7 @@ pub fn write<L: Language>(scenario: &Scenario<L>) -> String {
 
 /// The text of a scenario, line by line.
 #[derive(Clone, Debug)]
-pub struct Text<L: Language = buses::DefaultBus> {
+pub struct Text<L: Language> {
     lines: String,
     bus: PhantomData<L>,
 }

@@ -5,13 +5,13 @@
 //! `DEVIATIONS=update cargo test --test bus deviations` plays every scenario with every deviation and rewrites the file.
 
 use crate::blind::Blind;
+use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::simulate::simulated;
 use harness::buses::rings::rig::OnRings as _;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
 use harness::qualify::deviating_masters;
 use harness::rig::{PlayedScenario, Run, Session, UseOptions, parse};
-use harness::scenario::plan::Plan;
 use harness::scenario::run::run;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

@@ -5,6 +5,7 @@
 mod eeprom;
 
 use harness::buses::SimulatedLink;
+use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
@@ -15,7 +16,6 @@ use harness::qualify::{
     conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
 use harness::rig::{Way, play_one};
-use harness::scenario::plan::Plan;
 use harness::scenario::run::lacks;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;

@@ -1,5 +1,6 @@
 //! The twin: a ring beside its model, and what explains a ring that differs from it.
 
+use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::simulate::bench;
@@ -9,7 +10,6 @@ use harness::link::{Line as _, Link, LinkEvent, Octets, Recording, Replay};
 use harness::qualify::{
     Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
 };
-use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, Outcome, lacks};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

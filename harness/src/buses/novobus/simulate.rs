@@ -1,9 +1,9 @@
 //! The simulated rings that a plan asks for.
 
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::plan::PlannedSetupKind;
 use crate::link::{Line, Link};
-use crate::scenario::plan::Plan;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::properties::Properties;

@@ -11,7 +11,6 @@ use super::problem::{Problem, Problems, TextSpan};
 use super::source::Source;
 use super::syntax::{Action, Scenario, Step, When};
 use super::times::Window;
-use crate::buses::DefaultBus;
 use crate::link::Capability;
 use harness_proto::time::Span;
 use std::ops::{Deref, DerefMut};
@@ -24,7 +23,7 @@ const DEADLINE: Span = Span::from_millis(1000);
 
 /// A scenario for a bench of a given size. What its header says is read through the plan itself.
 #[derive(Clone, Debug)]
-pub struct Plan<L: Language = DefaultBus> {
+pub struct Plan<L: Language> {
     /// Whether messages that no line expects are a failure.
     pub strict: bool,
     /// How long a line without a time waits.
@@ -75,7 +74,7 @@ impl<L: Language> DerefMut for Plan<L> {
 
 /// A step, settled.
 #[derive(Clone, Debug)]
-pub struct PlannedStep<L: Language = DefaultBus> {
+pub struct PlannedStep<L: Language> {
     /// The time in front.
     pub when: PlannedWhen,
     /// What happens.
@@ -108,7 +107,7 @@ pub struct PlannedWindow {
 
 /// What a step does.
 #[derive(Clone, Debug)]
-pub enum PlannedAction<L: Language = DefaultBus> {
+pub enum PlannedAction<L: Language> {
     /// The master sends on a port, counted from 0.
     Send(usize, Vec<L::Sent>),
     /// The master receives on a port.

@@ -3,7 +3,6 @@
 use super::halt::Halt;
 use super::outcome::{Outcome, Stop};
 use super::skip::lacks;
-use crate::buses::DefaultBus;
 use crate::link::{Capability, Link};
 use crate::scenario::language::Language;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
@@ -82,7 +81,7 @@ pub struct PortState<L: Language> {
 }
 
 /// A plan that is being played. What a bus keeps of its own meanwhile is in `own`.
-pub struct Runner<'a, L: Language = DefaultBus> {
+pub struct Runner<'a, L: Language> {
     pub(crate) link: &'a mut dyn Link,
     pub(crate) plan: &'a Plan<L>,
     at_mismatch: AtMismatch,

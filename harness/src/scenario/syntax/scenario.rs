@@ -1,7 +1,6 @@
 //! The scenario, its header and its steps.
 
 use crate::bus::Bus;
-use crate::buses::DefaultBus;
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::language::Language;
@@ -10,7 +9,7 @@ use crate::scenario::times::{Duration, Window};
 
 /// A scenario: what it is, the bench that it needs, and its steps.
 #[derive(Clone, Debug)]
-pub struct Scenario<L: Language = DefaultBus> {
+pub struct Scenario<L: Language> {
     /// What the conversation shows, in a line.
     pub title: String,
     /// The tables of which manuals it pins.
@@ -48,7 +47,7 @@ impl<L: Language> Scenario<L> {
 
 impl<L: Language> Scenario<L> {
     /// What it says in words that every bus has; without the header lines of its bus and without steps.
-    pub(crate) fn in_common(self) -> Scenario {
+    pub(crate) fn in_common<C: Language>(self) -> Scenario<C> {
         Scenario {
             title: self.title,
             sources: self.sources,
@@ -73,7 +72,7 @@ pub struct Citation {
 
 /// A step.
 #[derive(Clone, Debug)]
-pub struct Step<L: Language = DefaultBus> {
+pub struct Step<L: Language> {
     /// The time in front.
     pub when: When,
     /// What happens.
@@ -106,7 +105,7 @@ pub enum When {
 
 /// What a step does.
 #[derive(Clone, Debug)]
-pub enum Action<L: Language = DefaultBus> {
+pub enum Action<L: Language> {
     /// `>`: the master sends.
     Send {
         /// On which port of the bench, counted from 0.

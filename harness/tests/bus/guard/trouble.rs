@@ -2,6 +2,7 @@
 //! notice it.
 
 use super::link;
+use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::run::over_bus::play_over_bus;
 use harness::buses::novobus::simulate::bench;
 use harness::guard::{Guarded, Limits};
@@ -10,7 +11,6 @@ use harness::link::{
     Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use harness::medium::{Heard, Medium, Out};
-use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

@@ -1,13 +1,13 @@
 //! What the writer writes is what the parser reads: `parse(write(x)) == x`.
 
 use harness::buses::nordac::language::Nordac;
+use harness::buses::novobus::language::syntax::Scenario;
 use harness::buses::unitek::language::Unitek;
 use harness::fuzz::written;
 use harness::library::sources;
 use harness::scenario::parse::parse;
 use harness::scenario::problem::Problems;
 use harness::scenario::source::Source;
-use harness::scenario::syntax::Scenario;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::path::Path;

@@ -2,17 +2,19 @@
 
 use super::faults::faults;
 use super::stimuli::{Told, told};
+use crate::buses::novobus::language::syntax::Scenario;
+use crate::buses::novobus::language::syntax::Step;
 use crate::buses::novobus::language::syntax::{
     CellPlace, DriveRange, Header, RingStep, Setup, SetupKind, Written,
 };
+use crate::buses::novobus::language::write::Text;
 use crate::capture::Capture;
 use crate::scenario::parse::parse;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Action, Scenario, Step, When};
+use crate::scenario::syntax::{Action, When};
 use crate::scenario::times::Duration;
-use crate::scenario::write::Text;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};

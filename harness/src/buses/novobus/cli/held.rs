@@ -1,6 +1,8 @@
 //! Rings that a session holds.
 
 use super::rig::OpenBench;
+use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::language::plan::PlannedStep;
 use crate::buses::novobus::language::plan::RingAct;
 use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;
@@ -14,7 +16,7 @@ use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
 use crate::rig::{End, PlayedScenario, Rig, Run, Session, SessionError, Shared, UseOptions};
 use crate::scenario::parse::parse_step;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, plan_step};
+use crate::scenario::plan::{PlannedAction, plan_step};
 use crate::scenario::source::Source;
 use crate::serve::first;
 use harness_proto::time::Span;

@@ -3,16 +3,17 @@
 use super::case::{Act, ActKind, Case, Harm, Talk, To};
 use super::oracle::sent;
 use super::play::MasterView;
+use crate::buses::novobus::language::syntax::Step;
 use crate::buses::novobus::language::syntax::{
     FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
 };
+use crate::buses::novobus::language::write::Text;
 use crate::buses::novobus::twin::answering;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::{Expected as Byte, Pattern};
 use crate::scenario::problem::TextSpan;
-use crate::scenario::syntax::{Action, Citation, Scenario, Step, When};
+use crate::scenario::syntax::{Action, Citation, Scenario, When};
 use crate::scenario::times::Duration;
-use crate::scenario::write::Text;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::roles;
 use harness_sim::fault::DriveFault;

@@ -2,6 +2,7 @@
 
 use crate::bus::Bus;
 use crate::buses::novobus::capture::scenario as sketch;
+use crate::buses::novobus::language::syntax::Scenario;
 use crate::capture::{self, CaptureError};
 use crate::evidence;
 use crate::fuzz::{rig as rig_body, scenario as scenario_body};
@@ -10,7 +11,6 @@ use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
 use harness_sim::fuzz::{Feature, Notebook};

@@ -1,14 +1,15 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
+use crate::buses::novobus::language::syntax::Step;
 use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep};
+use crate::buses::novobus::language::write::Text;
 use crate::buses::novobus::section::{EEPROM, SentBytes};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{HARMLESS, Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
-use crate::scenario::syntax::{Action, Scenario, Step};
+use crate::scenario::syntax::{Action, Scenario};
 use crate::scenario::times::Duration;
-use crate::scenario::write::Text;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};

@@ -4,8 +4,8 @@
 //! function of what it is asked for and of what comes back: one that is given the record must send and tell the same.
 
 use super::run::{Way, play_one};
+use crate::buses::novobus::language::plan::Plan;
 use crate::link::{Capability, Line as _, LinkEvent, Replay};
-use crate::scenario::plan::Plan;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

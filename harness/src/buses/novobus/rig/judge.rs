@@ -1,6 +1,7 @@
 //! The verdict of an attempt, compared with its twin.
 
 use super::left_open::{self, Explanation};
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{
     Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, Unasked,
@@ -10,7 +11,6 @@ use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
 use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::Plan;
 use crate::scenario::run::{ByteDifference, Mismatch, Outcome};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

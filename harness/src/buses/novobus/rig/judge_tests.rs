@@ -5,13 +5,13 @@ mod right;
 
 use super::{AttemptFacts, judge, known};
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::simulate::bench;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::Entry;
 use crate::link::{Link, LinkEvent, Octets, Recording};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, play_one, twin};
-use crate::scenario::plan::Plan;
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};

@@ -8,6 +8,7 @@ use super::judge::{AttemptFacts, judge, known};
 use super::put_back::within;
 use super::session::Session;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::run::over_bus::{come_home, play_over_bus, start_anew};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::simulate;
@@ -18,7 +19,6 @@ use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
 use crate::rig::{Again, Attempt, Keeper, PlayedScenario, Rig, SessionError, attempts_of};
-use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well};
 use harness_proto::novobus::address::RingSize;

@@ -2,12 +2,12 @@
 
 use super::limits;
 use crate::buses::novobus::language::parse::drive::DEVICES;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::plan::plan_header;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
 use crate::rig::profile::KnownProfile;
-use crate::scenario::plan::Plan;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::line_number;
 use harness_sim::nd21::Stimulus;

@@ -1,11 +1,11 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
 use super::recorder::Recorder;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::link::SimulatedLink;
 use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::medium::ErrorMarks;
-use crate::scenario::plan::Plan;
 use crate::serve::{ClientRole, ControlAnswer, Inner, Pace, ServedBus};
 use crate::web::LiveView;
 use harness_proto::line::{LineError, Received};

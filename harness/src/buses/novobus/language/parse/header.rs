@@ -4,6 +4,7 @@ use super::drive::{self, DriveLine};
 use super::step;
 use super::words::master_deviates;
 use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::syntax::Scenario;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
 use crate::counted::counted;
 use crate::scenario::parse::header::{Part, given_twice, header_lines, once, read};
@@ -11,7 +12,6 @@ use crate::scenario::parse::step as core;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 

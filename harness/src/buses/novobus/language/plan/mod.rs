@@ -17,3 +17,15 @@ pub use types::{
     CellTest, LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck,
     PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct,
 };
+
+use super::Novobus;
+use crate::scenario::plan;
+
+/// A scenario of rings, settled.
+pub type Plan = plan::Plan<Novobus>;
+
+/// A step of it.
+pub type PlannedStep = plan::PlannedStep<Novobus>;
+
+/// What such a step does.
+pub type PlannedAction = plan::PlannedAction<Novobus>;

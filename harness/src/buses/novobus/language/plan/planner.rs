@@ -5,6 +5,7 @@ use super::setup::model_unless_said;
 use super::types::{PlannedBench, PlannedCheck, RingAct};
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::parse::header::parse_lines;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::syntax::{
     Check, DriveRange, FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
 };
@@ -15,7 +16,7 @@ use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_BYTES, Pattern};
 use crate::scenario::plan::MAX_CARRIED;
-use crate::scenario::plan::{Plan, Unroll, plan};
+use crate::scenario::plan::{Unroll, plan};
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;

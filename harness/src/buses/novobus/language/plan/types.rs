@@ -1,10 +1,11 @@
 //! What a plan consists of.
 
 use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::plan::PlannedStep;
 use crate::buses::novobus::language::syntax::{CellPlace, Ending, Influence, Relation, Showing};
 use crate::link::{Capability, LinkFault, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedStep};
+use crate::scenario::plan::{Plan, PlannedAction};
 use crate::scenario::problem::TextSpan;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use harness_proto::line::Rate;

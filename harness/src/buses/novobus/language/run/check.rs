@@ -1,5 +1,6 @@
 //! Checks.
 
+use super::Runner;
 use super::look::Miss;
 use crate::buses::novobus::language::plan::PlannedCheck;
 use crate::buses::novobus::language::syntax::Ending;
@@ -7,7 +8,6 @@ use crate::buses::novobus::locate::{self, Location};
 use crate::counted::counted;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
-use crate::scenario::run::player::Runner;
 use harness_proto::novobus::master::{Fault, LinkEnd, RingLink};
 use harness_proto::novobus::sync::SYNCO;
 

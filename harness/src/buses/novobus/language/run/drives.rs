@@ -1,12 +1,12 @@
 //! What a step does to drives, and what it waits for or reads of them.
 
+use super::Runner;
 use super::look::{Miss, judge};
 use crate::buses::novobus::language::plan::{LOOK, NumberCheck, PlannedDriveCheck};
 use crate::buses::novobus::language::syntax::Influence;
 use crate::link::{AnyStimulus, DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::Stop;
-use crate::scenario::run::player::Runner;
 use harness_proto::time::Span;
 use std::ops::RangeInclusive;
 

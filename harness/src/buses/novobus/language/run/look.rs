@@ -1,5 +1,6 @@
 //! Compares the visible state of drives with what must hold.
 
+use super::Runner;
 use crate::buses::novobus::language::plan::{
     CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number,
 };
@@ -8,7 +9,6 @@ use crate::buses::novobus::language::syntax::{Relation, Showing};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::scenario::pattern::Expected;
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
-use crate::scenario::run::player::Runner;
 use crate::scenario::run::record::{hex, physical};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;

@@ -1,6 +1,7 @@
 //! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
 //! recorded, limited and shown is all the same.
 
+use super::Runner;
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, conduct, count_drives};
 use crate::buses::novobus::language::plan::PlannedCall;
 use crate::buses::novobus::language::syntax::Ending;
@@ -10,7 +11,6 @@ use crate::scenario::pattern::Expected;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::halt::Halt;
 use crate::scenario::run::outcome::Stop;
-use crate::scenario::run::player::Runner;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Event, Job, Outcome};

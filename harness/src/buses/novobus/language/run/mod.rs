@@ -10,3 +10,6 @@ pub mod over_bus;
 pub(crate) mod record;
 pub(crate) mod state;
 pub(crate) mod tapped;
+
+/// A scenario of rings that is being played.
+pub(crate) type Runner<'a> = crate::scenario::run::player::Runner<'a, super::Novobus>;

@@ -2,6 +2,8 @@
 //!
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
+use super::Runner;
+use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
@@ -10,9 +12,8 @@ use crate::buses::novobus::rig::health::sounds_timed_out;
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Octets};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::Plan;
 use crate::scenario::run::outcome::{Outcome, Unready};
-use crate::scenario::run::player::{AtMismatch, Runner, play};
+use crate::scenario::run::player::{AtMismatch, play};
 use crate::scenario::run::skip::lacks;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;

@@ -1,7 +1,7 @@
 //! Records cells while a scenario is played.
 
+use super::Runner;
 use crate::buses::novobus::language::plan::{LOOK, MAX_LOOKS, PlannedLooks, PlannedRecord};
-use crate::scenario::run::player::Runner;
 use crate::scenario::run::record::{CellRecord, MAX_SAMPLES, Sample};
 use harness_proto::time::Instant;
 

@@ -1,17 +1,18 @@
 //! What the bench keeps of the rings while a scenario is played.
 
+use super::Runner;
 use super::bytes::resolve;
 use super::record::Recorder;
 use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::plan::PlannedStep;
 use crate::buses::novobus::language::plan::RingAct;
 use crate::buses::novobus::language::syntax::Ending;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::link::{Link, Moment};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
+use crate::scenario::plan::{Plan, PlannedAction, PlannedWhen};
 use crate::scenario::problem::TextSpan;
 use crate::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
-use crate::scenario::run::player::Runner;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::command::Command;

@@ -4,8 +4,8 @@
 //! the bytes that it received. So a model of the bus end takes these, and what the drive sends must be what the model sends. The number that
 //! the drive keeps of its error is not on the bus: the cause is the one that the manual gives for the byte at which the zeros begin.
 
+use super::Runner;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::scenario::run::player::Runner;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::Place;
 use harness_proto::novobus::command::Field;

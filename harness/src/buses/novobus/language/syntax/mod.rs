@@ -11,3 +11,15 @@ pub use check::{Check, Condition, DriveCheck, Ending, Showing};
 pub use header::{DriveRange, Header, Influence, RingRange, Setup, SetupKind};
 pub use job::{JobKind, JobStep, MasterCall, WrittenTarget};
 pub use step::{CellRecording, FaultKind, FaultStep, LinkEnds, LinkFaultKind, Looks, RingStep};
+
+use super::Novobus;
+use crate::scenario::syntax;
+
+/// A scenario of rings, as written.
+pub type Scenario = syntax::Scenario<Novobus>;
+
+/// A step of it.
+pub type Step = syntax::Step<Novobus>;
+
+/// What such a step does.
+pub type Action = syntax::Action<Novobus>;

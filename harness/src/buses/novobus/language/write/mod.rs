@@ -8,7 +8,11 @@ mod job;
 
 pub(crate) use header::{devices, header, lines, setup};
 
+use super::Novobus;
 use super::syntax::{DriveRange, LinkEnds, RingStep};
+
+/// The text of a scenario of rings, line by line.
+pub(crate) type Text = crate::scenario::write::Text<Novobus>;
 
 /// A step, with its symbol or its word.
 pub(crate) fn step(step: &RingStep) -> String {
