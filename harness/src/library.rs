@@ -9,7 +9,7 @@ use crate::scenario::parse::{self, parse};
 use crate::scenario::plan::plan;
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::settled::Settled;
-use crate::scenario::source::{Source, SourceError};
+use crate::scenario::source::{LibraryError, MAX_DEPTH, MAX_FILES, Source};
 use crate::traffic::SegmentReport;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
@@ -20,46 +20,6 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/scenarios")
 
 /// The ending of a scenario's file name.
 pub const ENDING: &str = "scn";
-
-/// The most files that are taken from a folder.
-const MAX_FILES: usize = 10_000;
-/// How deep folders are searched.
-const MAX_DEPTH: usize = 16;
-
-/// Why a scenario cannot be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum LibraryError {
-    /// Neither a path nor the name of a built-in scenario.
-    #[error("failed to find {name}: neither a file or folder nor a built-in scenario; {remedy}")]
-    NotFound {
-        /// The name as given.
-        name: String,
-        /// What to do about it.
-        remedy: String,
-    },
-    /// A folder cannot be read.
-    #[error("failed to read the folder {folder}: {error}")]
-    Folder {
-        /// The folder.
-        folder: String,
-        /// The operating system's error.
-        error: std::io::Error,
-    },
-    /// A folder holds more than we take.
-    #[error(
-        "{folder} holds more than {MAX_FILES} scenarios, or folders nest deeper than {MAX_DEPTH}"
-    )]
-    TooMany {
-        /// The folder.
-        folder: String,
-    },
-    /// A file is no scenario.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// A scenario has mistakes.
-    #[error(transparent)]
-    Mistakes(#[from] Box<Problems>),
-}
 
 /// A scenario, read and settled, and not yet played.
 #[derive(Clone, Debug)]

@@ -1,8 +1,6 @@
 //! The manuals' tables and examples, which scenario pins each, and the errata ledgers.
 
 use crate::bus::Bus;
-use crate::buses::MANUALS;
-use crate::library::Entry;
 use serde::Deserialize;
 
 /// The manual of a bus.
@@ -82,12 +80,6 @@ struct Errata {
 }
 
 impl Manual {
-    /// Every manual.
-    #[must_use]
-    pub const fn all() -> &'static [Self] {
-        &MANUALS
-    }
-
     /// The tables and examples, in order of the manual.
     ///
     /// # Errors
@@ -109,28 +101,4 @@ impl Manual {
     pub fn open(&self) -> Vec<Open> {
         (self.open)()
     }
-}
-
-/// The tables and examples of the manual of [`Bus::DEFAULT`].
-///
-/// # Errors
-/// As of [`Manual::tables`].
-pub fn tables() -> Result<Vec<ManualTable>, toml::de::Error> {
-    MANUALS[0].tables()
-}
-
-/// The errata ledger of the manual of [`Bus::DEFAULT`].
-///
-/// # Errors
-/// As of [`Manual::errata`].
-pub fn errata() -> Result<Vec<Erratum>, toml::de::Error> {
-    MANUALS[0].errata()
-}
-
-/// The scenarios that pin a table.
-pub fn pinned_by<'a>(table: &str, entries: &'a [Entry]) -> impl Iterator<Item = &'a Entry> {
-    entries.iter().filter(move |entry| {
-        let sources = &entry.scenario.sources;
-        sources.iter().any(|source| source.text == table)
-    })
 }

@@ -70,7 +70,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// The manuals of the buses; that of [`Bus::DEFAULT`] first.
-pub(crate) const MANUALS: [Manual; 3] = [
+pub const MANUALS: [Manual; 3] = [
     novobus::manual::MANUAL,
     unitek::manual::MANUAL,
     nordac::manual::MANUAL,

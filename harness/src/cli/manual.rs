@@ -2,10 +2,11 @@
 
 use super::args::{ManualArguments, Selection};
 use super::run::select;
+use crate::buses::MANUALS;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::library::Entry;
-use crate::manual::{Erratum, Manual, ManualTable, NOT_YET, pinned_by};
+use crate::manual::{Erratum, Manual, ManualTable, NOT_YET};
 use std::fmt::Write as _;
 
 /// Shows the coverage of the manuals and the ledgers.
@@ -24,7 +25,7 @@ pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::i
         .to_lowercase();
     let wanted = |text: &str| text.to_lowercase().contains(&filter);
     let mut parts = Vec::new();
-    for manual in Manual::all() {
+    for manual in &MANUALS {
         let (tables, errata) = match (manual.tables(), manual.errata()) {
             (Ok(tables), Ok(errata)) => (tables, errata),
             (Err(error), _) | (_, Err(error)) => {
@@ -106,6 +107,14 @@ fn coverage(
     // Writing to a String cannot fail.
     let _infallible = writeln!(text, "{pinned} of {} pinned", tables.len());
     (found, text)
+}
+
+/// The scenarios that pin a table.
+fn pinned_by<'a>(table: &str, entries: &'a [Entry]) -> impl Iterator<Item = &'a Entry> {
+    entries.iter().filter(move |entry| {
+        let sources = &entry.scenario.sources;
+        sources.iter().any(|source| source.text == table)
+    })
 }
 
 fn ledger(

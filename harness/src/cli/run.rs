@@ -13,7 +13,7 @@ use crate::command::play::{PlayedOnce, play_entry, progress_bar};
 use crate::command::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_large};
-use crate::library::{Entry, LibraryError, is_named, sources};
+use crate::library::{Entry, is_named, sources};
 use crate::link::Recording;
 use crate::report::finding::explain;
 use crate::report::html::Head;
@@ -21,7 +21,7 @@ use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome};
-use crate::scenario::source::Source;
+use crate::scenario::source::{LibraryError, Source};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 

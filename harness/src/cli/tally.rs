@@ -199,8 +199,8 @@ pub(crate) fn counts(verdicts: &[Verdict]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::MANUALS;
     use crate::link::Capability;
-    use crate::manual::Manual;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
     use harness_proto::novobus::guard::LimitSetting;
@@ -213,7 +213,7 @@ mod tests {
 
     fn note(tally: &mut Tally, outcomes: &[Outcome]) {
         let source = |n: usize| {
-            let document = Manual::all()[0].document;
+            let document = MANUALS[0].document;
             let text = format!("title t\nsource {document} 9.{n}\nring 1\n> 80\n");
             Source::from_bytes("t.scn".to_owned(), text.into_bytes()).expect("a text")
         };

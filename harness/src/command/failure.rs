@@ -2,9 +2,9 @@
 
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::library::LibraryError;
 use crate::link::Trouble;
 use crate::scenario::problem::Problems;
+use crate::scenario::source::LibraryError;
 
 /// Why a command ended early.
 #[derive(Debug)]

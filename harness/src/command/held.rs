@@ -5,13 +5,13 @@ use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::guard::{Guarded, Safe};
-use crate::library::Entry;
 use crate::link::{Line, Link, Trouble};
 use crate::medium::Medium;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::segment::SegmentRun;
 use crate::rig::segment::run::{PortPlayer, PortRun};
 use crate::rig::{End, Ends, PlayedScenario, Rig, SessionError, UseOptions};
+use crate::scenario::source::Source;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 
@@ -63,7 +63,7 @@ pub(crate) trait HeldBench {
     ///
     /// # Errors
     /// [`Failure`]: the bench cannot be used any more, or not for scenarios.
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure>;
+    fn play(&mut self, source: &Source) -> Result<PlayedScenario, Failure>;
 
     /// Does a line of the scenario language to simulated drives at once: a fault, or what happens to a drive from outside the bus.
     ///
@@ -184,14 +184,14 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
         D::pass(self.session(), time)
     }
 
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure> {
+    fn play(&mut self, source: &Source) -> Result<PlayedScenario, Failure> {
         if self.session().listens_only() {
             return Err(Failure::refused(
                 "scenarios send, and the rig's file says `listen_only = true`",
             ));
         }
         self.0.forget_drives();
-        let played = self.0.play(&entry.source, None);
+        let played = self.0.play(source, None);
         // The scenario's master asked them, and they are in their safe state.
         self.session().drives().forget();
         let played = played.map_err(|error| {

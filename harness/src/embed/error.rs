@@ -1,9 +1,8 @@
 //! Why a call of the crate's own interface failed.
 
-use crate::library::LibraryError;
 use crate::rig::{FindError, SessionError};
 use crate::scenario::problem::Problems;
-use crate::scenario::source::SourceError;
+use crate::scenario::source::{LibraryError, SourceError};
 use crate::serve::ServeError;
 use thiserror::Error as Derived;
 

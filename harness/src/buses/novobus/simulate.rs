@@ -1,8 +1,7 @@
 //! The simulated rings that a plan asks for.
 
 use crate::buses::SimulatedLink;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::plan::PlannedSetupKind;
+use crate::buses::novobus::language::plan::{Plan, PlannedSetupKind};
 use crate::link::{Line, Link};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::{ee, ram};

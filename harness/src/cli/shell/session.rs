@@ -596,13 +596,13 @@ impl HeldSession {
         // What is judged is recorded whole.
         let Some(capture) = &mut self.capture else {
             self.bench.record_from_now(Some(u64::MAX));
-            let played = self.bench.play(entry);
+            let played = self.bench.play(&entry.source);
             self.bench.record_from_now(None);
             return Ok(played?.outcome);
         };
         capture.collect(&mut *self.bench)?;
         self.bench.record_from_now(Some(u64::MAX));
-        let played = self.bench.play(entry);
+        let played = self.bench.play(&entry.source);
         // The link begins anew, perhaps several times.
         capture.leave_out(
             &format!("scenario {}", entry.short_name()),

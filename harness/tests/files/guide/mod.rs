@@ -6,7 +6,7 @@ mod page;
 mod shell;
 mod words;
 
-use harness::manual::{errata, tables};
+use harness::buses::MANUALS;
 use page::{Page, Step};
 use std::cell::Cell;
 use std::collections::BTreeSet;
@@ -134,8 +134,13 @@ fn anchor(line: &str) -> Option<String> {
 /// Every section of the manual that a page cites is one that the manual has.
 pub(crate) fn citations(path: &Path) -> datatest_stable::Result<()> {
     let mut sections: BTreeSet<String> = WITHOUT_TABLES.iter().map(|s| (*s).to_owned()).collect();
-    sections.extend(tables()?.into_iter().map(|table| table.section));
-    sections.extend(errata()?.into_iter().map(|erratum| erratum.section));
+    sections.extend(MANUALS[0].tables()?.into_iter().map(|table| table.section));
+    sections.extend(
+        MANUALS[0]
+            .errata()?
+            .into_iter()
+            .map(|erratum| erratum.section),
+    );
     // A chapter is there where one of its sections is.
     let chapters: Vec<_> = sections
         .iter()

@@ -2,10 +2,8 @@
 
 use super::faults::faults;
 use super::stimuli::{Told, told};
-use crate::buses::novobus::language::syntax::Scenario;
-use crate::buses::novobus::language::syntax::Step;
 use crate::buses::novobus::language::syntax::{
-    CellPlace, DriveRange, Header, RingStep, Setup, SetupKind, Written,
+    CellPlace, DriveRange, Header, RingStep, Scenario, Setup, SetupKind, Step, Written,
 };
 use crate::buses::novobus::language::write::Text;
 use crate::capture::Capture;

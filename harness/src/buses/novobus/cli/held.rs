@@ -1,9 +1,7 @@
 //! Rings that a session holds.
 
 use super::rig::OpenBench;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::plan::PlannedStep;
-use crate::buses::novobus::language::plan::RingAct;
+use crate::buses::novobus::language::plan::{Plan, PlannedStep, RingAct};
 use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::command::drive::DriveCommand;
@@ -156,15 +154,18 @@ impl HeldBench for HeldRings {
         }
     }
 
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Failure> {
-        let Some(plan) = entry.plan.clone() else {
+    fn play(&mut self, source: &Source) -> Result<PlayedScenario, Failure> {
+        let size = self.plan.rings.first().map(|ring| ring.drives());
+        let entry = Entry::fitting(source.clone(), size);
+        let entry = entry.map_err(|problems| Failure::refused(problems.lines()))?;
+        let Some(plan) = &entry.plan else {
             return Err(Failure::refused(format!(
                 "{}: the scenario is for another bus",
                 entry.short_name()
             )));
         };
         self.apart(|session| {
-            let played = Run::new(session)?.play(&plan, None);
+            let played = Run::new(session)?.play(plan, None);
             // What is written between scenarios is meant to stay.
             let ended = session.link().trouble().is_some_and(Trouble::ends_a_run);
             let notes = session.put_back(!ended);

@@ -3,10 +3,10 @@
 use crate::buses::novobus::explore::judge::Judge;
 use crate::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::manual::MANUAL;
 use crate::explore::ExploreError;
 use crate::explore::MasterView;
 use crate::explore::{AttemptRecord, Case, Finding};
-use crate::manual::tables;
 use harness_proto::novobus::address::RingSize;
 use std::path::{Path, PathBuf};
 
@@ -80,7 +80,7 @@ impl Finding {
     /// The tables of the manual that it is about, as the catalogue names them.
     #[must_use]
     pub fn sources(&self) -> Vec<String> {
-        let tables = tables().unwrap_or_default();
+        let tables = MANUAL.tables().unwrap_or_default();
         let own = tables
             .iter()
             .find(|table| table.section == self.difference.section);

@@ -3,9 +3,8 @@
 use super::case::{Act, ActKind, Case, Harm, Talk, To};
 use super::oracle::sent;
 use super::play::MasterView;
-use crate::buses::novobus::language::syntax::Step;
 use crate::buses::novobus::language::syntax::{
-    FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep,
+    FaultKind, FaultStep, Header, LinkEnds, LinkFaultKind, RingStep, Step,
 };
 use crate::buses::novobus::language::write::Text;
 use crate::buses::novobus::twin::answering;

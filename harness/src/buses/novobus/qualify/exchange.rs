@@ -1,8 +1,7 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
-use crate::buses::novobus::language::syntax::Step;
-use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep};
+use crate::buses::novobus::language::syntax::{FaultStep, Header, LinkEnds, RingStep, Step};
 use crate::buses::novobus::language::write::Text;
 use crate::buses::novobus::section::{EEPROM, SentBytes};
 use crate::buses::novobus::twin::{Conversation, Done};

@@ -2,8 +2,7 @@
 
 use super::limits;
 use crate::buses::novobus::language::parse::drive::DEVICES;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::plan::plan_header;
+use crate::buses::novobus::language::plan::{Plan, plan_header};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};

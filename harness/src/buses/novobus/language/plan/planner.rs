@@ -15,8 +15,7 @@ use crate::link::{
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::language::Settle;
 use crate::scenario::pattern::{Expected, MAX_BYTES, Pattern};
-use crate::scenario::plan::MAX_CARRIED;
-use crate::scenario::plan::{Unroll, plan};
+use crate::scenario::plan::{MAX_CARRIED, Unroll, plan};
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;

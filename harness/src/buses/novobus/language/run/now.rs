@@ -1,9 +1,7 @@
 //! Steps that are done at once, beside the conversation of another master.
 
 use super::Runner;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::plan::PlannedStep;
-use crate::buses::novobus::language::plan::{PlannedCheck, RingAct};
+use crate::buses::novobus::language::plan::{Plan, PlannedCheck, PlannedStep, RingAct};
 use crate::link::Link;
 use crate::scenario::plan::{PlannedAction, PlannedWhen};
 use crate::scenario::run::player::AtMismatch;

@@ -3,8 +3,7 @@
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
 use super::Runner;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
+use crate::buses::novobus::language::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::locate::MAX_ZEROS;
