@@ -1,11 +1,12 @@
 //! `drivebench report`.
 
 use super::args::ReportArguments;
+use crate::buses::novobus::explore::page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{writable, write};
 use crate::evidence::{RIG, derive};
-use crate::explore::{RECORD, page};
+use crate::explore::RECORD;
 
 /// Makes the reports of a folder again.
 pub(crate) fn report(arguments: &ReportArguments, output: &mut Output) -> std::io::Result<Exit> {

@@ -1,13 +1,14 @@
 //! `drivebench verify`: every verdict of a folder of evidence, judged again.
 
 use super::args::VerifyArguments;
+use crate::buses::novobus::explore::Case;
 use crate::buses::verify_shared;
 use crate::command::exit::Exit;
 use crate::command::fuzz;
 use crate::command::output::Output;
 use crate::counted::counted;
 use crate::evidence::{MERGE, Signer, verify as judge_again, verify_merged};
-use crate::explore::read as read_run;
+use crate::explore::read_as;
 
 /// Judges a folder again.
 pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -17,7 +18,7 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
         .zip(arguments.identity.as_deref());
     let signer = signer.map(|(allowed, identity)| Signer { allowed, identity });
     let is_merged = arguments.folder.join(MERGE).exists();
-    if let Ok((kept, _)) = read_run(&arguments.folder) {
+    if let Ok((kept, _)) = read_as::<Case>(&arguments.folder) {
         return fuzz::verify(&arguments.folder, &kept, signer, output);
     }
     if let Some(exit) = verify_shared(&arguments.folder, signer, output) {

@@ -1,6 +1,5 @@
 //! A run tries case after case, keeps those that show something new, and confirms and records every difference from the model.
 
-use super::Case;
 use super::again::file_of;
 use super::confirm::Confirmation;
 use super::dice::Dice;
@@ -42,7 +41,7 @@ pub enum RunEnd {
 }
 
 /// What a run tells of while it goes on.
-pub trait Watcher<C: FuzzCase = Case> {
+pub trait Watcher<C: FuzzCase> {
     /// A round begins, with what its cases may have.
     fn round(&mut self, round: u64, swarm: &Swarm<C::Spice>);
 
@@ -55,7 +54,7 @@ pub trait Watcher<C: FuzzCase = Case> {
 
 /// A run.
 #[derive(Debug)]
-pub struct FuzzRun<C: FuzzCase = Case> {
+pub struct FuzzRun<C: FuzzCase> {
     about: FuzzSettings<C>,
     scope: C::Scope,
     pool: Pool<C>,

@@ -1,6 +1,5 @@
 //! A finding: a case, the difference, and how to reproduce it. It is stored as JSON next to its scenario.
 
-use super::Case;
 use super::files::{read_text, write_whole};
 use super::{ExploreError, FuzzCase};
 use crate::bus::Bus;
@@ -13,7 +12,7 @@ const SCHEMA: u32 = 1;
 /// A finding.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
-pub struct Finding<C: FuzzCase = Case> {
+pub struct Finding<C: FuzzCase> {
     /// The version of the format: 1.
     pub schema: u32,
     /// The rig's name, as it was given.

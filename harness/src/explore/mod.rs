@@ -3,7 +3,7 @@
 //! A conversation is a value that implements [`FuzzCase`]; each bus has its own. It is made from a seed, within a [`Swarm`]'s subset of
 //! what a conversation can have; a [`Target`] tries it: on simulated drives, or on a rig with ports behind its guard. A [`Pool`] keeps the
 //! cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario. A [`FuzzRun`] does all of
-//! it and a [`FuzzRecord`] writes it down as it happens. The ring's cases, and what shrinks and promotes them, are the default.
+//! it and a [`FuzzRecord`] writes it down as it happens.
 
 mod again;
 mod campaign;
@@ -31,16 +31,6 @@ pub use error::ExploreError;
 pub use finding::{Finding, bus_of};
 pub use fuzz_case::{Differing, FuzzCase, JudgedAgain, Spiced};
 pub use pool::{MOST_KEPT, Pool, by_novelty};
-pub use record::{
-    FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as, rig_of,
-};
+pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read_as, rig_of};
 pub use swarm::Swarm;
 pub use target::{Rehearsal, Target, Tried};
-
-/// The ring's cases and targets, the default of every parameter of this module.
-pub use crate::buses::rings::explore::{
-    Act, ActKind, AttemptRecord, Case, CaseScope, CommandSent, Damage, Difference, Generator, Harm,
-    MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted, RawCommand,
-    RingScope, RingSetup, Spice, Spoil, Talk, To, against_model, against_reference,
-    against_witnesses, beside, features, judged_again, mutate, page, play, shrink, text,
-};

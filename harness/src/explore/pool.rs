@@ -1,6 +1,5 @@
 //! Keeps cases that show something new, so that other cases can be made from them.
 
-use super::Case;
 use super::FuzzCase;
 use crate::explore::Dice;
 use std::collections::{BTreeSet, HashSet};
@@ -11,7 +10,7 @@ pub const MOST_KEPT: usize = 2_000;
 
 /// The cases that are kept, and what all of them have shown.
 #[derive(Clone, Debug)]
-pub struct Pool<C: FuzzCase = Case> {
+pub struct Pool<C: FuzzCase> {
     cases: Vec<C>,
     /// Which of them are with which drives ([`FuzzCase::lane`]).
     of_lane: [Vec<usize>; 2],

@@ -3,9 +3,8 @@
 
 use super::files::write_whole;
 use super::{Differing as _, ExploreError, Finding, FuzzCase};
-use crate::bus::Bus;
-use crate::buses::MANUALS;
 use crate::library::Entry;
+use crate::manual::Manual;
 use crate::report::page::page;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
@@ -40,8 +39,8 @@ pub struct Promoted {
 
 /// A case whose findings can be kept as scenarios.
 pub trait Promotes: FuzzCase {
-    /// Its bus.
-    fn bus() -> Bus;
+    /// The manual of its bus.
+    const MANUAL: Manual;
 
     /// How the drives of a finding differ, in words for a title.
     fn kind(finding: &Finding<Self>) -> String {
@@ -96,7 +95,7 @@ pub fn promote<C: Promotes>(
     naming: &Naming,
     top: &Path,
 ) -> Result<Promoted, ExploreError> {
-    let (name, bus) = (&naming.name, C::bus());
+    let (name, bus) = (&naming.name, C::MANUAL.bus);
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.';
     if name.is_empty() || name.len() > 80 || !name.chars().all(plain) || name.starts_with('.') {
         return Err(ExploreError::Usage(format!(
@@ -104,7 +103,7 @@ pub fn promote<C: Promotes>(
         )));
     }
     if let Some(source) = &naming.source {
-        known(bus, source)?;
+        known(C::MANUAL, source)?;
     }
     let title = match &naming.title {
         Some(title) => title.clone(),
@@ -147,14 +146,13 @@ pub fn promote<C: Promotes>(
 }
 
 /// Refuses a table that the catalogue of a bus does not have.
-fn known(bus: Bus, source: &str) -> Result<(), ExploreError> {
-    let own = MANUALS.iter().find(|manual| manual.bus == bus);
-    let tables = own.and_then(|own| own.tables().ok()).unwrap_or_default();
+fn known(manual: Manual, source: &str) -> Result<(), ExploreError> {
+    let tables = manual.tables().unwrap_or_default();
     match tables.iter().any(|table| table.id == source) {
         true => Ok(()),
         false => Err(ExploreError::Usage(format!(
             "the catalogue has no `{source}`; `drivebench manual --filter {}` shows what there is",
-            bus.name()
+            manual.bus.name()
         ))),
     }
 }

@@ -3,7 +3,6 @@
 //! `run.jsonl` is the record. Behind a line of progress everything in front of it is settled; what stands behind the last one is
 //! done again when a run is resumed.
 
-use super::Case;
 use super::FuzzCase;
 use super::error::ExploreError;
 use super::files::read_text;
@@ -20,7 +19,7 @@ pub const RECORD: &str = "run.jsonl";
 /// What a run is: all that decides which cases are tried, and how they are judged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
-pub struct FuzzSettings<C: FuzzCase = Case> {
+pub struct FuzzSettings<C: FuzzCase> {
     /// The version of the form: 1.
     pub schema: u32,
     /// The rig as it was named.
@@ -52,7 +51,7 @@ impl<C: FuzzCase> FuzzSettings<C> {
 /// A line of the record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", bound = "")]
-pub enum LogLine<C: FuzzCase = Case> {
+pub enum LogLine<C: FuzzCase> {
     /// The first line.
     Run(FuzzSettings<C>),
     /// A round begins.
@@ -102,7 +101,7 @@ pub struct Progress {
 
 /// What a record holds.
 #[derive(Clone, Debug)]
-pub struct KeptRun<C: FuzzCase = Case> {
+pub struct KeptRun<C: FuzzCase> {
     /// The first line.
     pub about: FuzzSettings<C>,
     /// The lines behind it, up to the last one of progress.
@@ -252,15 +251,7 @@ fn record_of(folder: &Path) -> Result<String, ExploreError> {
     read_text(&folder.join(RECORD))
 }
 
-/// What the folder of a run on a ring holds, and how long its record is up to the last line of progress.
-///
-/// # Errors
-/// There is no record, or it is damaged.
-pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
-    read_as(folder)
-}
-
-/// The same for any bus.
+/// What the folder of a run holds, and how long its record is up to the last line of progress.
 ///
 /// # Errors
 /// There is no record, or it is damaged.

@@ -1,14 +1,13 @@
 //! Swarm options: each round of a run uses a random subset of what a conversation can have. What is never there lets the rest
 //! stand out: a drive that forgets something after ten reads is not found where every third byte is damaged.
 
-use super::Spice;
 use super::Spiced;
 use super::dice::Dice;
 use std::collections::BTreeSet;
 
 /// A subset of what a conversation can have.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Swarm<S = Spice>(BTreeSet<S>);
+pub struct Swarm<S>(BTreeSet<S>);
 
 impl<S> Default for Swarm<S> {
     fn default() -> Self {

@@ -1,13 +1,12 @@
 //! What cases are tried on.
 
-use super::Case;
 use super::FuzzCase;
 use super::error::ExploreError;
 use harness_proto::time::Span;
 
 /// What the model makes of a case before it is tried.
 #[derive(Clone, Debug)]
-pub struct Rehearsal<C: FuzzCase = Case> {
+pub struct Rehearsal<C: FuzzCase> {
     /// What the master sees of it.
     pub seen: C::Seen,
     /// How long the line is used for it, with all that comes before it on a rig.
@@ -34,7 +33,7 @@ impl<C: FuzzCase> Default for Rehearsal<C> {
 
 /// The outcome of a case.
 #[derive(Clone, Debug)]
-pub struct Tried<C: FuzzCase = Case> {
+pub struct Tried<C: FuzzCase> {
     /// How long the line was used for it.
     pub took: Span,
     /// Mismatch with the expected behaviour.
@@ -57,7 +56,7 @@ impl<C: FuzzCase> Default for Tried<C> {
 }
 
 /// What cases are tried on, beside its model.
-pub trait Target<C: FuzzCase = Case> {
+pub trait Target<C: FuzzCase> {
     /// Plays a case on the model.
     ///
     /// # Errors

@@ -2,7 +2,8 @@
 
 use crate::program::{ended, findings, name, said};
 use crate::ring::Served;
-use harness::explore::{Finding, RECORD};
+use harness::buses::novobus::explore::Finding;
+use harness::explore::RECORD;
 use harness::port::PortAddress;
 use harness_proto::nd21::ram;
 use harness_sim::novobus::reference;
@@ -181,7 +182,7 @@ fn two_rings(transport: &str) {
     ended(&output, 1, "3 drives are stopped, standing and blocked");
     let (finding, path) = findings(&out)
         .iter()
-        .map(|path| Finding::read(path).expect("a finding"))
+        .map(|path| Finding::read_as(path).expect("a finding"))
         .find(|(finding, _)| finding.confirmed)
         .expect("one that was seen again");
     assert_eq!((finding.case.ring(), finding.case.sizes()), (1, vec![1, 2]));

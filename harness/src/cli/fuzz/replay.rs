@@ -1,14 +1,15 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
 use crate::buses::line_fuzz;
+use crate::buses::novobus::explore::{
+    Act, ActKind, Case, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
+};
 use crate::command::exit::Exit;
 use crate::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
 use crate::command::fuzz::rig::{on_ports, rings, scope, simulated, sizes, tell};
 use crate::command::output::Output;
 use crate::command::rig_failure::find_any_rig;
-use crate::explore::{
-    Act, ActKind, Case, ExploreError, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
-};
+use crate::explore::ExploreError;
 use crate::guard::Limits;
 use crate::regular::{self, Links};
 use crate::rig::{Rig, UseOptions};
@@ -74,7 +75,7 @@ fn campaign(
     arguments: &ReplayArguments,
     rig: &Rig,
     setup: RingSetup,
-    scope: crate::explore::CaseScope,
+    scope: crate::buses::novobus::explore::CaseScope,
 ) -> FuzzRun {
     let about = FuzzSettings {
         schema: <FuzzSettings>::SCHEMA,

@@ -1,6 +1,9 @@
 //! `drivebench fuzz run`.
 
 use crate::buses::line_fuzz;
+use crate::buses::novobus::explore::{
+    Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, Planted, RingSetup,
+};
 use crate::command::exit::Exit;
 use crate::command::fuzz::rig::{on_ports, scope, simulated, sizes, tell};
 use crate::command::fuzz::run::{
@@ -9,9 +12,7 @@ use crate::command::fuzz::run::{
 use crate::command::output::Output;
 use crate::command::page::writable;
 use crate::command::rig_failure::find_any_rig;
-use crate::explore::{
-    CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, Planted, RingSetup, Spiced as _, read, rig_of,
-};
+use crate::explore::{Spiced as _, read_as, rig_of};
 use crate::guard::Limits;
 use crate::partition::Partition;
 use crate::rig::{Rig, UseOptions};
@@ -67,7 +68,7 @@ fn on_rings(
     arguments: &FuzzRunArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let before = match arguments.resume.as_deref().map(read).transpose() {
+    let before = match arguments.resume.as_deref().map(read_as::<Case>).transpose() {
         Ok(before) => before.map(|(kept, _)| kept),
         Err(error) => return Ok(tell(&error, output)),
     };

@@ -1,10 +1,11 @@
 //! Work on a rig with ports: opened as `run --rig` opens it, given back in its safe state.
 
+use crate::buses::novobus::explore::{CaseScope, RingScope, RingSetup, Spice};
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, give_back};
-use crate::explore::{CaseScope, ExploreError, RingScope, RingSetup, Spice};
+use crate::explore::ExploreError;
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};

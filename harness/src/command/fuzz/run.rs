@@ -5,6 +5,7 @@ use super::rig::tell;
 use super::watch::{Telling, summary};
 use crate::bus::Bus;
 use crate::buses::deviations;
+use crate::buses::novobus::explore::{Planted, page};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -12,8 +13,7 @@ use crate::command::page::write;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal, unseal};
 use crate::explore::{
-    Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, Planted, RunEnd, Target,
-    page,
+    Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, RunEnd, Target,
 };
 use crate::partition::Partition;
 use crate::rig::state;

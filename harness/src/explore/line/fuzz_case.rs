@@ -3,13 +3,13 @@
 use super::generate::Maker;
 use super::text::text;
 use super::{LineAct, LineBus, LineScope, LineSetup, LineTalk, OnLine, Seen};
-use crate::bus::Bus;
 use crate::explore::promote::Promotes;
 use crate::explore::smaller::Acts;
 use crate::explore::{
     Confirmation, Dice, Differing as _, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
     Pool, Rehearsal, Swarm, Target, played_again,
 };
+use crate::manual::Manual;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -98,9 +98,7 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
 }
 
 impl<B: LineBus> Promotes for LineTalk<B> {
-    fn bus() -> Bus {
-        B::BUS
-    }
+    const MANUAL: Manual = B::MANUAL;
 
     fn scenario(
         finding: &Finding<Self>,

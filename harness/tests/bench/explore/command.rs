@@ -3,7 +3,8 @@
 use super::about;
 use super::findings::empty_checkout;
 use crate::program::{ended, findings, name};
-use harness::explore::{FuzzRecord, LogLine, RECORD, RingSetup};
+use harness::buses::novobus::explore::{LogLine, RingSetup};
+use harness::explore::{FuzzRecord, RECORD};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 

@@ -2,9 +2,11 @@
 
 use super::{Difference, bounds, explore, planted};
 use harness::buses::novobus::explore::shrink::{Shrunk, Subject, shrink};
+use harness::buses::novobus::explore::{Finding, OnSim, RingSetup, against_reference, play};
+use harness::buses::novobus::explore::{scenario, sources};
 use harness::buses::novobus::simulate::simulated;
 use harness::explore::promote::{Naming, checkout, promote};
-use harness::explore::{ExploreError, Finding, OnSim, RingSetup, Target, against_reference, play};
+use harness::explore::{ExploreError, Target};
 use harness::library::Entry;
 use harness::link::Link as _;
 use harness::scenario::run::run;
@@ -63,7 +65,7 @@ fn page(finding: &Finding, shrunk: Shrunk) -> String {
         case: shrunk.subject.case,
         ..finding.clone()
     };
-    new.scenario("small", &new.sources()).expect("a ring")
+    scenario(&new, "small", &sources(&new)).expect("a ring")
 }
 
 /// A drive that does not write: what is left is a telegram that writes and one that reads (ND21 10.1, 10.2).

@@ -11,11 +11,12 @@ mod telegrams;
 mod texts;
 mod witness;
 
-use harness::buses::syntax::Header;
-use harness::explore::{
-    Bounds, CaseScope, Difference, ExploreError, Finding, FuzzRun, FuzzSettings, OnSim, Planted,
-    Pool, Progress, Rehearsal, RingScope, RingSetup, RunEnd, Spice, Swarm, Target, Tried, Watcher,
+use harness::buses::novobus::explore::{
+    Case, CaseScope, Difference, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, Rehearsal,
+    RingScope, RingSetup, Spice, Swarm, Tried,
 };
+use harness::buses::syntax::Header;
+use harness::explore::{Bounds, ExploreError, Progress, RunEnd, Target, Watcher};
 use harness_proto::novobus::guard::Limits;
 
 /// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.
@@ -82,7 +83,7 @@ struct Heard {
     findings: Vec<Finding>,
 }
 
-impl Watcher for Heard {
+impl Watcher<Case> for Heard {
     fn round(&mut self, _: u64, _: &Swarm) {}
 
     fn found(&mut self, finding: &Finding, _: &str) {

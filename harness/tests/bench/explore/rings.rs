@@ -4,12 +4,14 @@ use super::command::{begin_and_kill, drivebench, names, settled};
 use super::findings::empty_checkout;
 use super::{Heard, about, bounds, scope_of};
 use crate::program::{ended, findings, name};
+use harness::buses::novobus::explore::scenario;
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
-use harness::buses::syntax::Header;
-use harness::explore::{
-    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, Planted, RingSetup, Target,
-    beside, by_novelty, play,
+use harness::buses::novobus::explore::{
+    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, Planted, RingSetup, beside,
+    play,
 };
+use harness::buses::syntax::Header;
+use harness::explore::{Target, by_novelty};
 use harness::link::Line as _;
 use harness::link::Octets;
 use harness_proto::time::Span;
@@ -88,7 +90,7 @@ fn a_deviating_drive_of_either_ring() {
 #[test]
 fn the_scenario_names_its_ring() {
     let (found, _) = explore(&planted(1, 2, "writes-ignored"), 2, 5_000);
-    let text = found[0].scenario("two rings", &[]).expect("rings");
+    let text = scenario(&found[0], "two rings", &[]).expect("rings");
     assert!(text.contains("\nring    2, 3\n"), "{text}");
     assert!(text.contains("\n2> ") && text.contains("\n2< "), "{text}");
     assert!(!text.contains("\n> ") && !text.contains("\n< "), "{text}");

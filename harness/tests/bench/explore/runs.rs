@@ -4,8 +4,8 @@ use super::{
     Difference, ExploreError, FuzzRun, Heard, Rehearsal, RunEnd, Target, Tried, about, bounds,
     explore, planted, repeat, scope, seed,
 };
+use harness::buses::novobus::explore::{Case, OnSim, RingSetup};
 use harness::buses::novobus::twin::Symptom;
-use harness::explore::{Case, OnSim, RingSetup};
 
 /// The ring and the reference model, which share no code, agree on everything that a run comes to.
 #[test]
@@ -61,7 +61,7 @@ struct LateOnce {
     wrong: fn(u32) -> bool,
 }
 
-impl Target for LateOnce {
+impl Target<Case> for LateOnce {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
         self.inner.rehearse(case)
     }

@@ -2,10 +2,12 @@
 
 use super::{repeat, scope, scope_of, seed};
 use harness::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
-use harness::buses::novobus::simulate::simulated;
-use harness::explore::{
-    Case, CaseScope, Dice, Generator, MasterView, RingSetup, Swarm, mutate, play,
+use harness::buses::novobus::explore::{
+    Case, CaseScope, Generator, MasterView, RingSetup, mutate, play,
 };
+use harness::buses::novobus::simulate::simulated;
+use harness::explore::Dice;
+use harness::explore::FuzzCase as _;
 use harness::library::Entry;
 use harness::link::Link;
 use harness::scenario::run::run;
@@ -22,7 +24,7 @@ fn cases_with(scope: &CaseScope, ring: usize, count: u64) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     for number in 0..count {
         let mut dice = Dice::of_part(seed(), number);
-        let swarm = Swarm::of_round(seed(), number, scope);
+        let swarm = Case::swarm(seed(), number, scope);
         let maker = Generator::new(scope, scope.ring(ring), &swarm, &mut dice);
         let new = match cases.last().filter(|_| number % 2 == 1) {
             Some(old) => mutate(old, cases.first(), &maker, &mut dice),

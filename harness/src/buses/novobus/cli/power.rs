@@ -1,14 +1,14 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
 use crate::buses::novobus::explore::masters;
+use crate::buses::novobus::explore::{
+    Case, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, RingSetup, Swarm,
+};
 use crate::command::exit::Exit;
 use crate::command::fuzz::rig::{simulated, tell};
 use crate::command::output::Output;
 use crate::counted::counted;
-use crate::explore::{
-    Bounds, ExploreError, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, Progress,
-    RingSetup, Swarm, Watcher,
-};
+use crate::explore::{Bounds, ExploreError, Progress, Watcher};
 use crate::rig::find::find;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
@@ -234,7 +234,7 @@ fn counts(
 /// Tells nothing.
 struct Silent;
 
-impl Watcher for Silent {
+impl Watcher<Case> for Silent {
     fn round(&mut self, _: u64, _: &Swarm) {}
     fn found(&mut self, _: &Finding, _: &str) {}
     fn progress(&mut self, _: &Progress, _: &Pool) {}

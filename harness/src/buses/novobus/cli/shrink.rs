@@ -1,22 +1,21 @@
 //! `drivebench shrink` for a finding on rings.
 
+use crate::buses::novobus::explore::shrink::{Shrunk, Subject, shrink as make_small};
+use crate::buses::novobus::explore::{Case, Difference, Finding, OnRig, OnSim, Planted, RingSetup};
 use crate::command::exit::Exit;
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::fuzz::{on_ports, scope, sizes, tell};
 use crate::command::output::Output;
 use crate::command::rig_failure::find_rig;
 use crate::counted::counted;
-use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
-use crate::explore::{
-    Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, RingSetup, Target,
-};
+use crate::explore::{ExploreError, Target};
 use crate::rig::{Run, UseOptions};
 use harness_sim::novobus::deviation::deviations;
 use std::path::Path;
 
 /// Makes a finding small, and writes what came of it beside it.
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let (finding, path) = match Finding::read(&arguments.finding) {
+    let (finding, path) = match Finding::read_as(&arguments.finding) {
         Ok(read) => read,
         Err(error) => return Ok(tell(&error, output)),
     };

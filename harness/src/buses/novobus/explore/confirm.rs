@@ -3,7 +3,8 @@
 use super::case::{Act, ActKind, Case, Talk, To};
 use super::on_record::OnRecord;
 use super::setup::drive_name;
-use crate::explore::{Confirmation, ExploreError, Finding, FuzzSettings, Rehearsal, Target};
+use crate::buses::novobus::explore::{Finding, FuzzSettings, Rehearsal};
+use crate::explore::{Confirmation, ExploreError, Target};
 use std::collections::BTreeMap;
 
 /// A finding of a ring with ports as its attempts give it; `None` where it has none. `known` says how often each difference was found
@@ -35,91 +36,95 @@ pub fn judged_again(
     };
     let mut confirmation = Confirmation::new(settings.confirm, settings.of, known);
     let before = first.before.as_deref();
-    confirmation.on_ring(&mut again, &rehearsal, before, &mut target)?;
+    on_ring(
+        &mut confirmation,
+        &mut again,
+        &rehearsal,
+        before,
+        &mut target,
+    )?;
     match target.over() {
         Some(_) => Ok(Some(again)),
         None => Err(wrong("it has more attempts than a run makes")),
     }
 }
 
-impl Confirmation<'_> {
-    /// Tries a case again with drives made ready for it, then with more and more of what was sent before it.
-    pub(super) fn on_ring(
-        &mut self,
-        finding: &mut Finding,
-        rehearsal: &Rehearsal,
-        before: Option<&[Act]>,
-        target: &mut dyn Target,
-    ) -> Result<(), ExploreError> {
-        let alone = finding.case.clone();
-        for most in PREFIXES {
-            let acts = last_acts(before.unwrap_or_default(), alone.drives, most);
-            finding.case.acts = [acts, &alone.acts[..]].concat();
-            self.again(finding, rehearsal, target)?;
-            let longer = before.is_some_and(|before| before.len() > acts.len());
-            if finding.confirmed || !longer || target.over().is_some() {
-                break;
-            }
+/// Tries a case again with drives made ready for it, then with more and more of what was sent before it.
+pub(super) fn on_ring(
+    confirmation: &mut Confirmation<'_>,
+    finding: &mut Finding,
+    rehearsal: &Rehearsal,
+    before: Option<&[Act]>,
+    target: &mut dyn Target<Case>,
+) -> Result<(), ExploreError> {
+    let alone = finding.case.clone();
+    for most in PREFIXES {
+        let acts = last_acts(before.unwrap_or_default(), alone.drives, most);
+        finding.case.acts = [acts, &alone.acts[..]].concat();
+        confirmation.again(finding, rehearsal, target)?;
+        let longer = before.is_some_and(|before| before.len() > acts.len());
+        if finding.confirmed || !longer || target.over().is_some() {
+            break;
         }
-        if finding.confirmed {
-            return self.blame(finding, target);
-        }
-        finding.case = alone;
-        self.by_others(finding);
-        Ok(())
     }
+    if finding.confirmed {
+        return blame(confirmation, finding, target);
+    }
+    finding.case = alone;
+    confirmation.by_others(finding);
+    Ok(())
+}
 
-    /// Checks whether the drive that the telegram addresses is to blame. If another drive on the byte's way is to blame, the same
-    /// conversation with the drives' roles exchanged differs at that byte too. An address byte is another one then: it blames no drive.
-    fn blame(
-        &mut self,
-        finding: &mut Finding,
-        target: &mut dyn Target,
-    ) -> Result<(), ExploreError> {
-        let drives = finding.case.drives;
-        let always = !self.moves && finding.seen_again == finding.of;
-        let Some(meant) = finding
-            .difference
-            .meant
-            .filter(|_| always && finding.difference.drive.is_none())
-        else {
+/// Checks whether the drive that the telegram addresses is to blame. If another drive on the byte's way is to blame, the same
+/// conversation with the drives' roles exchanged differs at that byte too. An address byte is another one then: it blames no drive.
+fn blame(
+    confirmation: &mut Confirmation<'_>,
+    finding: &mut Finding,
+    target: &mut dyn Target<Case>,
+) -> Result<(), ExploreError> {
+    let drives = finding.case.drives;
+    let always = !confirmation.moves && finding.seen_again == finding.of;
+    let Some(meant) = finding
+        .difference
+        .meant
+        .filter(|_| always && finding.difference.drive.is_none())
+    else {
+        return Ok(());
+    };
+    for step in 1..drives.min(MOST_EXCHANGED) {
+        let case = exchanged(&finding.case, step);
+        let rehearsal = target.rehearse(&case)?;
+        if rehearsal.denied.is_some() || target.over().is_some() {
             return Ok(());
-        };
-        for step in 1..drives.min(MOST_EXCHANGED) {
-            let case = exchanged(&finding.case, step);
-            let rehearsal = target.rehearse(&case)?;
-            if rehearsal.denied.is_some() || target.over().is_some() {
-                return Ok(());
-            }
-            target.begin();
-            let tried = target.attempt(&case, &rehearsal)?;
-            self.took = self.took + tried.took;
-            finding.attempts.extend(target.recorded());
-            if tried.not_played.is_some()
-                || tried
-                    .difference
-                    .is_some_and(|own| own.byte <= finding.difference.byte)
-            {
-                return Ok(());
-            }
         }
-        // A drive that is wrong only sometimes may have been right by chance.
-        let rehearsal = target.rehearse(&finding.case)?;
         target.begin();
-        let tried = target.attempt(&finding.case, &rehearsal)?;
-        self.took = self.took + tried.took;
+        let tried = target.attempt(&case, &rehearsal)?;
+        confirmation.took = confirmation.took + tried.took;
         finding.attempts.extend(target.recorded());
-        let again = tried
-            .difference
-            .is_some_and(|own| own.byte == finding.difference.byte);
-        if !again {
+        if tried.not_played.is_some()
+            || tried
+                .difference
+                .is_some_and(|own| own.byte <= finding.difference.byte)
+        {
             return Ok(());
         }
-        finding.difference.drive = Some(meant);
-        let name = drive_name(finding.difference.ring, meant);
-        finding.difference.about = format!("drive {name}, {}", finding.difference.about);
-        Ok(())
     }
+    // A drive that is wrong only sometimes may have been right by chance.
+    let rehearsal = target.rehearse(&finding.case)?;
+    target.begin();
+    let tried = target.attempt(&finding.case, &rehearsal)?;
+    confirmation.took = confirmation.took + tried.took;
+    finding.attempts.extend(target.recorded());
+    let again = tried
+        .difference
+        .is_some_and(|own| own.byte == finding.difference.byte);
+    if !again {
+        return Ok(());
+    }
+    finding.difference.drive = Some(meant);
+    let name = drive_name(finding.difference.ring, meant);
+    finding.difference.about = format!("drive {name}, {}", finding.difference.about);
+    Ok(())
 }
 
 /// How many earlier bytes are sent again before a case that shows nothing by itself.

@@ -2,6 +2,8 @@
 
 use super::case::{Act, Case};
 use super::confirm::judged_again;
+use super::confirm::on_ring;
+use super::finding::{is_bounded, scenario, sources};
 use super::generate::{CaseScope, Generator};
 use super::mutate::mutate;
 use super::on_sim::OnSim;
@@ -10,10 +12,10 @@ use super::play::MasterView;
 use super::setup::RingSetup;
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
+use crate::buses::novobus::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
 use crate::counted::counted;
 use crate::explore::{
-    Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
-    Pool, Rehearsal, Swarm, Target, played_again,
+    Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
 use std::collections::BTreeMap;
 
@@ -48,7 +50,8 @@ impl FuzzCase for Case {
     type Act = Act;
 
     fn swarm(seed: u64, round: u64, scope: &CaseScope) -> Swarm {
-        Swarm::of_round(seed, round, scope)
+        let needed = (&Spice::COMMANDS[..], Spice::ReadByte);
+        Swarm::drawn(seed, round, &scope.spices, needed)
     }
 
     fn tour(scope: &CaseScope, about: &FuzzSettings) -> Vec<Self> {
@@ -96,7 +99,8 @@ impl FuzzCase for Case {
     }
 
     fn text(finding: &Finding) -> Result<String, ExploreError> {
-        finding.text()
+        let title = format!("Found by fuzzing: {}", finding.difference.kind());
+        scenario(finding, &title, &sources(finding))
     }
 
     fn again(
@@ -120,7 +124,7 @@ impl FuzzCase for Case {
     }
 
     fn is_sound(finding: &Finding) -> bool {
-        finding.is_bounded()
+        is_bounded(finding)
     }
 
     fn confirm(
@@ -128,9 +132,9 @@ impl FuzzCase for Case {
         finding: &mut Finding,
         rehearsal: &Rehearsal,
         before: Option<&[Act]>,
-        target: &mut dyn Target,
+        target: &mut dyn Target<Case>,
     ) -> Result<(), ExploreError> {
-        confirmation.on_ring(finding, rehearsal, before, target)
+        on_ring(confirmation, finding, rehearsal, before, target)
     }
 }
 

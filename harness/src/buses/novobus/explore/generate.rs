@@ -3,8 +3,8 @@
 use super::case::{Act, ActKind, Case, Damage, Harm, MOST_NET, OtherRing, Talk, To};
 use super::idiom::Idiom;
 use super::order::{CommandSent, RawCommand, Spoil};
+use crate::buses::novobus::explore::{Spice, Swarm};
 use crate::explore::Dice;
-use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::cells::{Access, RAM};
 use harness_proto::nd21::ram;

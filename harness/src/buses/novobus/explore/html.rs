@@ -1,7 +1,8 @@
 //! The page of a run of fuzzing: what was found, what was reached, how it went on.
 
+use crate::buses::novobus::explore::FuzzSettings;
 use crate::counted::counted;
-use crate::explore::{FuzzSettings, Progress};
+use crate::explore::Progress;
 use crate::report::chart::{Along, Chart, Curve, Points};
 use crate::report::html::Html;
 use crate::report::html::ShownScenario;

@@ -3,8 +3,8 @@
 use super::case::{Act, ActKind, Damage, Harm, MOST_NET, Talk, To};
 use super::generate::Generator;
 use super::order::{CommandSent, RawCommand, Spoil};
+use crate::buses::novobus::explore::Spice;
 use crate::explore::Dice;
-use crate::explore::Spice;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
 use harness_proto::novobus::checksum::Checksum;

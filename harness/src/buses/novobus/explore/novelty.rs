@@ -3,8 +3,8 @@
 //! A feature is an action of a drive's bus end and the state of the line at that time: which byte of which kind of telegram followed which
 //! other byte, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
 
-use crate::explore::Case;
-use crate::explore::MasterView;
+use crate::buses::novobus::explore::Case;
+use crate::buses::novobus::explore::MasterView;
 use crate::explore::pool::hash;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};

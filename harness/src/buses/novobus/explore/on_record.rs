@@ -4,8 +4,9 @@ use super::case::{Act, Case};
 use super::judge::{BytesExchanged, Judge};
 use super::on_rig::LONGEST_HISTORY;
 use super::oracle::{Difference, sent};
+use crate::buses::novobus::explore::{Rehearsal, Tried};
 use crate::buses::novobus::twin;
-use crate::explore::{ExploreError, Rehearsal, Target, Tried};
+use crate::explore::{ExploreError, Target};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::Role;
@@ -201,7 +202,7 @@ impl OnRecord {
     }
 }
 
-impl Target for OnRecord {
+impl Target<Case> for OnRecord {
     fn rehearse(&mut self, _: &Case) -> Result<Rehearsal, ExploreError> {
         Ok(Rehearsal::default())
     }

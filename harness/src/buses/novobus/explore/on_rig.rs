@@ -7,6 +7,8 @@ use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, is_silenced
 use super::order::{CommandSent, RawCommand};
 use super::play::MasterView;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::explore::features;
+use crate::buses::novobus::explore::{Rehearsal, Tried};
 use crate::buses::novobus::language::run::over_bus::monitors;
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::buses::novobus::language::syntax::Header;
@@ -14,8 +16,7 @@ use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::SILENCED;
 use crate::explore::ExploreError;
-use crate::explore::features;
-use crate::explore::{Rehearsal, Target, Tried};
+use crate::explore::Target;
 use crate::guard::{Guarded, OVERDUE};
 use crate::link::{Capability, Lead, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::rig::{Run, examine};
@@ -173,7 +174,7 @@ impl OnRig<'_, '_> {
     }
 }
 
-impl Target for OnRig<'_, '_> {
+impl Target<Case> for OnRig<'_, '_> {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
         let mut link = Guarded::new(self.model.clone(), self.limits);
         link.know_as(self.run.session().guarded());

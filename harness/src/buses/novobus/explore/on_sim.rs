@@ -5,9 +5,10 @@ use super::oracle::{Difference, against_model, against_reference, against_witnes
 use super::play::play;
 use super::setup::RingSetup;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::explore::features;
+use crate::buses::novobus::explore::{Rehearsal, Tried};
 use crate::explore::ExploreError;
-use crate::explore::features;
-use crate::explore::{Rehearsal, Target, Tried};
+use crate::explore::Target;
 use crate::link::Link;
 use harness_sim::record::Trace;
 
@@ -94,7 +95,7 @@ impl OnSim {
     }
 }
 
-impl Target for OnSim {
+impl Target<Case> for OnSim {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
         let mut link = self.fresh(case)?.model.clone();
         let seen = play(&mut link, case);

@@ -1,12 +1,14 @@
 //! The page of a run of fuzzing, made from its folder and nothing else: the same folder gives the same page.
 
+use super::finding::{scenario, sources};
 use super::html::{Explored, explored};
+use crate::buses::novobus::explore::Case;
+use crate::buses::novobus::explore::Finding;
+use crate::buses::novobus::explore::play;
+use crate::buses::novobus::explore::{KeptRun, LogLine};
 use crate::buses::novobus::simulate::simulated;
-use crate::explore::Case;
 use crate::explore::ExploreError;
-use crate::explore::Finding;
-use crate::explore::play;
-use crate::explore::{KeptRun, LogLine, read};
+use crate::explore::read_as;
 use crate::library::Entry;
 use crate::link::Link;
 use crate::report::html::{ScenarioView, ShownScenario, section};
@@ -28,7 +30,7 @@ const MOST: usize = 40;
 /// # Errors
 /// It holds no run, or its record or a finding is damaged.
 pub fn page(folder: &Path) -> Result<String, ExploreError> {
-    let (kept, _) = read(folder)?;
+    let (kept, _) = read_as::<Case>(folder)?;
     let mut findings = Vec::new();
     let mut features = vec![(0, 0)];
     let mut reached = Reached::default();
@@ -36,7 +38,7 @@ pub fn page(folder: &Path) -> Result<String, ExploreError> {
         match line {
             LogLine::Finding { file, .. } if findings.len() < MOST && is_name(file) => {
                 let path = folder.join(format!("{file}.json"));
-                let (finding, _) = Finding::read(&path)?;
+                let (finding, _) = Finding::read_as(&path)?;
                 let number = findings.len() + 1;
                 findings.push(shown(number, &finding, file, &path)?);
             }
@@ -104,8 +106,8 @@ fn shown(
     file: &str,
     path: &Path,
 ) -> Result<ShownScenario, ExploreError> {
-    let sources = finding.sources();
-    let text = finding.scenario(&finding.difference.kind(), &sources)?;
+    let sources = sources(&finding);
+    let text = scenario(&finding, &finding.difference.kind(), &sources)?;
     let (text, mut outcome, traces) = played(finding, &text)?;
     outcome.verdict = match finding.confirmed {
         true => Verdict::Failed,

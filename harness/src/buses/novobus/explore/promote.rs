@@ -1,8 +1,11 @@
 //! What is kept of a finding on a ring: an input of the fuzz targets beside its scenario.
 
-use crate::bus::Bus;
+use super::finding::{scenario, scenario_on, sources};
+use crate::buses::novobus::explore::{Act, ActKind, Case, Finding, Harm};
+use crate::buses::novobus::manual::MANUAL;
+use crate::explore::ExploreError;
 use crate::explore::promote::Promotes;
-use crate::explore::{Act, ActKind, Case, ExploreError, Finding, Harm};
+use crate::manual::Manual;
 
 /// The folder of inputs.
 const INPUTS: &str = "corpora/fuzz/ring";
@@ -11,9 +14,7 @@ const INPUTS: &str = "corpora/fuzz/ring";
 const MOST_INPUT: usize = 256;
 
 impl Promotes for Case {
-    fn bus() -> Bus {
-        Bus::Novobus
-    }
+    const MANUAL: Manual = MANUAL;
 
     fn kind(finding: &Finding) -> String {
         finding.difference.kind()
@@ -25,7 +26,7 @@ impl Promotes for Case {
         source: Option<&str>,
     ) -> Result<String, ExploreError> {
         let own = source.map(|source| vec![source.to_owned()]);
-        finding.scenario(title, &own.unwrap_or_else(|| finding.sources()))
+        scenario(finding, title, &own.unwrap_or_else(|| sources(finding)))
     }
 
     fn on_deviating(finding: &Finding) -> Result<Option<String>, ExploreError> {
@@ -33,7 +34,7 @@ impl Promotes for Case {
             return Ok(None);
         }
         let header = finding.setup.with_deviations();
-        let text = finding.scenario_on(&header, "the ring under test", &[])?;
+        let text = scenario_on(finding, &header, "the ring under test", &[])?;
         Ok(Some(text))
     }
 

@@ -1,7 +1,6 @@
 //! What a conversation on the ring can have.
 
-use super::CaseScope;
-use crate::explore::{Spiced, Swarm};
+use crate::explore::Spiced;
 
 /// Something that a conversation can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -113,13 +112,4 @@ impl Spice {
 
 impl Spiced for Spice {
     const ALL: &'static [(&'static str, Self)] = &Self::NAMES;
-}
-
-impl Swarm {
-    /// The subset of a round of a run, of what the scope allows.
-    #[must_use]
-    pub fn of_round(seed: u64, round: u64, scope: &CaseScope) -> Self {
-        let needed = (&Spice::COMMANDS[..], Spice::ReadByte);
-        Self::drawn(seed, round, &scope.spices, needed)
-    }
 }

@@ -1,17 +1,20 @@
 //! Drives that make every choice left open by the manual in the opposite way to the model are not blamed. Wrong drives are.
 
 use super::*;
+use crate::buses::novobus::explore::Finding;
+use crate::buses::novobus::explore::FuzzRun;
+use crate::buses::novobus::explore::FuzzSettings;
+use crate::buses::novobus::explore::Pool;
 use crate::buses::novobus::explore::case::{Act, Case};
 use crate::buses::novobus::explore::generate::{CaseScope, RingScope};
 use crate::buses::novobus::explore::setup::RingSetup;
+use crate::buses::novobus::explore::{Rehearsal, Tried};
+use crate::buses::novobus::explore::{Spice, Swarm, scenario};
 use crate::explore::Dice;
 use crate::explore::ExploreError;
-use crate::explore::Finding;
-use crate::explore::Pool;
-use crate::explore::{Bounds, FuzzRun, RunEnd, Watcher};
-use crate::explore::{FuzzSettings, Progress};
-use crate::explore::{Rehearsal, Target, Tried};
-use crate::explore::{Spice, Swarm};
+use crate::explore::Progress;
+use crate::explore::Target;
+use crate::explore::{Bounds, RunEnd, Watcher};
 use harness_proto::nd21::own;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_proto::novobus::error::BusError;
@@ -159,7 +162,7 @@ impl AnyRing {
     }
 }
 
-impl Target for AnyRing {
+impl Target<Case> for AnyRing {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
         Ok(Rehearsal {
             took: Span::from_micros(300) * case.bytes().len() as u64,
@@ -211,7 +214,7 @@ impl Target for AnyRing {
 #[derive(Default)]
 struct Heard(Vec<Finding>);
 
-impl Watcher for Heard {
+impl Watcher<Case> for Heard {
     fn round(&mut self, _: u64, _: &Swarm) {}
     fn found(&mut self, finding: &Finding, _: &str) {
         self.0.push(finding.clone());
@@ -276,7 +279,7 @@ fn not_blamed(cases: u64) {
         let ring = AnyRing::new(3, properties, Wrong::Nothing, number);
         let (found, not_sent) = run(ring, number, cases, &[]);
         let told = found.iter().map(|own| {
-            let text = own.scenario("it was blamed", &[]).unwrap_or_default();
+            let text = scenario(&own, "it was blamed", &[]).unwrap_or_default();
             format!(
                 "{} confirmed {}\n{text}",
                 own.difference.about, own.confirmed

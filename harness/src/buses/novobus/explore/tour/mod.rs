@@ -7,8 +7,8 @@ mod memory;
 use super::case::{Act, ActKind, Case, Talk, To};
 use super::generate::{CaseScope, RingScope};
 use super::order::{CommandSent, RawCommand, Spoil};
+use crate::buses::novobus::explore::Spice;
 use crate::explore::Dice;
-use crate::explore::Spice;
 use harness_proto::nd21::{own, ram};
 
 /// Maximum number of bytes of a case of the tour.

@@ -2,11 +2,12 @@
 
 use super::line::Stalls;
 use super::{Run, rig, session};
+use crate::buses::novobus::explore::{Case, Finding, FuzzRun, FuzzSettings, Pool, Swarm};
 use crate::buses::novobus::explore::{OnRig, RingSetup};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::Twin;
 use crate::command::fuzz::scope;
-use crate::explore::{Bounds, Finding, FuzzRun, FuzzSettings, Pool, Progress, Swarm, Watcher};
+use crate::explore::{Bounds, Progress, Watcher};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};
 use crate::rig::PlayedScenario;
@@ -104,7 +105,7 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
 #[derive(Default)]
 struct Found(Vec<String>);
 
-impl Watcher for Found {
+impl Watcher<Case> for Found {
     fn round(&mut self, _: u64, _: &Swarm) {}
 
     fn found(&mut self, finding: &Finding, file: &str) {
