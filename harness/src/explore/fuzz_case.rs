@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
+use std::path::Path;
 
 /// Something that a conversation can have.
 pub trait Spiced: Copy + Ord + Debug + 'static {
@@ -103,6 +104,12 @@ pub trait FuzzCase:
         about: &FuzzSettings<Self>,
         known: &BTreeMap<String, u8>,
     ) -> Result<JudgedAgain, ExploreError>;
+
+    /// The page of the run in a folder; `None` where its cases have none.
+    fn page(folder: &Path) -> Option<Result<String, ExploreError>> {
+        let _no_page = folder;
+        None
+    }
 
     /// Whether a finding that was read is within the bounds of what a run writes.
     fn is_sound(finding: &Finding<Self>) -> bool;

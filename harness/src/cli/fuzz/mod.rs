@@ -13,6 +13,7 @@ use clap::Subcommand;
 #[derive(Debug, Subcommand)]
 pub enum FuzzCommand {
     /// Play random conversations and report every byte that differs from the manual.
+    #[command(mut_arg("deviates", |own| own.value_parser(run::planted)))]
     Run(FuzzRunArguments),
     /// Play the conversations that a run has kept, the most telling first.
     Replay(ReplayArguments),

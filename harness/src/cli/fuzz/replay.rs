@@ -1,12 +1,13 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
 use crate::buses::line_fuzz;
+use crate::buses::novobus::cli::fuzz::{on_ports, rings, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
     Act, ActKind, Case, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
 };
 use crate::command::exit::Exit;
 use crate::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
-use crate::command::fuzz::rig::{on_ports, rings, scope, simulated, sizes, tell};
+use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::command::rig_failure::find_any_rig;
 use crate::explore::ExploreError;

@@ -1,21 +1,47 @@
 //! `drivebench fuzz run`.
 
-use crate::buses::line_fuzz;
+use crate::bus::Bus;
+use crate::buses::novobus::cli::fuzz::{on_ports, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
-    Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, Planted, RingSetup,
+    Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, RingSetup, planted_setup,
 };
+use crate::buses::{deviations, line_fuzz};
 use crate::command::exit::Exit;
-use crate::command::fuzz::rig::{on_ports, scope, simulated, sizes, tell};
 use crate::command::fuzz::run::{
-    CASES, FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore,
+    CASES, FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore, planted as read_planted,
 };
+use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::command::page::writable;
 use crate::command::rig_failure::find_any_rig;
-use crate::explore::{Spiced as _, read_as, rig_of};
+use crate::explore::{Planted, Spiced as _, read_as, rig_of};
 use crate::guard::Limits;
 use crate::partition::Partition;
 use crate::rig::{Rig, UseOptions};
+use crate::scenario::problem::nearest;
+
+/// A deviation of a drive, which a bus must have.
+pub(super) fn planted(text: &str) -> Result<Planted, String> {
+    read_planted(text, |name| {
+        let names = deviation_names();
+        let known = names.iter().find(|own| **own == name.trim());
+        let known = known.ok_or_else(|| {
+            let remedy = match nearest(name.trim(), &names) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "`drivebench deviations` lists them".to_owned(),
+            };
+            format!("there is no deviation `{name}`; {remedy}")
+        })?;
+        Ok((*known).to_owned())
+    })
+}
+
+/// The deviations of drives of all buses.
+fn deviation_names() -> Vec<&'static str> {
+    let buses = Bus::NAMES.iter().map(|(_, bus)| *bus);
+    let rows = buses.flat_map(|bus| deviations(bus).into_iter().next().unwrap_or_default());
+    rows.map(|row| row.name).collect()
+}
 
 /// Explores.
 pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -72,7 +98,7 @@ fn on_rings(
         Ok(before) => before.map(|(kept, _)| kept),
         Err(error) => return Ok(tell(&error, output)),
     };
-    let others = |own: &&Planted| own.setup().is_none();
+    let others = |own: &&Planted| planted_setup(own).is_none();
     if let Some(planted) = arguments.deviates.iter().find(others) {
         output.complain(&format!(
             "drives on a ring have no deviation `{}`; `drivebench deviations` lists them",
@@ -88,7 +114,7 @@ fn on_rings(
         return on_simulated(arguments, before.as_ref(), &rig, output);
     }
     if rig.is_simulated() {
-        let planted = arguments.deviates.iter().filter_map(Planted::setup);
+        let planted = arguments.deviates.iter().filter_map(planted_setup);
         rig.setup.setups.extend(planted);
     } else if !arguments.deviates.is_empty() || arguments.whole {
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");

@@ -3,18 +3,31 @@
 mod line;
 pub(crate) mod promote;
 pub(crate) mod replay;
-pub(crate) mod rig;
 pub(crate) mod run;
 pub(crate) mod shrink;
 mod verify;
 pub(crate) mod watch;
 
 use crate::command::exit::Exit;
-use crate::explore::{FuzzCase, FuzzRun};
+use crate::command::output::Output;
+use crate::command::rig_failure::exit_of;
+use crate::explore::{ExploreError, FuzzCase, FuzzRun};
 
 pub(crate) use line::LineFuzz;
-pub(crate) use rig::{on_ports, scope, sizes, tell};
 pub(crate) use verify::verify;
+
+/// Tells why exploring ended early, and gives the exit code for it.
+pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
+    match error {
+        ExploreError::Mistakes(problems) => output.mistakes(problems),
+        other => output.complain(&other.to_string()),
+    }
+    match error {
+        ExploreError::Session(error) => exit_of(error),
+        ExploreError::Mistakes(_) | ExploreError::File(_) | ExploreError::Usage(_) => Exit::Usage,
+        ExploreError::Lost(_) | ExploreError::Unwritable(_) => Exit::RigError,
+    }
+}
 
 /// The exit code of cases that were played.
 pub(crate) fn exit_of_cases<C: FuzzCase>(campaign: &FuzzRun<C>) -> Exit {

@@ -1,6 +1,6 @@
 //! A finding that is kept as a scenario.
 
-use super::rig::tell;
+use super::tell;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::explore::promote::{Naming, Promoted, Promotes, checkout, promote as write};

@@ -1,8 +1,7 @@
 //! Cases that a run has kept, played again.
 
-use super::exit_of_cases;
-use super::rig::tell;
 use super::watch::{Telling, summary};
+use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;

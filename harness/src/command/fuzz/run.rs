@@ -1,11 +1,7 @@
 //! A fuzz run: its options, its bounds, and what is said of it.
 
-use super::exit_of_cases;
-use super::rig::tell;
 use super::watch::{Telling, summary};
-use crate::bus::Bus;
-use crate::buses::deviations;
-use crate::buses::novobus::explore::{Planted, page};
+use super::{exit_of_cases, tell};
 use crate::command::args::{WIRE_TIME_HELP, duration};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -13,11 +9,10 @@ use crate::command::page::write;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal, unseal};
 use crate::explore::{
-    Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, RunEnd, Target,
+    Bounds, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, Planted, RunEnd, Target,
 };
 use crate::partition::Partition;
 use crate::rig::state;
-use crate::scenario::problem::nearest;
 use clap::Args;
 use harness_proto::time::Span;
 use std::path::PathBuf;
@@ -50,7 +45,7 @@ pub struct FuzzRunArguments {
     #[arg(long, value_name = "TIME", value_parser = duration, help = WIRE_TIME_HELP)]
     pub wire_time: Option<Duration>,
     /// Plant a deviation in a drive of a simulated ring: DRIVE=NAME, or 2:DRIVE=NAME in ring 2. `drivebench deviations` lists the names. May repeat.
-    #[arg(long, value_name = "DRIVE=NAME", value_parser = planted)]
+    #[arg(long, value_name = "DRIVE=NAME", value_parser = |text: &str| planted(text, |name| Ok(name.to_owned())))]
     pub deviates: Vec<Planted>,
     /// Make the drives of sim:N complete ND21s instead of plain memory. A witness judges each of them by the rules of the manual for the
     /// bus, the cells and the invariants of a drive.
@@ -86,8 +81,11 @@ pub struct FuzzRunArguments {
     pub wait: Option<Duration>,
 }
 
-/// `1=sends-16-zeros`, `2:1=sends-16-zeros`.
-fn planted(text: &str) -> Result<Planted, String> {
+/// `1=sends-16-zeros`, `2:1=sends-16-zeros`; `named` gives the deviation of a name.
+pub(crate) fn planted(
+    text: &str,
+    named: impl FnOnce(&str) -> Result<String, String>,
+) -> Result<Planted, String> {
     let form = "a deviation is planted as DRIVE=NAME, such as 1=sends-16-zeros; in ring 2 as 2:1=sends-16-zeros";
     let (drive, name) = text.split_once('=').ok_or(form)?;
     let (ring, drive) = match drive.split_once(':') {
@@ -99,27 +97,11 @@ fn planted(text: &str) -> Result<Planted, String> {
         },
     };
     let drive = drive.trim().parse().map_err(|_| form)?;
-    let names = deviation_names();
-    let known = names.iter().find(|own| **own == name.trim());
-    let known = known.ok_or_else(|| {
-        let remedy = match nearest(name.trim(), &names) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "`drivebench deviations` lists them".to_owned(),
-        };
-        format!("there is no deviation `{name}`; {remedy}")
-    })?;
     Ok(Planted {
         ring,
         drive,
-        name: (*known).to_owned(),
+        name: named(name)?,
     })
-}
-
-/// The deviations of drives of all buses.
-fn deviation_names() -> Vec<&'static str> {
-    let buses = Bus::NAMES.iter().map(|(_, bus)| *bus);
-    let rows = buses.flat_map(|bus| deviations(bus).into_iter().next().unwrap_or_default());
-    rows.map(|row| row.name).collect()
 }
 
 /// `2/3`.
@@ -229,10 +211,10 @@ pub(crate) fn explore<C: FuzzCase>(
         return Ok(exit_of_cases(&campaign).with_rig_error());
     }
     if let Some(path) = &arguments.html {
-        match page(&folder) {
-            Ok(text) if write(path, &text, output) => {}
-            Ok(_) => return Ok(Exit::RigError),
-            Err(error) => return Ok(tell(&error, output)),
+        match C::page(&folder) {
+            Some(Ok(text)) if !write(path, &text, output) => return Ok(Exit::RigError),
+            Some(Err(error)) => return Ok(tell(&error, output)),
+            Some(Ok(_)) | None => {}
         }
     }
     Ok(exit_of_cases(&campaign))

@@ -1,6 +1,6 @@
 //! A finding made small: its options, and the file beside it.
 
-use super::rig::tell;
+use super::tell;
 use crate::command::args::duration;
 use crate::command::exit::Exit;
 use crate::command::output::Output;

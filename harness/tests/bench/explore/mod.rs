@@ -12,10 +12,11 @@ mod texts;
 mod witness;
 
 use harness::buses::novobus::explore::{
-    Case, CaseScope, Difference, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, Rehearsal,
-    RingScope, RingSetup, Spice, Swarm, Tried,
+    Case, CaseScope, Difference, Finding, FuzzRun, FuzzSettings, OnSim, Pool, Rehearsal, RingScope,
+    RingSetup, Spice, Swarm, Tried,
 };
 use harness::buses::syntax::Header;
+use harness::explore::Planted;
 use harness::explore::{Bounds, ExploreError, Progress, RunEnd, Target, Watcher};
 use harness_proto::novobus::guard::Limits;
 

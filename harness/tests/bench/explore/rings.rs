@@ -7,10 +7,10 @@ use crate::program::{ended, findings, name};
 use harness::buses::novobus::explore::scenario;
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
 use harness::buses::novobus::explore::{
-    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, Planted, RingSetup, beside,
-    play,
+    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, RingSetup, beside, play,
 };
 use harness::buses::syntax::Header;
+use harness::explore::Planted;
 use harness::explore::{Target, by_novelty};
 use harness::link::Line as _;
 use harness::link::Octets;

@@ -3,9 +3,8 @@
 use super::command::drivebench;
 use super::{Heard, about, bounds, repeat, scope, seed};
 use crate::program::{ended, findings, name};
-use harness::buses::novobus::explore::{
-    Finding, FuzzRun, OnSim, Planted, RingSetup, Spice, scenario,
-};
+use harness::buses::novobus::explore::{Finding, FuzzRun, OnSim, RingSetup, Spice, scenario};
+use harness::explore::Planted;
 
 /// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
 fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {

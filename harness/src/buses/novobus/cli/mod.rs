@@ -6,6 +6,7 @@ mod control;
 pub(crate) mod coverage;
 pub(crate) mod deviations;
 pub(crate) mod distil;
+pub(crate) mod fuzz;
 pub(crate) mod held;
 mod info;
 mod params;

@@ -1,13 +1,15 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
+use crate::buses::novobus::cli::fuzz::simulated;
 use crate::buses::novobus::explore::masters;
 use crate::buses::novobus::explore::{
-    Case, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, RingSetup, Swarm,
+    Case, Finding, FuzzRun, FuzzSettings, OnSim, Pool, RingSetup, Swarm,
 };
 use crate::command::exit::Exit;
-use crate::command::fuzz::rig::{simulated, tell};
+use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::counted::counted;
+use crate::explore::Planted;
 use crate::explore::{Bounds, ExploreError, Progress, Watcher};
 use crate::rig::find::find;
 use clap::Args;

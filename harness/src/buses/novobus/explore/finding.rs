@@ -1,5 +1,6 @@
 //! The scenario of a finding on a ring.
 
+use super::setup::planted_line;
 use crate::buses::novobus::explore::MasterView;
 use crate::buses::novobus::explore::judge::Judge;
 use crate::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
@@ -46,7 +47,7 @@ pub(crate) fn scenario_on(
     let timed = finding.difference.byte.filter(|_| finding.difference.time);
     let mut remarks = vec![finding.difference.about.clone()];
     for planted in &finding.setup.deviates {
-        remarks.push(format!("found on {}", planted.line()));
+        remarks.push(format!("found on {}", planted_line(planted)));
     }
     let page = Surroundings {
         title,

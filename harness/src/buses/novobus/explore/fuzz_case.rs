@@ -8,6 +8,7 @@ use super::generate::{CaseScope, Generator};
 use super::mutate::mutate;
 use super::on_sim::OnSim;
 use super::oracle::Difference;
+use super::page::page;
 use super::play::MasterView;
 use super::setup::RingSetup;
 use super::tour::tour;
@@ -18,6 +19,7 @@ use crate::explore::{
     Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
 };
 use std::collections::BTreeMap;
+use std::path::Path;
 
 impl Differing for Difference {
     fn is_like(&self, other: &Self) -> bool {
@@ -121,6 +123,10 @@ impl FuzzCase for Case {
         }
         let mut target = OnSim::new(finding.setup.clone());
         played_again(finding, about, known, &mut target)
+    }
+
+    fn page(folder: &Path) -> Option<Result<String, ExploreError>> {
+        Some(page(folder))
     }
 
     fn is_sound(finding: &Finding) -> bool {

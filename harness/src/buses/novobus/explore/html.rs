@@ -1,5 +1,6 @@
 //! The page of a run of fuzzing: what was found, what was reached, how it went on.
 
+use super::setup::planted_line;
 use crate::buses::novobus::explore::FuzzSettings;
 use crate::counted::counted;
 use crate::explore::Progress;
@@ -82,7 +83,7 @@ fn facts(html: &mut Html, run: &Explored<'_>) {
         }
         fact("Seed", &about.seed);
         for planted in &about.setup.deviates {
-            fact("Planted", &planted.line());
+            fact("Planted", &planted_line(planted));
         }
         fact(
             "Confirmed",

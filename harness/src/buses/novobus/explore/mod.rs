@@ -41,7 +41,8 @@ pub use oracle::{Difference, against_model, against_reference, against_witnesses
 pub use order::{CommandSent, RawCommand, Spoil};
 pub use page::page;
 pub use play::{MasterView, play};
-pub use setup::{Planted, RingSetup};
+pub use setup::RingSetup;
+pub(crate) use setup::planted_setup;
 pub use spice::Spice;
 
 /// A finding on a ring.

@@ -4,12 +4,13 @@
 use super::case::{ActKind, Case, Harm, OtherRing};
 use super::order::CommandSent;
 use super::play::MasterView;
-use super::setup::{drive_name, is_first};
+use super::setup::drive_name;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::calm::calm;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::section::SentBytes;
 use crate::buses::novobus::twin::{self, Symptom};
+use crate::explore::is_first;
 use crate::link::{Link, Octets, link_name};
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;

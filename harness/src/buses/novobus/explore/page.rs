@@ -2,6 +2,7 @@
 
 use super::finding::{scenario, sources};
 use super::html::{Explored, explored};
+use super::setup::planted_line;
 use crate::buses::novobus::explore::Case;
 use crate::buses::novobus::explore::Finding;
 use crate::buses::novobus::explore::play;
@@ -165,7 +166,9 @@ fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>)
     // The header ends with the first empty line.
     let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
     let planted = finding.setup.deviates.iter();
-    let planted: String = planted.map(|own| format!("\n{}", own.line())).collect();
+    let planted: String = planted
+        .map(|own| format!("\n{}", planted_line(own)))
+        .collect();
     let text = format!("{head}{planted}\n\n{steps}");
     let source = Source {
         name: "the ring under test".to_owned(),

@@ -6,6 +6,7 @@ use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::plan_header;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup as HeaderLine, SetupKind};
 use crate::buses::novobus::simulate;
+use crate::explore::Planted;
 use crate::rig::Rig;
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::problem::Problems;
@@ -13,44 +14,21 @@ use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::novobus::deviation;
 use serde::{Deserialize, Serialize};
 
-/// A deviation that is planted in a drive.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Planted {
-    /// In which ring, counted from 0.
-    #[serde(default, skip_serializing_if = "is_first")]
-    pub ring: usize,
-    /// Which drive.
-    pub drive: u8,
-    /// The name of the deviation.
-    pub name: String,
+/// The line of a header that plants a deviation.
+#[must_use]
+pub(super) fn planted_line(own: &Planted) -> String {
+    let drive = drive_name(own.ring, own.drive);
+    format!("drive {drive} deviates {}", own.name)
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde calls it with a reference"
-)]
-pub(crate) const fn is_first(ring: &usize) -> bool {
-    *ring == 0
-}
-
-impl Planted {
-    /// The line of a header.
-    #[must_use]
-    pub fn line(&self) -> String {
-        let drive = drive_name(self.ring, self.drive);
-        format!("drive {drive} deviates {}", self.name)
-    }
-
-    /// The same as a header; `None` where there is no such deviation.
-    #[must_use]
-    pub fn setup(&self) -> Option<HeaderLine> {
-        let known = deviation::deviation(&self.name)?;
-        Some(HeaderLine::deviates(
-            DriveRange::one(self.ring, self.drive),
-            known,
-        ))
-    }
+/// The same as a header; `None` where there is no such deviation.
+#[must_use]
+pub(crate) fn planted_setup(own: &Planted) -> Option<HeaderLine> {
+    let known = deviation::deviation(&own.name)?;
+    Some(HeaderLine::deviates(
+        DriveRange::one(own.ring, own.drive),
+        known,
+    ))
 }
 
 /// What simulated rings are made of.
@@ -93,7 +71,7 @@ impl RingSetup {
     /// Adds a hidden deviation: the model has it as well.
     #[must_use]
     pub fn hides(mut self, planted: &Planted) -> Self {
-        self.header.setups.extend(planted.setup());
+        self.header.setups.extend(planted_setup(planted));
         self
     }
 
@@ -145,7 +123,7 @@ impl RingSetup {
     #[must_use]
     pub fn with_deviations(&self) -> Header {
         let mut header = self.header.clone();
-        let planted = self.deviates.iter().filter_map(Planted::setup);
+        let planted = self.deviates.iter().filter_map(planted_setup);
         header.setups.extend(planted);
         header
     }

@@ -2,11 +2,11 @@
 
 use super::line::Stalls;
 use super::{Run, rig, session};
+use crate::buses::novobus::cli::fuzz::scope;
 use crate::buses::novobus::explore::{Case, Finding, FuzzRun, FuzzSettings, Pool, Swarm};
 use crate::buses::novobus::explore::{OnRig, RingSetup};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::Twin;
-use crate::command::fuzz::scope;
 use crate::explore::{Bounds, Progress, Watcher};
 use crate::library::Entry;
 use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};

@@ -1,30 +1,16 @@
-//! Work on a rig with ports: opened as `run --rig` opens it, given back in its safe state.
+//! What `fuzz` and `shrink` do on rings. A rig with ports is opened as `run --rig` opens it and given back in its safe state.
 
 use crate::buses::novobus::explore::{CaseScope, RingScope, RingSetup, Spice};
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, give_back};
-use crate::explore::ExploreError;
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::wrong_parity;
 use crate::rig::{Rig, Run, Session, UseOptions};
 use crate::signals::interrupt_flag;
-
-/// Tells why exploring ended early, and gives the exit code for it.
-pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
-    match error {
-        ExploreError::Mistakes(problems) => output.mistakes(problems),
-        other => output.complain(&other.to_string()),
-    }
-    match error {
-        ExploreError::Session(error) => exit_of(error),
-        ExploreError::Mistakes(_) | ExploreError::File(_) | ExploreError::Usage(_) => Exit::Usage,
-        ExploreError::Lost(_) | ExploreError::Unwritable(_) => Exit::RigError,
-    }
-}
 
 /// Opens a rig with ports, works on it, and gives it back in its safe state.
 pub(crate) fn on_ports(
