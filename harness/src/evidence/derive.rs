@@ -4,8 +4,8 @@
 //! A run makes them in the same way when it ends, so making them again gives the same bytes. A record does not have the expected bytes: as
 //! in `verify`, each attempt is played again from what was received. If the result agrees with the record, the bytes that differ are shown.
 
+use super::error::EvidenceError;
 use super::files::{self, CAPTURES, DEVIATIONS, PROFILE, SCENARIOS};
-use super::folder::EvidenceError;
 use super::junit::{JunitCase, junit};
 use super::merge::{MERGE, derive_merged};
 use super::record::RecordLine;

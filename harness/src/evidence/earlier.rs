@@ -1,7 +1,7 @@
 //! What earlier runs have shown: the verdicts of their folders, which are judged again before anything is left out because of them.
 
+use super::error::EvidenceError;
 use super::files::sum;
-use super::folder::EvidenceError;
 use super::merge::{MERGE, opened_parts, verify_merged};
 use super::record::RecordLine;
 use super::verify::{Opened, Verified, verify};

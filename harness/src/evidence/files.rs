@@ -1,6 +1,6 @@
 //! The files of a folder of evidence, and their sums.
 
-use super::folder::EvidenceError;
+use super::error::EvidenceError;
 use crate::regular::{self, Links};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

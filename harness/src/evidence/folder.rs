@@ -1,6 +1,7 @@
 //! The folder of a run, written as the run goes on.
 
 use super::derive::{Settled, bare, derive, plain};
+use super::error::EvidenceError;
 use super::files::{
     CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
 };
@@ -13,7 +14,6 @@ use crate::buses::SimulatedLink;
 use crate::buses::{SharedForm, write_shared};
 use crate::capture::Carries;
 use crate::link::{Capability, LinkEvent, Sink};
-use crate::regular;
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
@@ -21,50 +21,8 @@ use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-
-/// Why a folder cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub enum EvidenceError {
-    /// There is something in it.
-    #[error("{0} is not empty; name a new or empty folder for the evidence")]
-    NotEmpty(String),
-    /// A file.
-    #[error("failed to use {path}: {error}")]
-    File {
-        /// Which.
-        path: String,
-        /// Why not.
-        error: io::Error,
-    },
-    /// The record is damaged.
-    #[error("{RECORD}: {0}")]
-    Record(#[from] super::read::RecordError),
-    /// It cannot be signed, or its signature cannot be checked.
-    #[error("failed to use a signature: {0}")]
-    Signature(String),
-    /// It is no folder of a run: which, and why not.
-    #[error("{0} is not an evidence folder: {1}")]
-    Foreign(String, String),
-    /// A folder of an earlier run that cannot be continued.
-    #[error("failed to continue an earlier run: {0}")]
-    Earlier(String),
-    /// Folders that are no parts of one run.
-    #[error("failed to merge: {0}")]
-    Merge(String),
-}
-
-impl EvidenceError {
-    /// A place that cannot be used.
-    pub(super) fn file(path: &Path, error: io::Error) -> Self {
-        Self::File {
-            path: path.display().to_string(),
-            error: regular::in_words(path, error),
-        }
-    }
-}
 
 /// What a record begins with.
 #[derive(Clone, Debug)]

@@ -1,7 +1,8 @@
 //! The body of the fuzz target for records: hostile ones give a reason with a place, and what is taken is judged without a panic or a
 //! hang.
 
-use super::read::{RecordError, read};
+use super::error::RecordError;
+use super::read::read;
 use super::record::RecordLine;
 use super::verify::{Beside, judge_record};
 /// The scenario of every attempt, whatever its name.

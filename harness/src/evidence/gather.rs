@@ -1,7 +1,7 @@
 //! The scenarios of a run that was split, gathered part by part and judged again.
 
 use super::derive::{CaseReport, Settled, case_reports};
-use super::folder::EvidenceError;
+use super::error::EvidenceError;
 use super::junit::JunitCase;
 use super::qualified_parts::{QualifiedPart, qualified_parts};
 use super::read_parts::ReadPart;

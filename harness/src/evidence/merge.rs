@@ -10,8 +10,8 @@
 //! Each part was played on drives of its own, so each is judged by its own record. All else is made from the parts, and `verify` makes it again.
 
 use super::derive::{DEVIATIONS_HEADING, Derived, PROFILE_HEADING, plain, suite};
+use super::error::EvidenceError;
 use super::files::{self, DEVIATIONS, JUNIT, PAGE, PROFILE, REPORT, SUMS, sum};
-use super::folder::EvidenceError;
 use super::gather::{Gathering, Row};
 use super::junit::junit;
 use super::qualified::compare;

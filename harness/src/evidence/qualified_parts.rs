@@ -1,7 +1,7 @@
 //! What the parts of a qualification that was split come to together, judged by all their records as one qualification is by its own.
 
+use super::error::EvidenceError;
 use super::files::sum;
-use super::folder::EvidenceError;
 use super::qualified::{Case, cases, course, is_thorough};
 use super::verify::{Judged, Opened};
 use crate::buses::qualify::{QualifiedBench, TRIALS};

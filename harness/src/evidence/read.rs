@@ -1,6 +1,7 @@
 //! A record read back: every line is one, holds what can be, and stands where it can. The first that does not is named with its
 //! place.
 
+use super::error::RecordError;
 use super::record::{RecordLine, SCHEMA};
 use crate::link::{Lead, LinkEvent, LinkFault, Moment, PlacedFault};
 use crate::rig::rings::rings;
@@ -12,20 +13,6 @@ pub const MAX_SIZE: u64 = 1 << 31;
 
 /// The longest time of a conversation: what a damaged digit makes of one must not keep a computer busy for years.
 pub const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
-
-/// Why bytes are no record.
-#[derive(Debug, thiserror::Error)]
-#[error("line {line}, column {column} (byte {offset}): {message}")]
-pub struct RecordError {
-    /// Which line, counted from 1.
-    pub line: usize,
-    /// Where in it, in bytes, counted from 1.
-    pub column: usize,
-    /// Where in the record, in bytes, counted from 0.
-    pub offset: usize,
-    /// What is wrong.
-    pub message: String,
-}
 
 /// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
 ///

@@ -1,7 +1,7 @@
 //! The parts of a run that was split, read from their folders: whether they are of one run.
 
+use super::error::EvidenceError;
 use super::files::{self, CAPTURES, SCENARIOS, SIGNATURE, SUMS, sum};
-use super::folder::EvidenceError;
 use super::record::{PartItem, RecordLine};
 use super::verify::Opened;
 use crate::partition::Partition;

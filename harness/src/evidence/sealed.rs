@@ -1,7 +1,7 @@
 //! The sums of a folder that is no evidence of scenarios, such as a run of `fuzz run`, and their signature.
 
+use super::error::EvidenceError;
 use super::files::{SIGNATURE, SUMS, compare_sums, sums};
-use super::folder::EvidenceError;
 use super::signature::{self, Signer};
 use std::fs;
 use std::io::ErrorKind;

@@ -1,7 +1,7 @@
 //! A detached signature of a folder's sums, made and checked by OpenSSH's `ssh-keygen`.
 
+use super::error::EvidenceError;
 use super::files::{self, SIGNATURE, SUMS};
-use super::folder::EvidenceError;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

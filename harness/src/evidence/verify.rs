@@ -5,15 +5,16 @@ use super::attempt::{
 };
 use super::cases;
 use super::derive::derived;
+use super::error::EvidenceError;
+use super::error::RecordError;
 use super::files::{
     self, DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SUMS, compare_sums,
     read_text, sum,
 };
-use super::folder::EvidenceError;
 use super::header::{Header, header};
 use super::keep::left_out;
 use super::qualified;
-use super::read::{RecordError, read, unlike_written};
+use super::read::{read, unlike_written};
 use super::record::RecordLine;
 use super::reports;
 use super::rerun::rerun;
