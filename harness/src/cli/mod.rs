@@ -16,6 +16,7 @@ mod man;
 mod manual;
 mod merge;
 mod merge_counts;
+mod page;
 mod plot;
 mod promote;
 mod qualify;
@@ -33,6 +34,7 @@ mod verify;
 
 pub use crate::command::exit::Exit;
 pub use args::Arguments;
+pub use promote::played;
 
 use crate::command::args::{ColourWhen, ShowProgress};
 use crate::command::output::{self, Output};

@@ -5,12 +5,38 @@ use crate::buses::novobus::explore::Case;
 use crate::command::exit::Exit;
 use crate::command::fuzz::promote::{PromoteArguments, keep};
 use crate::command::output::Output;
-use crate::explore::bus_of;
+use crate::explore::{ExploreError, bus_of};
+use crate::library::Entry;
+use crate::report::page::page;
+use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 
 /// Keeps a finding, whatever its bus.
 pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
     match bus_of(&arguments.finding).and_then(line_fuzz) {
-        Some(own) => (own.promote)(arguments, output),
-        None => keep::<Case>(arguments, output),
+        Some(own) => (own.promote)(arguments, played, output),
+        None => keep::<Case>(arguments, played, output),
     }
+}
+
+/// What comes of a scenario on simulated drives, why, and its page.
+///
+/// # Errors
+/// The scenario has mistakes.
+pub fn played(name: &str, text: &str) -> Result<(Verdict, String, String), ExploreError> {
+    let source = Source {
+        name: name.to_owned(),
+        text: text.to_owned().into(),
+    };
+    let entry = Entry::new(source, None)?;
+    let Some(plan) = entry.settled() else {
+        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
+    };
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, AtMismatch::Stop);
+    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
+    let page = page(&entry, &outcome, &traces);
+    let why = outcome.finding.map(|finding| finding.message);
+    Ok((outcome.verdict, why.unwrap_or_default(), page))
 }

@@ -2,9 +2,9 @@
 
 use super::run_rig::{Course, EarlyEnd, PlayOrder, course_of, keep, reports, show, worse};
 use crate::buses::run_on;
+use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::command::page::Page;
 use crate::command::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;

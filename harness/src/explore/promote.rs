@@ -3,11 +3,7 @@
 
 use super::files::write_whole;
 use super::{Differing as _, ExploreError, Finding, FuzzCase};
-use crate::library::Entry;
 use crate::manual::Manual;
-use crate::report::page::page;
-use crate::scenario::run::AtMismatch;
-use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +32,9 @@ pub struct Promoted {
     /// Whether the drives with the planted deviations fail the scenario; `None` where none was planted.
     pub fails_on_deviating: Option<bool>,
 }
+
+/// Plays a scenario with this name and text on simulated drives: what comes of it, why, and its page.
+pub type Plays = fn(&str, &str) -> Result<(Verdict, String, String), ExploreError>;
 
 /// A case whose findings can be kept as scenarios.
 pub trait Promotes: FuzzCase {
@@ -93,7 +92,7 @@ pub fn checkout(from: &Path) -> Result<PathBuf, ExploreError> {
 pub fn promote<C: Promotes>(
     finding: &Finding<C>,
     naming: &Naming,
-    top: &Path,
+    (top, played): (&Path, Plays),
 ) -> Result<Promoted, ExploreError> {
     let (name, bus) = (&naming.name, C::MANUAL.bus);
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.';
@@ -110,7 +109,7 @@ pub fn promote<C: Promotes>(
         None => format!("Found by fuzzing: {}", C::kind(finding)),
     };
     let text = C::scenario(finding, &title, naming.source.as_deref())?;
-    let table = snapshot(name, &text)?;
+    let table = snapshot(played(name, &text)?)?;
     let file = |folder: &str, ending: &str| {
         let folder = top.join(folder).join(bus.name());
         folder.join(format!("{name}.{ending}"))
@@ -157,27 +156,8 @@ fn known(manual: Manual, source: &str) -> Result<(), ExploreError> {
     }
 }
 
-/// What comes of a scenario on simulated drives, why, and its page.
-fn played(name: &str, text: &str) -> Result<(Verdict, String, String), ExploreError> {
-    let source = Source {
-        name: name.to_owned(),
-        text: text.to_owned().into(),
-    };
-    let entry = Entry::new(source, None)?;
-    let Some(plan) = entry.settled() else {
-        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
-    };
-    let mut link = plan.simulate();
-    let outcome = plan.play(&mut *link, AtMismatch::Stop);
-    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
-    let page = page(&entry, &outcome, &traces);
-    let why = outcome.finding.map(|finding| finding.message);
-    Ok((outcome.verdict, why.unwrap_or_default(), page))
-}
-
 /// The snapshot of a scenario, as `cargo test --test files scenarios` compares it; the model must pass the scenario.
-fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
-    let (verdict, why, page) = played(name, text)?;
+fn snapshot((verdict, why, page): (Verdict, String, String)) -> Result<String, ExploreError> {
     if verdict != Verdict::Passed {
         return Err(ExploreError::Usage(format!(
             "the model itself does not pass this scenario ({verdict}: {why}); nothing was written"

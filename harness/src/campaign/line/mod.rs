@@ -186,7 +186,7 @@ pub(crate) fn time_of_case(at: Instant) -> String {
 
 /// Plays the scenario of a case, which a right drive must meet and which states its class: the text, and what the line carried.
 #[cfg(test)]
-pub(crate) fn replayed(
+pub(crate) fn replayed<L: crate::scenario::language::Language>(
     campaign: &dyn LineCampaign,
     case: &str,
     class: LineClass,
@@ -199,9 +199,8 @@ pub(crate) fn replayed(
         name: case.to_owned(),
         text: text.clone().into(),
     };
-    let entry = crate::library::Entry::new(source, None);
-    let entry = entry.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
-    let plan = entry.other.expect("a plan of its bus");
+    let settled = crate::scenario::settled::settle::<L, L>(&source, None);
+    let (_, plan) = settled.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
     let mut link = plan.simulate();
     let played = plan.play(&mut *link, AtMismatch::Stop);
     assert_eq!(played.verdict, Verdict::Passed, "{text}\n{played:?}");

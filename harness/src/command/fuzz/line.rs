@@ -12,6 +12,7 @@ use crate::counted::counted;
 use crate::explore::line::{
     LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
 };
+use crate::explore::promote::Plays;
 use crate::explore::smaller::{Smaller, smaller};
 use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Spiced, Target, read_as,
@@ -33,7 +34,7 @@ pub(crate) struct LineFuzz {
     /// `shrink`
     pub(crate) shrink: fn(&ShrinkArguments, &mut Output) -> std::io::Result<Exit>,
     /// `promote`
-    pub(crate) promote: fn(&PromoteArguments, &mut Output) -> std::io::Result<Exit>,
+    pub(crate) promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
 }
 
 impl LineFuzz {

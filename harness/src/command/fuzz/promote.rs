@@ -3,7 +3,7 @@
 use super::tell;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::explore::promote::{Naming, Promoted, Promotes, checkout, promote as write};
+use crate::explore::promote::{Naming, Plays, Promoted, Promotes, checkout, promote as write};
 use crate::explore::{ExploreError, Finding};
 use clap::Args;
 use std::path::PathBuf;
@@ -30,9 +30,10 @@ pub struct PromoteArguments {
 /// Writes the files.
 pub(crate) fn keep<C: Promotes>(
     arguments: &PromoteArguments,
+    played: Plays,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let promoted = match promoted::<C>(arguments) {
+    let promoted = match promoted::<C>(arguments, played) {
         Ok(promoted) => promoted,
         Err(error) => return Ok(tell(&error, output)),
     };
@@ -53,7 +54,10 @@ pub(crate) fn keep<C: Promotes>(
     Ok(Exit::Passed)
 }
 
-fn promoted<C: Promotes>(arguments: &PromoteArguments) -> Result<Promoted, ExploreError> {
+fn promoted<C: Promotes>(
+    arguments: &PromoteArguments,
+    played: Plays,
+) -> Result<Promoted, ExploreError> {
     let (finding, _) = Finding::<C>::read_as(&arguments.finding)?;
     let here = PathBuf::from(".");
     let from = arguments.checkout.as_ref().unwrap_or(&here);
@@ -65,5 +69,5 @@ fn promoted<C: Promotes>(arguments: &PromoteArguments) -> Result<Promoted, Explo
         title: arguments.title.clone(),
         source: arguments.source.clone(),
     };
-    write(&finding, &naming, &checkout(&from)?)
+    write(&finding, &naming, (&checkout(&from)?, played))
 }

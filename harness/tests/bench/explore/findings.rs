@@ -5,6 +5,7 @@ use harness::buses::novobus::explore::shrink::{Shrunk, Subject, shrink};
 use harness::buses::novobus::explore::{Finding, OnSim, RingSetup, against_reference, play};
 use harness::buses::novobus::explore::{scenario, sources};
 use harness::buses::novobus::simulate::simulated;
+use harness::cli::played;
 use harness::explore::promote::{Naming, checkout, promote};
 use harness::explore::{ExploreError, Target};
 use harness::library::Entry;
@@ -219,7 +220,7 @@ fn a_finding_is_kept() {
     };
     let inner = top.path().join("corpora/fuzz");
     let found = checkout(&inner).expect("a checkout");
-    let promoted = promote(&finding, &naming, &found).expect("room");
+    let promoted = promote(&finding, &naming, (&found, played)).expect("room");
     assert_eq!(promoted.fails_on_deviating, Some(true));
     let entry =
         Entry::new(Source::read(&promoted.files[0]).expect("a text"), None).expect("no mistakes");
@@ -240,7 +241,7 @@ fn a_finding_is_kept() {
         "{table}"
     );
     // Nothing is written twice, under no other name, and no table that there is not.
-    let again = promote(&finding, &naming, &found).expect_err("it is there");
+    let again = promote(&finding, &naming, (&found, played)).expect_err("it is there");
     assert!(again.to_string().contains("is there already"), "{again}");
     for (name, source, word) in [
         ("../x", None, "is not a name"),
@@ -251,7 +252,7 @@ fn a_finding_is_kept() {
             title: None,
             source,
         };
-        let error = promote(&finding, &naming, &found).expect_err("refused");
+        let error = promote(&finding, &naming, (&found, played)).expect_err("refused");
         assert!(error.to_string().contains(word), "{error}");
     }
     let nowhere = tempfile::tempdir().expect("a folder");

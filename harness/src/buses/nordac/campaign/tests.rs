@@ -1,6 +1,7 @@
 //! The built-in campaigns have the figures that they pin, and mistakes in files are named.
 
 use super::*;
+use crate::buses::nordac::language::Nordac;
 use crate::campaign::line::{replayed, table};
 
 /// The page with the figures.
@@ -71,7 +72,7 @@ fn cases_are_scenarios(step: usize) {
             .expect("it can be read");
         for case in campaign.cases.iter().step_by(step) {
             let (class, conversation) = campaign.play(*case).expect("played");
-            let (text, _) = replayed(&campaign, &case.name(), CLASSES[class]);
+            let (text, _) = replayed::<Nordac>(&campaign, &case.name(), CLASSES[class]);
             let sent = conversation
                 .telegrams
                 .iter()

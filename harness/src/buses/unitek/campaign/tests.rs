@@ -1,6 +1,7 @@
 //! The built-in campaigns have the figures that they pin, and mistakes in files are named.
 
 use super::*;
+use crate::buses::unitek::language::Unitek;
 use crate::campaign::line::{replayed, table};
 
 /// The page with the figures.
@@ -60,7 +61,7 @@ fn cases_are_scenarios(step: usize) {
                 continue;
             }
             let class = CLASSES[outcome.class as usize];
-            let (text, trace) = replayed(&campaign, &case.to_string(), class);
+            let (text, trace) = replayed::<Unitek>(&campaign, &case.to_string(), class);
             let frames: Vec<_> = trace.channels[0]
                 .frames()
                 .iter()
