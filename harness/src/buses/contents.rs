@@ -1,16 +1,17 @@
 //! What the drives of a bus hold, for lists and completions, and how they can deviate.
 
+use super::find_rig_in;
 use super::{nordac, novobus, unitek};
 use crate::bus::Bus;
 use crate::command::args::CellsArguments;
 use crate::command::deviations::DeviationRow;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::rig::find::{find, folder};
+use crate::rig::find::folder;
 
 /// The names of what drives hold, for completions: of the drives of a rig, or of the default bus where there is no such rig.
 pub(crate) fn cell_names(rig: Option<&str>) -> Vec<String> {
-    let found = rig.and_then(|name| find(name, &folder()).ok());
+    let found = rig.and_then(|name| find_rig_in(name, &folder()).ok());
     let bus = found.and_then(|rig| Some(rig.port()?.bus.bus()));
     match bus.unwrap_or(Bus::DEFAULT) {
         Bus::Novobus => novobus::cli::cells::names().map(str::to_owned).collect(),

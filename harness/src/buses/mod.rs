@@ -7,7 +7,6 @@ mod interrupt_tests;
 mod live_tests;
 pub mod nordac;
 pub mod novobus;
-pub(crate) mod port_row;
 #[cfg(test)]
 mod toy;
 pub mod unitek;
@@ -36,7 +35,8 @@ use crate::command::failure::Failure;
 use crate::command::fuzz::{LineFuzz, verify};
 use crate::command::held::HeldBench;
 use crate::command::output::Output;
-use crate::command::rig_failure::{exit_of, find_any_rig};
+use crate::command::port_row::PortCommands;
+use crate::command::rig_failure::{self, exit_of};
 use crate::command::rig_name::RigName;
 use crate::evidence::Signer;
 use crate::explore::read_as;
@@ -44,8 +44,9 @@ use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::medium::ErrorMarks;
 use crate::port::Wire;
+use crate::rig::buses::RigBuses;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
-use crate::rig::{Rig, SessionError, UseOptions};
+use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
@@ -60,9 +61,6 @@ use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::Trace;
 use novobus::language::plan::Plan;
 use novobus::language::syntax::Scenario;
-use port_row::PortRow;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -131,27 +129,52 @@ pub(crate) fn over_ports(
     Box::new(link)
 }
 
-/// The buses of `[port.1]` in a rig's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum PortBus {
-    /// UNITEK DS/BAMOCAR on CAN.
-    Unitek,
-    /// NORDAC *vector* on PROFIBUS DP.
-    Nordac,
+/// The buses, as the files of rigs know them.
+pub static RIG_BUSES: RigBuses = RigBuses {
+    rings: novobus::rig::RINGS,
+    ports: [&unitek::rig::PORT, &nordac::rig::PORT],
+};
+
+/// Commands on rigs with ports.
+static PORT_COMMANDS: [PortCommands; 2] = [unitek::rig::COMMANDS, nordac::rig::COMMANDS];
+
+/// What serves the port of a rig; `None` for rings.
+fn commands_of(rig: &Rig) -> Option<&'static PortCommands> {
+    let bus = rig.port()?.bus;
+    PORT_COMMANDS.iter().find(|own| own.bus == bus)
 }
 
-impl PortBus {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Unitek, Self::Nordac];
+/// Finds and reads a rig; see [`find::find`].
+///
+/// # Errors
+/// There is no such rig, or its file has mistakes.
+pub fn find_rig_in(name: &str, folder: &Path) -> Result<Rig, FindError> {
+    find::find(name, folder, &RIG_BUSES)
+}
 
-    /// What a rig's file says of its drives, and what the commands do with them.
-    pub(crate) const fn row(self) -> &'static PortRow {
-        match self {
-            Self::Unitek => &unitek::rig::PORT,
-            Self::Nordac => &nordac::rig::PORT,
+/// Reads a rig's file.
+///
+/// # Errors
+/// All its mistakes, each with its place.
+pub fn parse_rig(source: &Source) -> Result<Rig, Problems> {
+    check::parse(source, &RIG_BUSES)
+}
+
+/// Finds the rig of this name, for a command that serves rings only; reports what is wrong with it.
+pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
+    let rig = find_any_rig(name, output)?;
+    match rig.of_rings() {
+        Ok(()) => Some(rig),
+        Err(error) => {
+            output.complain(&error.to_string());
+            None
         }
     }
+}
+
+/// Finds the rig of this name, whatever its bus; reports what is wrong with it.
+pub(crate) fn find_any_rig(name: &str, output: &mut Output) -> Option<Rig> {
+    rig_failure::find_any_rig(name, &RIG_BUSES, output)
 }
 
 /// Takes a rig with a port, to play scenarios on it.
@@ -159,8 +182,8 @@ impl PortBus {
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
 pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError> {
-    match rig.port() {
-        Some(port) => (port.bus.row().run)(rig, options),
+    match commands_of(rig) {
+        Some(own) => (own.run)(rig, options),
         None => Err(SessionError::Drives {
             rig: rig.id().to_owned(),
             why: "it has no [port.1]".to_owned(),
@@ -175,8 +198,8 @@ pub(crate) fn judge_of(
     allow_motion: bool,
     qualifies: bool,
 ) -> Option<Box<dyn SegmentJudge>> {
-    let judge = rig.port()?.bus.row().judge?;
-    Some(judge(rig, allow_motion, qualifies))
+    let own = commands_of(rig)?;
+    Some((own.judge)(rig, allow_motion, qualifies))
 }
 
 /// How traces of a shared line are shown, by what the channels carried; `None` for a ring.
@@ -317,10 +340,10 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
     let Some(rig) = find_any_rig(name, output) else {
         return Ok(Exit::Usage);
     };
-    let Some(bus) = rig.port().map(|port| port.bus) else {
+    let Some(own) = commands_of(&rig) else {
         return novobus::cli::drive(command, output);
     };
-    let end = (bus.row().command)(&rig, command, output);
+    let end = (own.command)(&rig, command, output);
     told(end, output)
 }
 
@@ -333,9 +356,9 @@ pub(crate) fn hold(
     options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
-    match rig.port() {
+    match commands_of(rig) {
         None => novobus::cli::held::hold(rig, options, output),
-        Some(port) => (port.bus.row().hold)(rig, options)
+        Some(own) => (own.hold)(rig, options)
             .map_err(|error| Failure::Said(exit_of(&error), error.to_string())),
     }
 }
@@ -349,10 +372,10 @@ pub(crate) fn check_rig(
         return Ok(Exit::Usage);
     };
     let for_tools = arguments.format == ListFormat::Json;
-    match rig.port().map(|port| port.bus) {
+    match commands_of(&rig) {
         None => novobus::cli::rig_check::check(&rig, arguments, output),
-        Some(bus) => {
-            let end = (bus.row().check)(&rig, &arguments.options(), for_tools, output);
+        Some(own) => {
+            let end = (own.check)(&rig, &arguments.options(), for_tools, output);
             told(end, output)
         }
     }
@@ -360,8 +383,8 @@ pub(crate) fn check_rig(
 
 /// How drives of a shared line are explored; `None` for rings.
 pub(crate) fn line_fuzz(bus: Bus) -> Option<&'static LineFuzz> {
-    let own = PortBus::ALL.into_iter().find(|own| own.bus() == bus)?;
-    Some(&own.row().fuzz)
+    let own = PORT_COMMANDS.iter().find(|own| own.bus.bus() == bus)?;
+    Some(&own.fuzz)
 }
 
 /// Judges the findings of a run on drives of a shared line again; `None` if the folder has no such run.

@@ -6,6 +6,7 @@
 
 use super::capture::{listen_into, taps_of};
 use crate::bus::Bus;
+use crate::buses::RIG_BUSES;
 use crate::buses::example;
 use crate::capture::{LiveRecorder, Tape};
 use crate::command::exit::Exit;
@@ -155,7 +156,10 @@ fn interfaces() -> String {
         );
     }
     for (name, place) in find::all(&find::folder()) {
-        let rig = place.source().ok().and_then(|own| find::read(&own).ok());
+        let rig = place
+            .source()
+            .ok()
+            .and_then(|own| find::read(&own, &RIG_BUSES).ok());
         if rig.is_some_and(|own| taps_of(&own).is_ok()) {
             let name = field(&name);
             let _infallible = writeln!(
@@ -170,7 +174,7 @@ fn interfaces() -> String {
 /// The link type of an interface: that of frames, where a bus has frames or a rig has a CAN adapter.
 fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
-    let rig = rig.and_then(|name| find(name, &find::folder()).ok());
+    let rig = rig.and_then(|name| find(name, &find::folder(), &RIG_BUSES).ok());
     let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
     let frames = adapter || simulated_bus(interface).is_some_and(Bus::carries_frames);
     let (number, name, display) = match frames {
@@ -208,7 +212,7 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
         }
     };
     let done = match interface.strip_prefix(RIG) {
-        Some(name) => find(name, &find::folder())
+        Some(name) => find(name, &find::folder(), &RIG_BUSES)
             .map_err(|error| error.to_string())
             .and_then(|rig| taps_of(&rig))
             .and_then(|(taps, line, in_band)| listen_into(fifo, taps, line, in_band)),

@@ -1,5 +1,6 @@
 //! `drivebench rig`: benches, their files and their locks.
 
+use crate::buses::RIG_BUSES;
 use crate::buses::check_rig as check;
 use crate::buses::commands::rig_check::CheckRigArguments;
 use crate::command::args::ListFormat;
@@ -112,7 +113,7 @@ pub(crate) fn rig(command: &RigCommand, output: &mut Output) -> std::io::Result<
 }
 
 fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure> {
-    let find = |name: &str| find::find(name, &find::folder()).map_err(Failure::Find);
+    let find = |name: &str| find::find(name, &find::folder(), &RIG_BUSES).map_err(Failure::Find);
     let folder = || state::folder().map_err(|error| Failure::state(&error));
     let text = match command {
         RigCommand::List { format } => list(*format, &folder()?),
@@ -129,8 +130,8 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
                 return Err(Failure::Said(Exit::NothingSelected, message.to_owned()));
             }
             let between = if ports.is_empty() { "" } else { "\n" };
-            let interfaces = scan::propose_interfaces(&interfaces);
-            scan::propose(&ports) + between + &interfaces
+            let interfaces = scan::propose_interfaces(&interfaces, &RIG_BUSES);
+            scan::propose(&ports, &RIG_BUSES) + between + &interfaces
         }
         RigCommand::Lock { rig, purpose } => {
             let rig = find(rig)?;
@@ -230,7 +231,7 @@ fn row(name: &str, place: &RigPlace, folder: &Path) -> Value {
     let rig = place
         .source()
         .map_err(FindError::from)
-        .and_then(|source| find::read(&source));
+        .and_then(|source| find::read(&source, &RIG_BUSES));
     let rig = match rig {
         Ok(rig) => rig,
         Err(error) => {

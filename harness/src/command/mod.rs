@@ -17,6 +17,7 @@ pub(crate) mod output;
 pub(crate) mod page;
 pub(crate) mod play;
 pub(crate) mod port_bench;
+pub(crate) mod port_row;
 pub(crate) mod rig_failure;
 pub(crate) mod rig_name;
 pub(crate) mod sim;

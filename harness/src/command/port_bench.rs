@@ -40,14 +40,15 @@ pub(crate) fn on<D: PortDrives>(
     };
     let mut rig = rig.clone();
     if let Some(path) = &arguments.setup {
-        let Some(port) = rig.port().filter(|_| rig.origin.starts_with("sim:")) else {
+        let simulated = rig.origin.starts_with("sim:");
+        let Some((port, row)) = rig.port().zip(rig.port_row()).filter(|_| simulated) else {
             let bus = rig.port().map_or("", |port| port.bus.name());
             return Err(Failure::refused(format!(
                 "--setup is for sim:{bus}:N; what stands in a rig's file is set up by its [sim] setup",
             )));
         };
         let source = Source::read(path).map_err(|error| Failure::File(error.into()))?;
-        if let Some(problems) = (port.bus.row().setup_mistakes)(port, &source) {
+        if let Some(problems) = (row.setup_mistakes)(port, &source) {
             return Err(problems.into());
         }
         if let Some(sim) = &mut rig.file.sim {

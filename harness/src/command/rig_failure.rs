@@ -2,29 +2,22 @@
 
 use super::exit::Exit;
 use super::output::Output;
-use crate::link::{Line, Trouble};
+use crate::link::Trouble;
+use crate::rig::buses::RigBuses;
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
-use crate::rig::{Alarm, End, FindError, Rig, Session, SessionError, find};
+use crate::rig::{Alarm, End, FindError, Rig, SessionError, find};
 use crate::top::screen;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// Finds the rig of this name, for a command that serves rings only; reports what is wrong with it.
-pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
-    let rig = find_any_rig(name, output)?;
-    match rig.of_rings() {
-        Ok(()) => Some(rig),
-        Err(error) => {
-            output.complain(&error.to_string());
-            None
-        }
-    }
-}
-
 /// Finds the rig of this name, whatever its bus; reports what is wrong with it.
-pub(crate) fn find_any_rig(name: &str, output: &mut Output) -> Option<Rig> {
-    match find(name, &folder()) {
+pub(crate) fn find_any_rig(
+    name: &str,
+    buses: &'static RigBuses,
+    output: &mut Output,
+) -> Option<Rig> {
+    match find(name, &folder(), buses) {
         Ok(rig) => Some(rig),
         Err(FindError::Mistakes(problems)) => {
             output.mistakes(&problems);
@@ -70,17 +63,6 @@ pub(crate) fn exit_of(error: &SessionError) -> Exit {
         | SessionError::Watchdog(_)
         | SessionError::Ill { .. } => Exit::RigError,
     }
-}
-
-/// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
-pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
-    let exit = exit_of_end(session.link().trouble(), exit, output);
-    let end = match exit {
-        Exit::RigError | Exit::Interlock => session.close_with_error(),
-        _ => session.close(),
-    };
-    let exit = tell_end(&end, exit, output);
-    (end, exit)
 }
 
 /// The exit code of work that this trouble has ended.

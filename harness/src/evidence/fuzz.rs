@@ -7,7 +7,7 @@ use super::record::RecordLine;
 use super::verify::{Beside, judge_record};
 /// The scenario of every attempt, whatever its name.
 pub use crate::buses::rings::fuzz::RECORDED as SCENARIO;
-use crate::rig::{Rig, parse};
+use crate::rig::Rig;
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
 use std::sync::OnceLock;
@@ -29,7 +29,7 @@ fn rig() -> &'static Rig {
             name: "fuzz.toml".to_owned(),
             text: RIG.into(),
         };
-        parse(&source).unwrap_or_else(|problems| panic!("{problems}"))
+        crate::buses::parse_rig(&source).unwrap_or_else(|problems| panic!("{problems}"))
     })
 }
 

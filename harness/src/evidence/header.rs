@@ -294,7 +294,7 @@ fn abilities(rig: &Rig, limits: Limits, (line_errors, taps): (bool, bool)) -> Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::check::parse;
+    use crate::buses::parse_rig as parse;
     use crate::scenario::source::Source;
 
     /// A record that says that a port showed no line errors, although the rig's file says that it does, is changed: scenarios that need them would

@@ -21,7 +21,7 @@ use super::rerun::rerun;
 use super::sealed::unsigned;
 use super::selection;
 use super::signature::{self, Signer};
-use crate::buses::judge_of;
+use crate::buses::{RIG_BUSES, judge_of};
 use crate::counted::counted;
 use crate::regular;
 use crate::rig::judge::known;
@@ -188,7 +188,7 @@ impl Opened {
             Source::from_bytes(name, text).map_err(|error| error.to_string())
         };
         let source = beside(RIG).map_err(foreign)?;
-        let rig = parse_beside(&source, &|_| beside(KNOWN_PROFILE));
+        let rig = parse_beside(&source, &RIG_BUSES, &|_| beside(KNOWN_PROFILE));
         Self::of(
             &record,
             rig.map_err(|problems| foreign(problems.to_string()))?,

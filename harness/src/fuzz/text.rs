@@ -1,7 +1,6 @@
 //! The bodies of the fuzz targets for texts: scenarios and rig files.
 
 use crate::buses::novobus::language::Novobus;
-use crate::rig;
 use crate::scenario::language::Language;
 use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
@@ -79,7 +78,7 @@ pub fn rig(data: &[u8]) {
     let Some((text, source)) = source("input.toml", data) else {
         return;
     };
-    let read = |source: &Source| match rig::parse(source) {
+    let read = |source: &Source| match crate::buses::parse_rig(source) {
         // Its text has the newline, and no more than that.
         Ok(rig) => format!("{:?} {:?}", rig.file, rig.profile),
         Err(problems) => check(&problems, source),

@@ -1,11 +1,11 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
+use super::buses::{PortRow, RigBuses};
 use super::file::schema;
 use super::file::{Endpoint, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::port_file::Port;
 use super::profile::KnownProfile;
 use super::session_error::SessionError;
-use crate::buses::syntax::Header;
 use crate::counted::counted;
 use crate::file::schema::{PathStep, compare, place, syntax};
 use crate::file::values::LinkName;
@@ -33,8 +33,8 @@ pub struct Rig {
     pub file: RigFile,
     /// The profile that it names, read.
     pub profile: Option<KnownProfile>,
-    /// The lines of its `[sim]`, read.
-    pub setup: Header,
+    /// What its buses know of rigs.
+    pub buses: &'static RigBuses,
 }
 
 impl Rig {
@@ -86,6 +86,11 @@ impl Rig {
         self.file.port.as_ref().map(|ports| &ports.first)
     }
 
+    /// What its bus knows of the port.
+    pub(crate) fn port_row(&self) -> Option<&'static PortRow> {
+        self.port().map(|port| self.buses.port(port.bus))
+    }
+
     /// How often a ring is examined before a scenario until it counts as ill; `None` where its file asks for no examination. An interlock
     /// asks for one: its drive must answer, whatever the scenario before has left.
     pub(crate) fn examinations(&self) -> Option<u8> {
@@ -116,19 +121,24 @@ pub type FindProfile<'f> = dyn Fn(&str) -> Result<Source, String> + 'f;
 ///
 /// # Errors
 /// All its mistakes, each with its place.
-pub fn parse(source: &Source) -> Result<Rig, Problems> {
-    parse_beside(source, &|named| {
+pub fn parse(source: &Source, buses: &'static RigBuses) -> Result<Rig, Problems> {
+    let beside = |named: &str| {
         let folder = Path::new(&source.name).parent();
         let path = folder.unwrap_or(Path::new("")).join(named);
         Source::read(&path).map_err(|error| error.to_string())
-    })
+    };
+    parse_beside(source, buses, &beside)
 }
 
 /// The same, with the text of the profile that it may name found by `profile`.
 ///
 /// # Errors
 /// All its mistakes, each with its place.
-pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, Problems> {
+pub fn parse_beside(
+    source: &Source,
+    buses: &'static RigBuses,
+    profile: &FindProfile<'_>,
+) -> Result<Rig, Problems> {
     let problems = |mut problems: Vec<Problem>| {
         problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
         problems.dedup();
@@ -143,9 +153,10 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
     let mut check = RigCheck {
         table: &table,
         file: &file,
+        buses,
         problems: Vec::new(),
     };
-    let (profile, setup) = check.all(source, profile);
+    let profile = check.all(source, profile);
     if !check.problems.is_empty() {
         return Err(problems(check.problems));
     }
@@ -154,7 +165,7 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
         text: source.text.clone(),
         file,
         profile,
-        setup,
+        buses,
     })
 }
 
@@ -168,6 +179,7 @@ pub(crate) fn is_address(text: &str) -> bool {
 pub(crate) struct RigCheck<'a> {
     pub(crate) table: &'a Spanned<DeTable<'a>>,
     pub(crate) file: &'a RigFile,
+    pub(crate) buses: &'static RigBuses,
     pub(crate) problems: Vec<Problem>,
 }
 
@@ -187,11 +199,7 @@ impl RigCheck<'_> {
         self.problems.push(problem);
     }
 
-    fn all(
-        &mut self,
-        source: &Source,
-        find_profile: &FindProfile<'_>,
-    ) -> (Option<KnownProfile>, Header) {
+    fn all(&mut self, source: &Source, find_profile: &FindProfile<'_>) -> Option<KnownProfile> {
         let file = self.file;
         debug_assert!(file.schema <= SCHEMA);
         self.id();
@@ -200,8 +208,7 @@ impl RigCheck<'_> {
             self.programs();
             self.quarantine();
             let port = file.port.as_ref().map(|ports| &ports.first);
-            let profile = port.and_then(|port| self.port_profile(port, find_profile));
-            return (profile, Header::default());
+            return port.and_then(|port| self.port_profile(port, find_profile));
         }
         for (ring, number) in file.rings().zip(["1", "2"]) {
             let path = [PathStep::Key("ring"), PathStep::Key(number)];
@@ -236,8 +243,8 @@ impl RigCheck<'_> {
         self.programs();
         self.quarantine();
         let profile = self.profile(find_profile);
-        let setup = self.setup(source, profile.as_ref());
-        (profile, setup)
+        self.setup(source, profile.as_ref());
+        profile
     }
 
     fn id(&mut self) {

@@ -119,19 +119,20 @@ impl RigCheck<'_> {
 
     /// What only other buses have is no part of a file for this one.
     fn of_other_buses(&mut self, port: &Port) {
+        let row = self.buses.port(port.bus);
         let limits = &self.file.limits;
         let speed = limits.max_speed.map(|_| "max_speed");
         let given = limits.port.given().into_iter().chain(speed);
         let adapters = port.adapters().into_iter();
-        let adapters = adapters.map(|key| (key, port.bus.adapters()));
-        let more = port.more().into_iter().map(|key| (key, port.bus.keys()));
+        let adapters = adapters.map(|key| (key, row.adapters));
+        let more = port.more().into_iter().map(|key| (key, row.keys));
         let of_port = adapters.chain(more).map(|(key, own)| {
             let path = vec![PORT[0], PORT[1], PathStep::Key(key)];
             (path, key, own)
         });
         let of_limits = given.map(|key| {
             let path = vec![PathStep::Key("limits"), PathStep::Key(key)];
-            (path, key, port.bus.limits())
+            (path, key, row.limits)
         });
         let all: Vec<_> = of_port.chain(of_limits).collect();
         for (path, key, own) in all {
@@ -161,7 +162,7 @@ impl RigCheck<'_> {
                 "the port has no adapter",
                 format!(
                     "`{}`, or a table [sim] with `bus` for simulated drives, expected",
-                    port.bus.adapters().join("`, `")
+                    self.buses.port(port.bus).adapters.join("`, `")
                 ),
             ),
             (None, None, Some(sim)) if sim.bus != Some(port.bus) => {
@@ -218,7 +219,7 @@ impl RigCheck<'_> {
             let expected = "`channel` only beside `socketcand` expected";
             self.wrong(&at("channel"), "this adapter has one bus", expected);
         }
-        if !port.bus.has_rate(port.rate.bits_per_second()) {
+        if !(self.buses.port(port.bus).has_rate)(port.rate.bits_per_second()) {
             let message = format!("no bus runs at {} kbit/s", port.rate);
             self.wrong(&at("rate"), message, "such as 500 expected here");
         }
@@ -273,13 +274,14 @@ impl RigCheck<'_> {
             self.wrong(&at(index), "this is more than one line", expected);
             return;
         }
-        for (index, problem) in port.bus.setup_mistakes(port, lines) {
+        for (index, problem) in self.buses.port(port.bus).line_mistakes(port, lines) {
             self.add(&at(index), &problem);
         }
     }
 
     /// Every drive has identifiers of its own.
     fn nodes(&mut self, port: &Port) {
+        let row = self.buses.port(port.bus);
         let mut seen: Vec<(u16, usize)> = Vec::new();
         let mut numbers: Vec<u8> = Vec::new();
         for (index, node) in port.drives.iter().enumerate() {
@@ -289,11 +291,11 @@ impl RigCheck<'_> {
                 PathStep::Key("drives"),
                 PathStep::Index(index),
             ];
-            if let Err((message, expected)) = port.bus.named(*node) {
+            if let Err((message, expected)) = (row.named)(*node) {
                 self.wrong(&path, message, expected);
                 continue;
             }
-            let (number, identifiers) = port.bus.drive(index, *node);
+            let (number, identifiers) = (row.drive)(index, *node);
             if numbers.contains(&number) {
                 let message = format!("drive {number} is listed twice");
                 self.wrong(&path, message, "another drive expected here");
@@ -315,15 +317,14 @@ impl RigCheck<'_> {
 
     /// Interlocks are on registers of drives that the port lists.
     fn port_interlocks(&mut self, port: &Port) {
+        let row = self.buses.port(port.bus);
         let file = self.file;
         let listed = port.drives.iter().enumerate();
-        let listed: Vec<u8> = listed
-            .map(|(at, node)| port.bus.drive(at, *node).0)
-            .collect();
+        let listed: Vec<u8> = listed.map(|(at, node)| (row.drive)(at, *node).0).collect();
         for (index, own) in file.interlock.iter().enumerate() {
             let entry = [PathStep::Key("interlock"), PathStep::Index(index)];
             let at = |key| [entry[0], entry[1], PathStep::Key(key)];
-            let (key, read) = port.bus.row().interlock;
+            let (key, read) = row.interlock;
             let foreign = [
                 ("ring", own.ring != 1),
                 ("cell", own.cell.is_some()),
@@ -362,6 +363,7 @@ impl RigCheck<'_> {
     }
 
     fn port_limits(&mut self, port: &Port) {
+        let row = self.buses.port(port.bus);
         let limits = &self.file.limits.port;
         let at = |key| [PathStep::Key("limits"), PathStep::Key(key)];
         if limits.max_setpoint.is_some() && limits.max_frequency.is_some() {
@@ -373,7 +375,7 @@ impl RigCheck<'_> {
             );
         }
         for (index, name) in limits.allow_registers.iter().enumerate() {
-            if let Err((message, expected)) = port.bus.special_register(name) {
+            if let Err((message, expected)) = (row.special_register)(name) {
                 let path = [at("allow_registers").as_slice(), &[index.into()]].concat();
                 self.wrong(&path, message, expected);
             }

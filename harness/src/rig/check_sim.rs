@@ -3,25 +3,16 @@
 use super::check::{FindProfile, RigCheck};
 use super::file::Sim;
 use super::port_file::Port;
-use super::profile::{KnownProfile, Profile, ProfileLines, ProfileSetup};
-use crate::buses::novobus::language::parse::header::{for_other_rings, parse_lines};
-use crate::buses::syntax::Header;
+use super::profile::{KnownProfile, Profile, ProfileError, ProfileLines};
 use crate::file::schema::PathStep;
-use crate::rig::sim::{mistakes, sizes};
 use crate::scenario::problem::{Problem, TextSpan};
 use crate::scenario::source::{Source, line_number};
-use serde::de::DeserializeOwned;
 
 impl RigCheck<'_> {
     /// The profile that the rig's file names, of drives in rings.
     pub(crate) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
-        let (header, text) = self.read_profile(find)?;
-        let lines = Vec::new();
-        Some(KnownProfile {
-            text,
-            header,
-            lines,
-        })
+        let (lines, text) = self.read_profile(find, self.buses.rings.profile)?;
+        Some(KnownProfile { text, lines })
     }
 
     /// The same, of drives behind a port. Each of its lines must be about one of them.
@@ -30,30 +21,29 @@ impl RigCheck<'_> {
         port: &Port,
         find: &FindProfile<'_>,
     ) -> Option<KnownProfile> {
-        let (lines, text) = self.read_profile::<ProfileLines>(find)?;
-        for (_, problem) in port.bus.setup_mistakes(port, &lines) {
+        let read = |text: &str| Ok(Profile::<ProfileLines>::parse(text)?.header());
+        let (lines, text) = self.read_profile(find, read)?;
+        let row = self.buses.port(port.bus);
+        for (_, problem) in row.line_mistakes(port, &lines) {
             self.wrong(
                 &["rig".into(), "profile".into()],
                 format!("the profile is not of these drives: {}", problem.message),
                 "the profile that `drivebench qualify` writes for the drives of this file expected here",
             );
         }
-        Some(KnownProfile {
-            text,
-            header: Header::default(),
-            lines,
-        })
+        Some(KnownProfile { text, lines })
     }
 
-    fn read_profile<S: ProfileSetup + DeserializeOwned>(
+    fn read_profile(
         &mut self,
         find: &FindProfile<'_>,
-    ) -> Option<(S, String)> {
+        read: impl Fn(&str) -> Result<ProfileLines, ProfileError>,
+    ) -> Option<(ProfileLines, String)> {
         let named = self.file.rig.profile.as_ref()?;
         let profile = find(named).and_then(|source| {
-            let profile = Profile::<S>::parse(&source.text);
-            let profile = profile.map_err(|error| format!("{}: {error}", source.name))?;
-            Ok((profile.header(), source.text.to_string()))
+            let lines = read(&source.text);
+            let lines = lines.map_err(|error| format!("{}: {error}", source.name))?;
+            Ok((lines, source.text.to_string()))
         });
         match profile {
             Ok(profile) => Some(profile),
@@ -66,7 +56,7 @@ impl RigCheck<'_> {
     }
 
     /// Reads the lines of `[sim]`, and settles them behind the profile for the rig's rings.
-    pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) -> Header {
+    pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) {
         let none = Sim::default();
         let lines = &self.file.sim.as_ref().unwrap_or(&none).setup;
         let line = |index: usize| {
@@ -83,34 +73,21 @@ impl RigCheck<'_> {
                 "this is more than one line",
                 "one line expected here",
             );
-            return Header::default();
+            return;
         }
         let text = lines.join("\n");
         let place = |span: TextSpan| line(line_number(&text, span.start) - 1);
-        let read = parse_lines(&Source {
+        let own = Source {
             name: source.name.clone(),
             text: text.as_str().into(),
-        });
-        let own = match read {
-            Ok(own) => own,
-            Err(problems) => {
-                for problem in problems.all() {
-                    self.add(&place(problem.span), problem);
-                }
-                return Header::default();
-            }
         };
-        if let Some(problem) = for_other_rings(&own, &sizes(self.file)) {
-            self.add(&place(problem.span), &problem);
-            return own;
-        }
-        for (setup, problem) in mistakes(&source.name, self.file, profile, &own) {
-            match setup {
-                Some(setup) => self.add(&place(setup.span), &problem),
+        let profile = profile.map(|profile| profile.lines.as_slice());
+        for (span, problem) in (self.buses.rings.mistakes)(self.file, profile, &own) {
+            match span {
+                Some(span) => self.add(&place(span), &problem),
                 None => self.add(&["rig".into(), "profile".into()], &problem),
             }
         }
-        own
     }
 
     /// Adds a mistake at a value of the rig's file.

@@ -1,5 +1,6 @@
 //! A rig by its name: `sim:3`, a file, a file of a folder of rigs, or one that the program carries.
 
+use super::buses::RigBuses;
 use super::check::{Rig, parse};
 use super::port_file::PortBus;
 use crate::rig::rings::{simulated_rings, sizes_of_rings};
@@ -57,29 +58,30 @@ pub fn folder() -> PathBuf {
 ///
 /// # Errors
 /// There is no such rig, or its file has mistakes.
-pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
+pub fn find(name: &str, folder: &Path, buses: &'static RigBuses) -> Result<Rig, FindError> {
     if let Some(sizes) = name.strip_prefix("sim:") {
         let text = match simulated_port(sizes) {
-            Some((bus, drives)) => drives.map(|drives| simulated_bus(bus, drives)),
+            Some((bus, drives)) => drives.map(|drives| simulated_bus(bus, drives, buses)),
             None => simulated_rings(sizes).map_err(|reason| or_meant(sizes, reason)),
         };
         let text = text.map_err(|reason| FindError::Simulated {
             name: name.to_owned(),
             reason,
         })?;
-        return read(&Source {
+        let source = Source {
             name: name.to_owned(),
             text: text.into(),
-        });
+        };
+        return read(&source, buses);
     }
     let path = Path::new(name);
     let is_path = name.contains('/') || path.extension().is_some_and(|ending| ending == "toml");
     if is_path && path.exists() {
-        return read(&Source::read(path)?);
+        return read(&Source::read(path)?, buses);
     }
     let all = all(folder);
     if let Some((_, place)) = all.iter().find(|(known, _)| known == name) {
-        return read(&place.source()?);
+        return read(&place.source()?, buses);
     }
     let known: Vec<_> = all.iter().map(|(name, _)| name.as_str()).collect();
     let near = nearest(name, &known).map(str::to_owned);
@@ -163,8 +165,8 @@ impl RigPlace {
 ///
 /// # Errors
 /// Its mistakes.
-pub fn read(source: &Source) -> Result<Rig, FindError> {
-    parse(source).map_err(|problems| Box::new(problems).into())
+pub fn read(source: &Source, buses: &'static RigBuses) -> Result<Rig, FindError> {
+    parse(source, buses).map_err(|problems| Box::new(problems).into())
 }
 
 /// Every rig with its name, in order: those of `folder`, and the built-in ones with other names.
@@ -209,8 +211,8 @@ pub fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
 }
 
 /// The file of a simulated bench with a port. All is permitted.
-fn simulated_bus(bus: PortBus, drives: u8) -> String {
-    let (nodes, limits) = bus.simulated(drives);
+fn simulated_bus(bus: PortBus, drives: u8, buses: &RigBuses) -> String {
+    let (nodes, limits) = (buses.port(bus).simulated)(drives);
     let name = bus.name();
     format!(
         "schema = 2\n[rig]\nid = \"sim-{name}-{drives}\"\n[port.1]\nbus = \"{name}\"\ndrives = [{nodes}]\n[sim]\nbus = \"{name}\"\n\

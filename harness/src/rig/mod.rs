@@ -5,6 +5,7 @@
 //! which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
 pub(crate) mod around;
+pub mod buses;
 pub(crate) mod check;
 mod check_port;
 mod check_sim;
@@ -52,4 +53,4 @@ pub use watchdog::Alarm;
 pub use crate::buses::rings::rig::{
     Driven, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures, play_one,
 };
-pub(crate) use crate::buses::rings::rig::{judge, run, sim, wrong_parity};
+pub(crate) use crate::buses::rings::rig::{judge, run, wrong_parity};

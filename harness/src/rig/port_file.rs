@@ -1,5 +1,6 @@
 //! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
+use crate::bus::Bus;
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;
@@ -8,7 +9,44 @@ use crate::rig::file::Transport;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::buses::PortBus;
+/// The buses of `[port.1]` in a rig's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PortBus {
+    /// UNITEK DS/BAMOCAR on CAN.
+    Unitek,
+    /// NORDAC *vector* on PROFIBUS DP.
+    Nordac,
+}
+
+impl PortBus {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Unitek, Self::Nordac];
+
+    /// The bus of its scenarios.
+    #[must_use]
+    pub const fn bus(self) -> Bus {
+        match self {
+            Self::Unitek => Bus::Unitek,
+            Self::Nordac => Bus::Nordac,
+        }
+    }
+
+    /// The name in a rig's file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.bus().name()
+    }
+
+    /// The most drives of a simulated bench: node 1 to 127; address 8 to 126.
+    #[must_use]
+    pub const fn most_drives(self) -> u8 {
+        match self {
+            Self::Unitek => 127,
+            Self::Nordac => 119,
+        }
+    }
+}
 
 /// The ports of a bench.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -1,6 +1,5 @@
 //! A profile: what is known about the drives of a rig, as a file that the simulator can load.
 
-use crate::buses::syntax::Header;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -14,12 +13,6 @@ pub trait ProfileSetup: Default {
     fn add(&mut self, more: &Self);
 }
 
-impl ProfileSetup for Header {
-    fn add(&mut self, more: &Self) {
-        *self = self.and(more);
-    }
-}
-
 impl ProfileSetup for ProfileLines {
     fn add(&mut self, more: &Self) {
         self.extend_from_slice(more);
@@ -29,7 +22,7 @@ impl ProfileSetup for ProfileLines {
 /// A drive profile (TOML).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Profile<S = Header> {
+pub struct Profile<S> {
     /// The version of this form: 1.
     pub schema: u32,
     /// Which rig was asked.
@@ -49,7 +42,7 @@ pub struct Profile<S = Header> {
 /// A property that was settled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SettledProperty<S = Header> {
+pub struct SettledProperty<S> {
     /// What was found, for people.
     pub value: String,
     /// The section that leaves it open.
@@ -63,9 +56,7 @@ pub struct SettledProperty<S = Header> {
 pub struct KnownProfile {
     /// Its text.
     pub text: String,
-    /// What makes simulated drives behave so, in rings.
-    pub header: Header,
-    /// The same of drives behind a port: header lines of a scenario.
+    /// What makes simulated drives behave so.
     pub lines: ProfileLines,
 }
 

@@ -3,6 +3,7 @@
 //! Linux tells it in files: `/sys/class/tty/*` has the ports, `/run/udev/data/c4:64` the keys of the port with
 //! these numbers. Nothing is opened, so that no port is disturbed.
 
+use super::buses::{PortRow, RigBuses};
 use super::port_file::PortBus;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -177,7 +178,7 @@ fn port(root: &Path, folder: &Path) -> Option<FoundPort> {
 
 /// A block of a rig file for each port, to choose from: each is made for ring 1, and as a comment for an SLCAN adapter.
 #[must_use]
-pub fn propose(ports: &[FoundPort]) -> String {
+pub fn propose(ports: &[FoundPort], buses: &RigBuses) -> String {
     let mut text = String::new();
     for (number, port) in ports.iter().enumerate() {
         let device = port.device.display().to_string();
@@ -202,7 +203,7 @@ pub fn propose(ports: &[FoundPort]) -> String {
             "{gap}# {device}{model}\n[ring.1]\ndrives = 1                      # how many there are\n\
              transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n"
         );
-        for bus in with_adapter("slcan") {
+        for bus in with_adapter("slcan", buses) {
             let _infallible = write!(
                 text,
                 "# Or, if it is an SLCAN adapter, in a file with schema = 2:\n# [port.1]\n# bus = {}\n# slcan = {}\n# drives = [{{ node = 1 }}]\n",
@@ -216,10 +217,10 @@ pub fn propose(ports: &[FoundPort]) -> String {
 
 /// A block of a rig file for each CAN interface.
 #[must_use]
-pub fn propose_interfaces(names: &[String]) -> String {
+pub fn propose_interfaces(names: &[String], buses: &RigBuses) -> String {
     let mut text = String::new();
     for name in names {
-        for bus in with_adapter("socketcan") {
+        for bus in with_adapter("socketcan", buses) {
             let _infallible = write!(
                 text,
                 "# {name}, in a file with schema = 2:\n[port.1]\nbus = {}\nsocketcan = {}\ndrives = [{{ node = 1 }}]\n",
@@ -232,9 +233,10 @@ pub fn propose_interfaces(names: &[String]) -> String {
 }
 
 /// The buses that are reached by an adapter of this kind.
-fn with_adapter(kind: &'static str) -> impl Iterator<Item = PortBus> {
-    let has = move |bus: &PortBus| bus.adapters().contains(&kind);
-    PortBus::ALL.into_iter().filter(has)
+fn with_adapter(kind: &'static str, buses: &RigBuses) -> impl Iterator<Item = PortBus> {
+    let rows = buses.ports.iter().copied();
+    let has = move |row: &&PortRow| row.adapters.contains(&kind);
+    rows.filter(has).map(|row| row.bus)
 }
 
 fn quoted(text: &str) -> String {

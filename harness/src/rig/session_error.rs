@@ -3,7 +3,6 @@
 use super::hook::HookError;
 use super::in_use::End;
 use super::lock::LockError;
-use super::open::OpenRigError;
 use std::error::Error;
 
 /// What the bus of a rig says of it.
@@ -65,7 +64,7 @@ pub enum SessionError {
         /// Which.
         rig: String,
         /// Why not.
-        error: Box<OpenRigError>,
+        error: Finding,
     },
     /// A hook.
     #[error("rig {rig}: {error}")]

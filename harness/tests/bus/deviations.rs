@@ -7,11 +7,12 @@
 use crate::blind::Blind;
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::simulate::simulated;
+use harness::buses::parse_rig as parse;
 use harness::buses::rings::rig::OnRings as _;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
 use harness::qualify::deviating_masters;
-use harness::rig::{PlayedScenario, Run, Session, UseOptions, parse};
+use harness::rig::{PlayedScenario, Run, Session, UseOptions};
 use harness::scenario::run::run;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

@@ -391,7 +391,7 @@ fn one_port_for_both_ends_in_a_rig_file() {
     };
     let parsed = |text: String| {
         let source = Source::from_bytes("a.toml".to_owned(), text.into()).expect("a text");
-        harness::rig::parse(&source)
+        harness::buses::parse_rig(&source)
     };
     let one = parsed(format!("{ring}{}", interposer("2->1")));
     assert!(one.is_ok(), "{one:?}");

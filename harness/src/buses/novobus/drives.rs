@@ -3,6 +3,7 @@
 use super::driver::cell::{CellFound, find, write};
 use super::driver::{self, Axis, OpenRings, State};
 use crate::buses::SimulatedLink;
+use crate::buses::find_rig_in;
 use crate::buses::novobus::language::argument::{assignments, cells, encode};
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
@@ -142,7 +143,7 @@ impl Drives {
     /// # Errors
     /// There is no such rig, its file has mistakes, it is in use, or its rings do not answer.
     pub fn open(rig: &str, allow_motion: bool) -> Result<Self, Error> {
-        let rig = rig::find(rig, &rig::find::folder())?;
+        let rig = find_rig_in(rig, &rig::find::folder())?;
         let plan = rig.plan()?;
         let options = rig::UseOptions {
             purpose: "another program".to_owned(),

@@ -9,11 +9,11 @@ pub(crate) use place::taps_of;
 
 use super::args::{ImportArguments, ReadingArguments, TraceOutput, rate};
 use super::import::import;
+use crate::buses::find_any_rig;
 use crate::capture::NamedLink;
 use crate::command::args::duration;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::command::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::signals;
 use clap::Args;

@@ -1,5 +1,6 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
+use crate::buses::find_any_rig;
 use crate::buses::line_fuzz;
 use crate::buses::novobus::cli::fuzz::{on_ports, rings, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
@@ -9,7 +10,6 @@ use crate::command::exit::Exit;
 use crate::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
 use crate::command::fuzz::tell;
 use crate::command::output::Output;
-use crate::command::rig_failure::find_any_rig;
 use crate::explore::ExploreError;
 use crate::guard::Limits;
 use crate::regular::{self, Links};

@@ -5,7 +5,8 @@ use crate::buses::novobus::cli::fuzz::{on_ports, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
     Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, RingSetup, planted_setup,
 };
-use crate::buses::{deviations, line_fuzz};
+use crate::buses::novobus::rig::sim;
+use crate::buses::{deviations, find_any_rig, line_fuzz};
 use crate::command::exit::Exit;
 use crate::command::fuzz::run::{
     CASES, FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore, planted as read_planted,
@@ -13,7 +14,6 @@ use crate::command::fuzz::run::{
 use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::command::page::writable;
-use crate::command::rig_failure::find_any_rig;
 use crate::explore::{Planted, Spiced as _, read_as, rig_of};
 use crate::guard::Limits;
 use crate::partition::Partition;
@@ -115,7 +115,9 @@ fn on_rings(
     }
     if rig.is_simulated() {
         let planted = arguments.deviates.iter().filter_map(planted_setup);
-        rig.setup.setups.extend(planted);
+        let mut own = sim::setup(&rig);
+        own.setups.extend(planted);
+        sim::set_up(&mut rig, &own);
     } else if !arguments.deviates.is_empty() || arguments.whole {
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);

@@ -11,11 +11,12 @@ mod session;
 pub(crate) use request::schema;
 
 use crate::bus::Bus;
+use crate::buses::find_any_rig;
 use crate::buses::hold;
 use crate::command::args::{ColourWhen, ShowProgress, duration};
 use crate::command::exit::Exit;
 use crate::command::output::{Output, Stream};
-use crate::command::rig_failure::{alarm, find_any_rig, tell_end};
+use crate::command::rig_failure::{alarm, tell_end};
 use crate::rig::UseOptions;
 use crate::signals::{at_ctrl_c, interrupt_flag, interrupt_flag_without_ctrl_c};
 use clap::Args;

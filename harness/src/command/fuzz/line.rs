@@ -261,7 +261,7 @@ fn shrink<B: LineRig>(arguments: &ShrinkArguments, output: &mut Output) -> std::
             Ok(Exit::Usage)
         }
         (true, Some(name)) => {
-            let Some(rig) = find_any_rig(name, output) else {
+            let Some(rig) = find_any_rig(name, &crate::buses::RIG_BUSES, output) else {
                 return Ok(Exit::Usage);
             };
             if rig.port().map(|port| port.bus.bus()) != Some(B::BUS) {

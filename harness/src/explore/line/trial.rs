@@ -4,13 +4,14 @@
 use super::{
     LineBus, LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
 };
+use crate::buses::find_rig_in as find;
 use crate::explore::smaller::smaller;
 use crate::explore::{
     Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd,
     Spiced, Swarm, Watcher,
 };
 use crate::library::Entry;
-use crate::rig::{UseOptions, find};
+use crate::rig::UseOptions;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;

@@ -1,11 +1,12 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
 use harness::buses::novobus::rig::InterlockCondition;
+use harness::buses::{RIG_BUSES, find_rig_in as find, parse_rig as parse};
 use harness::file::values::{MaxSpeed, Speed};
 use harness::rig::file::{Level, LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
 use harness::rig::lock::{self, RigLock};
-use harness::rig::{Rig, find, parse, scan, schema};
+use harness::rig::{Rig, scan, schema};
 use harness::scenario::source::Source;
 use proptest::prelude::*;
 use std::fmt::Write as _;
@@ -453,7 +454,7 @@ fn scan_finds_ports_and_what_udev_says_of_them() {
         .map(|port| port.device.display().to_string())
         .collect();
     assert_eq!(names, ["/dev/ttyS1", "/dev/ttyUSB2", "/dev/ttyUSB10"]);
-    let text = scan::propose(&ports);
+    let text = scan::propose(&ports, &RIG_BUSES);
     for block in text.split("\n\n") {
         let rig = good(&format!("schema = 1\n[rig]\nid = \"new\"\n{block}"));
         let lines = block.lines().skip_while(|line| *line != "# [port.1]");
@@ -488,7 +489,7 @@ fn scan_finds_ports_and_what_udev_says_of_them() {
     assert!(scan::scan(Path::new("/no/such/folder")).is_empty());
     let names = scan::interfaces(root.path());
     assert_eq!(names, ["can2", "can10", "vcan2"]);
-    let text = scan::propose_interfaces(&names[..1]);
+    let text = scan::propose_interfaces(&names[..1], &RIG_BUSES);
     let can = good(&format!("schema = 2\n[rig]\nid = \"new\"\n{text}"));
     assert!(
         can.port()

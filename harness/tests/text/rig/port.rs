@@ -22,7 +22,7 @@ fn a_port_of_drives_on_can() {
     let port = rig.port().expect("a port");
     let drives: Vec<_> = (0..)
         .zip(&port.drives)
-        .map(|(index, node)| port.bus.drive(index, *node))
+        .map(|(index, node)| rig.buses.drive(port.bus, index, *node))
         .collect();
     assert_eq!(drives, [(3, vec![0x203, 0x183]), (2, vec![0x210, 0x190])]);
     assert!(!rig.is_simulated() && rig.rings().count() == 0);
@@ -45,7 +45,7 @@ fn a_port_of_slaves_on_a_line() {
     let port = rig.port().expect("a port");
     let addresses: Vec<_> = (0..)
         .zip(&port.drives)
-        .map(|(index, node)| port.bus.drive(index, *node).0)
+        .map(|(index, node)| rig.buses.drive(port.bus, index, *node).0)
         .collect();
     assert_eq!(addresses, [8, 9]);
     assert_eq!(port.rate.bits_per_second(), 93_750);

@@ -19,12 +19,12 @@ pub use session::{Inverters, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
-use crate::bus::Bus;
-use crate::buses::port_row::PortRow;
 use crate::command::fuzz::LineFuzz;
 use crate::command::held::HeldPort;
 use crate::command::port_bench::PortBench;
-use crate::rig::port_file::{Node, Port};
+use crate::command::port_row::PortCommands;
+use crate::rig::buses::PortRow;
+use crate::rig::port_file::{Node, Port, PortBus};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::{Part, header_lines, read};
 use crate::scenario::plan::plan as settle;
@@ -43,12 +43,9 @@ pub const MASTER: u8 = 2;
 /// The address of the first simulated slave.
 const FIRST: u8 = 8;
 
-/// The highest address.
-const LAST: u8 = 126;
-
 /// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
-    bus: Bus::Nordac,
+    bus: PortBus::Nordac,
     adapters: &["serial", "tcp", "port"],
     keys: &["transport", "marks", "echo"],
     limits: &[
@@ -60,7 +57,6 @@ pub(crate) const PORT: PortRow = PortRow {
         "max_frequency",
         "max_eeprom_writes",
     ],
-    most_drives: LAST - FIRST + 1,
     simulated,
     named,
     has_rate: |bits| BusRate::from_bits_per_second(bits).is_some(),
@@ -72,10 +68,15 @@ pub(crate) const PORT: PortRow = PortRow {
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
     interlock: ("parameter", interlock::checked),
+};
+
+/// Commands on rigs of this bus.
+pub(crate) const COMMANDS: PortCommands = PortCommands {
+    bus: PortBus::Nordac,
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
-    judge: Some(|rig, allow_motion, qualifies| {
+    judge: |rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
-    }),
+    },
     command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
     hold: |rig, options| Ok(Box::new(HeldPort::<Inverters>::open(rig, options)?)),
     check: super::cli::check,

@@ -309,11 +309,11 @@ impl Attempts for AttemptNotes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::find_rig_in as find;
     use crate::buses::nordac::gate::guarded;
     use crate::buses::nordac::rig::player::Own;
     use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
     use crate::link::Link as _;
-    use crate::rig::find;
     use crate::scenario::verdict::Verdict;
     use harness_proto::profibus::BusRate;
     use harness_proto::time::Span;

@@ -1,10 +1,11 @@
 //! What `fuzz` and `shrink` do on rings. A rig with ports is opened as `run --rig` opens it and given back in its safe state.
 
+use crate::buses::commands::give_back_session as give_back;
 use crate::buses::novobus::explore::{CaseScope, RingScope, RingSetup, Spice};
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::command::rig_failure::{alarm, exit_of, give_back};
+use crate::command::rig_failure::{alarm, exit_of};
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};

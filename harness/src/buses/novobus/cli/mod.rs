@@ -26,6 +26,8 @@ mod top_page;
 mod watch;
 mod write;
 
+pub(crate) use rig::give_back_session;
+
 use crate::buses::novobus::driver;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;

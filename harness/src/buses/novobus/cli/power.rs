@@ -1,5 +1,6 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
+use crate::buses::find_rig_in;
 use crate::buses::novobus::cli::fuzz::simulated;
 use crate::buses::novobus::explore::masters;
 use crate::buses::novobus::explore::{
@@ -11,7 +12,6 @@ use crate::command::output::Output;
 use crate::counted::counted;
 use crate::explore::Planted;
 use crate::explore::{Bounds, ExploreError, Progress, Watcher};
-use crate::rig::find::find;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
 use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
@@ -191,7 +191,7 @@ fn counts(
     deviation: &Deviation,
     arguments: &PowerArguments,
 ) -> Result<Vec<Option<u64>>, ExploreError> {
-    let rig = find(&format!("sim:{DRIVES}"), std::path::Path::new(""))
+    let rig = find_rig_in(&format!("sim:{DRIVES}"), std::path::Path::new(""))
         .map_err(|error| ExploreError::Usage(error.to_string()))?;
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {

@@ -3,6 +3,7 @@
 
 use super::axes;
 use crate::buses::SimulatedLink;
+use crate::buses::find_rig;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
 use crate::buses::novobus::language::parse::header::parse_setup;
@@ -12,12 +13,12 @@ use crate::command::drive::RigArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
-use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_rig, tell_end};
+use crate::command::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use crate::command::rig_name::{RigName, Use};
 use crate::counted::counted;
 use crate::link::{Line, Link};
 use crate::medium::{Heard, Medium, Out};
-use crate::rig::{self, Rig, Session, Shared};
+use crate::rig::{self, End, Rig, Session, Shared};
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use harness_proto::nd21::ram;
@@ -309,6 +310,21 @@ fn give_back(
         rig.close(matches!(exit, Exit::RigError | Exit::Interlock))
     };
     end.map_or(exit, |end| tell_end(&end, exit, output))
+}
+
+/// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
+pub(crate) fn give_back_session(
+    mut session: Session,
+    exit: Exit,
+    output: &mut Output,
+) -> (End, Exit) {
+    let exit = exit_of_end(session.link().trouble(), exit, output);
+    let end = match exit {
+        Exit::RigError | Exit::Interlock => session.close_with_error(),
+        _ => session.close(),
+    };
+    let exit = tell_end(&end, exit, output);
+    (end, exit)
 }
 
 /// The simulated drives of a bench, with nothing sent to them. A rig with ports is represented by its simulated model.

@@ -1,5 +1,6 @@
 //! `drivebench shrink` for a finding on rings.
 
+use crate::buses::find_rig;
 use crate::buses::novobus::cli::fuzz::{on_ports, scope, sizes};
 use crate::buses::novobus::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::buses::novobus::explore::{Case, Difference, Finding, OnRig, OnSim, RingSetup};
@@ -7,7 +8,6 @@ use crate::command::exit::Exit;
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::fuzz::tell;
 use crate::command::output::Output;
-use crate::command::rig_failure::find_rig;
 use crate::counted::counted;
 use crate::explore::Planted;
 use crate::explore::{ExploreError, Target};

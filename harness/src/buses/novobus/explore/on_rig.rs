@@ -11,7 +11,6 @@ use crate::buses::novobus::explore::features;
 use crate::buses::novobus::explore::{Rehearsal, Tried};
 use crate::buses::novobus::language::run::over_bus::monitors;
 use crate::buses::novobus::language::run::over_bus::start_anew;
-use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::SILENCED;
@@ -68,7 +67,9 @@ impl<'r, 's> OnRig<'r, 's> {
         let session = run.session();
         let mut rig = session.rig().clone();
         // The setup describes the simulated drives themselves; the model must follow the manual.
-        rig.setup = Header::default();
+        if let Some(sim) = &mut rig.file.sim {
+            sim.setup.clear();
+        }
         let plan = rig.plan().map_err(Box::new)?;
         let mut model = simulate::bench(&plan);
         model.run_until(Instant::START + WARM);

@@ -5,6 +5,7 @@ use super::play::{MasterView, play};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::plan_header;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup as HeaderLine, SetupKind};
+use crate::buses::novobus::rig::sim;
 use crate::buses::novobus::simulate;
 use crate::explore::Planted;
 use crate::rig::Rig;
@@ -48,7 +49,7 @@ impl RingSetup {
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
     pub fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
-        let own = &rig.setup;
+        let own = sim::setup(rig);
         let mut header = own.only(|setup| planted_by(setup, rig).is_empty());
         let mut deviates: Vec<_> = own
             .setups

@@ -6,7 +6,6 @@ use crate::buses::novobus::language::syntax::Scenario;
 use crate::capture::{self, CaptureError};
 use crate::evidence;
 use crate::fuzz::{rig as rig_body, scenario as scenario_body};
-use crate::rig;
 use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::Problems;
@@ -59,7 +58,7 @@ pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
     let Ok(source) = Source::from_bytes("input.toml".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
     };
-    if let Err(found) = rig::parse(&source) {
+    if let Err(found) = crate::buses::parse_rig(&source) {
         return problems(notes, "a mistake", &found);
     }
     let Ok(table) = source.text.parse::<toml::Table>() else {

@@ -224,7 +224,7 @@ impl Qualification {
         Ok(())
     }
 
-    fn qualified(&self, profile: Option<Profile>, deviations: String) -> Qualified {
+    fn qualified(&self, profile: Option<Profile<Header>>, deviations: String) -> Qualified {
         Qualified {
             profile: profile.map(|profile| toml::to_string(&profile).unwrap_or_default()),
             deviations,
@@ -391,7 +391,10 @@ impl Qualification {
 
     /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus, or assumed, is part of every later
     /// question and is the second value; a time of a drive is the middle of a span, and no later answer rests on it.
-    fn profile<B: QualifiedBench>(&mut self, bench: &mut B) -> Result<(Profile, Header), B::Stop> {
+    fn profile<B: QualifiedBench>(
+        &mut self,
+        bench: &mut B,
+    ) -> Result<(Profile<Header>, Header), B::Stop> {
         let rings: Vec<u8> = self.facts.rig.rings().map(|(_, own)| own.drives).collect();
         let mut profile = Profile {
             schema: 1,

@@ -202,9 +202,9 @@ impl Entry {
 mod tests {
     use super::*;
     use crate::buses::novobus::simulate::bench;
+    use crate::buses::parse_rig as parse;
     use crate::library::Entry;
     use crate::link::{DriveFault, Link as _, Moment, PlacedFault};
-    use crate::rig::check::parse;
     use crate::scenario::source::Source;
 
     fn source(text: &str) -> Source {

@@ -1,6 +1,7 @@
 //! The verdict of an attempt, compared with its twin.
 
 use super::left_open::{self, Explanation};
+use super::sim;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{
@@ -248,8 +249,9 @@ fn passes(rig: &Rig, facts: &AttemptFacts<'_>) -> bool {
 fn passes_with_defaults(facts: &AttemptFacts<'_>) -> bool {
     let settles = |own: &Setup| own.sets().is_some();
     let mut rig = facts.rig.clone();
-    let settled = rig.profile.take().is_some() | rig.setup.setups.iter().any(settles);
-    rig.setup = rig.setup.only(|own| !settles(own));
+    let own = sim::setup(&rig);
+    let settled = rig.profile.take().is_some() | own.setups.iter().any(settles);
+    sim::set_up(&mut rig, &own.only(|own| !settles(own)));
     settled && !passes(facts.rig, facts) && passes(&rig, facts)
 }
 

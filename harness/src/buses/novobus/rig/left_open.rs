@@ -3,6 +3,7 @@
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
 use super::judge::{AttemptFacts, known};
+use super::sim;
 use crate::buses::novobus::choice::{Choice, SELF_TEST_TIME, of_drives, of_self_tests, of_the_bus};
 use crate::buses::novobus::language::syntax::{DriveRange, Header};
 use crate::buses::novobus::language::write::ring_prefix;
@@ -140,9 +141,9 @@ fn candidates<'c>(
 
 /// The choices that the rig's file and its profile do not settle.
 fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
-    let profile = facts.rig.profile.iter().map(|profile| &profile.header);
-    let headers = profile.chain([&facts.rig.setup]);
-    let settings: Vec<_> = headers.flat_map(|own| &own.setups).collect();
+    let profile = facts.rig.profile.iter().flat_map(|own| &own.lines);
+    let sim = facts.rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    let settings = sim::read(profile.chain(sim)).setups;
     let is_settled = |property| settings.iter().any(|own| own.sets() == Some(property));
     let settled = |choice: &Choice| {
         is_settled(choice.property) || choice.with.is_some() && is_settled(SELF_TEST_TIME)

@@ -27,3 +27,4 @@ pub use health::{RingHealth, Unhealthy, examine};
 pub(crate) use permitted::limits;
 pub use run::{Run, Way, play_one};
 pub use session::Session;
+pub(crate) use sim::RINGS;

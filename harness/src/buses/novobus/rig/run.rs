@@ -7,6 +7,7 @@ use super::health::{Unhealthy, examine};
 use super::judge::{AttemptFacts, judge, known};
 use super::put_back::within;
 use super::session::Session;
+use super::sim;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::run::over_bus::{come_home, play_over_bus, start_anew};
@@ -574,7 +575,7 @@ impl Sink for Both<'_> {
 pub(crate) fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
     let mut model = rig.clone();
     // A simulated drive that is wrong on purpose is compared with one that is not.
-    model.setup = model.setup.without_deviations();
+    sim::set_up(&mut model, &sim::setup(rig).without_deviations());
     let plan = model.plan_with(header)?;
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
     twin.rest_through_self_tests();

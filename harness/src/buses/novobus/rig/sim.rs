@@ -2,13 +2,15 @@
 
 use super::limits;
 use crate::buses::novobus::language::parse::drive::DEVICES;
+use crate::buses::novobus::language::parse::header::{for_other_rings, parse_lines};
 use crate::buses::novobus::language::plan::{Plan, plan_header};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
+use crate::rig::buses::{RingMistakes, RingRow};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
-use crate::rig::profile::KnownProfile;
+use crate::rig::profile::{Profile, ProfileSetup};
 use crate::scenario::problem::{Problem, Problems, TextSpan};
-use crate::scenario::source::line_number;
+use crate::scenario::source::{Source, line_number};
 use harness_sim::nd21::Stimulus;
 
 impl Rig {
@@ -38,7 +40,7 @@ impl Rig {
             && file.power.is_empty()
             && file.hooks == Hooks::default()
             && self.profile.is_none()
-            && self.setup.only(|own| !is_input(own)).is_empty()
+            && setup(self).only(|own| !is_input(own)).is_empty()
     }
 
     /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
@@ -64,7 +66,11 @@ impl Rig {
                 vec![problem],
             ));
         }
-        let own = header(&self.file, self.profile.as_ref(), &self.setup);
+        let profile = self
+            .profile
+            .as_ref()
+            .map(|profile| profile.lines.as_slice());
+        let own = header(&self.file, profile, &setup(self));
         plan_header(&self.origin, &own.and(more), &sizes(&self.file))
     }
 }
@@ -74,33 +80,67 @@ pub(crate) fn sizes(file: &RigFile) -> Vec<u8> {
     file.rings().map(|ring| ring.drives).collect()
 }
 
+/// What the lines of `[sim]` say; they were read when the rig was.
+pub(crate) fn setup(rig: &Rig) -> Header {
+    let lines = rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    read(lines)
+}
+
+/// Sets simulated drives up like this in place of what the lines of `[sim]` say.
+pub(crate) fn set_up(rig: &mut Rig, header: &Header) {
+    rig.file.sim.get_or_insert_default().setup = header.lines();
+}
+
+/// The lines of a header that have no mistakes.
+pub(crate) fn read<'l>(lines: impl Iterator<Item = &'l String>) -> Header {
+    let lines: Vec<&str> = lines.map(String::as_str).collect();
+    lines.join("\n").parse().unwrap_or_default()
+}
+
 /// What the drives of a rig are: the types of its devices, its profile, and the lines of its `[sim]`.
-fn header(file: &RigFile, profile: Option<&KnownProfile>, own: &Header) -> Header {
+fn header(file: &RigFile, profile: Option<&[String]>, own: &Header) -> Header {
     let types: Header = file.drive.iter().filter_map(device).collect();
-    let profile = profile.map(|profile| &profile.header);
-    let known = profile.map_or_else(|| types.clone(), |profile| types.and(profile));
+    let profile = profile.map(|lines| read(lines.iter()));
+    let known = profile.map_or_else(|| types.clone(), |profile| types.and(&profile));
     known.and(own).nd21_by_default(sizes(file).len())
 }
 
-/// What makes no drives of a rig, each with the line of `[sim]` that it is in; `None` where it is in the profile.
-pub(crate) fn mistakes(
-    name: &str,
-    file: &RigFile,
-    profile: Option<&KnownProfile>,
-    own: &Header,
-) -> Vec<(Option<Setup>, Problem)> {
-    let whole = header(file, profile, own);
-    let Err(problems) = plan_header(name, &whole, &sizes(file)) else {
+/// What the files of rigs ask of rings.
+pub(crate) const RINGS: RingRow = RingRow {
+    profile: |text| Ok(Profile::<Header>::parse(text)?.header().lines()),
+    mistakes,
+};
+
+impl ProfileSetup for Header {
+    fn add(&mut self, more: &Self) {
+        *self = self.and(more);
+    }
+}
+
+/// What makes no drives of a rig: a line of `[sim]`, or one of the profile.
+fn mistakes(file: &RigFile, profile: Option<&[String]>, lines: &Source) -> RingMistakes {
+    let own = match parse_lines(lines) {
+        Ok(own) => own,
+        Err(problems) => {
+            let all = problems.all().iter();
+            return all.map(|own| (Some(own.span), own.clone())).collect();
+        }
+    };
+    if let Some(problem) = for_other_rings(&own, &sizes(file)) {
+        return vec![(Some(problem.span), problem)];
+    }
+    let whole = header(file, profile, &own);
+    let Err(problems) = plan_header(&lines.name, &whole, &sizes(file)) else {
         return Vec::new();
     };
     // The lines about drives stand in front of that about the master, and those of `[sim]` behind all others.
-    let lines = whole.lines();
-    let first = lines.len() - usize::from(whole.master.is_some()) - own.setups.len();
-    let text = lines.join("\n");
+    let written = whole.lines();
+    let first = written.len() - usize::from(whole.master.is_some()) - own.setups.len();
+    let text = written.join("\n");
     let placed = problems.all().iter().map(|problem| {
         let line = line_number(&text, problem.span.start) - 1;
         let setup = line.checked_sub(first).and_then(|at| own.setups.get(at));
-        (setup.cloned(), problem.clone())
+        (setup.map(|setup| setup.span), problem.clone())
     });
     placed.collect()
 }

@@ -20,12 +20,12 @@ pub use session::{Session, UnitekDrives};
 use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use crate::bus::Bus;
-use crate::buses::port_row::PortRow;
 use crate::command::fuzz::LineFuzz;
 use crate::command::held::HeldPort;
 use crate::command::port_bench::PortBench;
-use crate::rig::port_file::{CONFIRMATION, Node, Port};
+use crate::command::port_row::PortCommands;
+use crate::rig::buses::PortRow;
+use crate::rig::port_file::{CONFIRMATION, Node, Port, PortBus};
 use crate::rig::segment::run::{PortJudge, PortRun};
 use crate::scenario::parse::header::header_lines;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
@@ -35,7 +35,7 @@ use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 
 /// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
-    bus: Bus::Unitek,
+    bus: PortBus::Unitek,
     adapters: &["slcan", "socketcand", "socketcan"],
     keys: &["channel"],
     limits: &[
@@ -46,7 +46,6 @@ pub(crate) const PORT: PortRow = PortRow {
         "bit_rate_way_back",
         "store_bus_settings",
     ],
-    most_drives: 127,
     simulated,
     named,
     has_rate: |bits| BitRate::from_bits_per_second(bits).is_some(),
@@ -58,10 +57,15 @@ pub(crate) const PORT: PortRow = PortRow {
     steps: |source| header_lines::<Unitek>(source).err(),
     special_register,
     interlock: ("register", interlock::checked),
+};
+
+/// Commands on rigs of this bus.
+pub(crate) const COMMANDS: PortCommands = PortCommands {
+    bus: PortBus::Unitek,
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
-    judge: Some(|rig, allow_motion, qualifies| {
+    judge: |rig, allow_motion, qualifies| {
         Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
-    }),
+    },
     command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
     hold: |rig, options| Ok(Box::new(HeldPort::<UnitekDrives>::open(rig, options)?)),
     check: super::cli::check,

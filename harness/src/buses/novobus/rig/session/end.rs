@@ -1,5 +1,6 @@
 //! The ways out of a session.
 
+use super::super::sim;
 use super::{Session, come_round};
 use crate::buses::simulated;
 use crate::guard::{Guarded, Safe, safe_state};
@@ -78,8 +79,8 @@ impl Session {
     /// How simulated drives with deviations are not brought to their safe state. They have just been switched on: a scenario may
     /// have left the ring cut.
     fn disobeys(&self) -> Option<Safe> {
-        let setup = &self.rig.setup;
-        if setup.without_deviations() == *setup {
+        let setup = sim::setup(&self.rig);
+        if setup.without_deviations() == setup {
             return None;
         }
         let ends = Ends::Simulated(simulated(&self.rig.plan().ok()?));

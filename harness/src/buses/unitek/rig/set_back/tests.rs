@@ -1,12 +1,13 @@
 //! Drives are as they were found, whatever a scenario or a probe has done, and however it ended.
 
 use super::super::player::Player;
+use crate::buses::parse_rig as parse;
 use crate::buses::unitek::simulate::Bench;
 use crate::link::{FrameFault, Line as _, Link as _, LinkEvent, Moment, PlacedFault, Sink};
 use crate::rig::port_file::CONFIRMATION;
 use crate::rig::segment::SegmentRun as _;
 use crate::rig::segment::run::PortRun;
-use crate::rig::{Attempt, Keeper, UseOptions, parse};
+use crate::rig::{Attempt, Keeper, UseOptions};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

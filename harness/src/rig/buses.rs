@@ -1,0 +1,98 @@
+//! What the files of rigs ask of the buses: a table that the program hands in.
+
+use super::condition::Mistake;
+use super::file::{Interlock, RigFile};
+use super::port_file::{Node, Port, PortBus};
+use super::profile::{ProfileError, ProfileLines};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
+use crate::scenario::source::{Source, line_number};
+use std::fmt;
+
+/// Checks an entry of `[[interlock]]`.
+type CheckInterlock = fn(&Interlock) -> Result<(), Mistake>;
+
+/// What a bus knows of `[port.1]` and of the drives there.
+pub(crate) struct PortRow {
+    /// The bus.
+    pub(crate) bus: PortBus,
+    /// The keys of its adapters.
+    pub(crate) adapters: &'static [&'static str],
+    /// The keys of `[port.1]` that not every bus has, beside those of adapters.
+    pub(crate) keys: &'static [&'static str],
+    /// The keys of `[limits]` that not every bus has.
+    pub(crate) limits: &'static [&'static str],
+    /// The drives of a simulated bench as its file lists them, and the limits with which all is permitted.
+    pub(crate) simulated: fn(u8) -> (String, String),
+    /// Whether a drive is named as on this bus; or what is wrong, and what was expected.
+    pub(crate) named: fn(Node) -> Result<(), (&'static str, &'static str)>,
+    /// Whether the bus has a rate of this number of bits a second.
+    pub(crate) has_rate: fn(u32) -> bool,
+    /// The drive at a place of a port's list: its number, and its identifiers.
+    pub(crate) drive: fn(usize, Node) -> (u8, Vec<u16>),
+    /// The mistakes of a setup, whose steps are ignored.
+    pub(crate) setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
+    /// The steps among lines of a header.
+    pub(crate) steps: fn(&Source) -> Option<Problems>,
+    /// The register of `allow_registers`; or what is wrong, and what was expected.
+    pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
+    /// The key under which an entry of `[[interlock]]` names what it looks at, and what checks the entry.
+    pub(crate) interlock: (&'static str, CheckInterlock),
+}
+
+impl PortRow {
+    /// The mistakes of `setup` lines of a simulated port, each with the number of its line, counted from 0.
+    pub(crate) fn line_mistakes(&self, port: &Port, lines: &[String]) -> Vec<(usize, Problem)> {
+        let source = Source {
+            name: "setup".to_owned(),
+            text: lines.join("\n").into(),
+        };
+        let read = (self.steps)(&source).or_else(|| (self.setup_mistakes)(port, &source));
+        let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
+        let problems = read.iter().flat_map(Problems::all);
+        let placed = problems.map(|own| (line(own), own.clone()));
+        placed.collect()
+    }
+}
+
+/// What is wrong with the drives of a rig's rings; `None` in place of a line of `[sim]` where it is in the profile.
+pub(crate) type RingMistakes = Vec<(Option<TextSpan>, Problem)>;
+
+/// What the bus of rings knows of `[ring.1]` and `[ring.2]`.
+pub(crate) struct RingRow {
+    /// The lines of a profile.
+    pub(crate) profile: fn(&str) -> Result<ProfileLines, ProfileError>,
+    /// The mistakes of the lines of `[sim]` behind those of the profile.
+    pub(crate) mistakes: fn(&RigFile, Option<&[String]>, &Source) -> RingMistakes,
+}
+
+/// The buses, as the files of rigs know them.
+pub struct RigBuses {
+    pub(crate) rings: RingRow,
+    /// In the order of [`PortBus::ALL`].
+    pub(crate) ports: [&'static PortRow; PortBus::ALL.len()],
+}
+
+impl RigBuses {
+    /// What a bus knows of `[port.1]`.
+    pub(crate) const fn port(&self, bus: PortBus) -> &'static PortRow {
+        self.ports[bus as usize]
+    }
+
+    /// The drive at a place of a port's list: its number, and its identifiers.
+    #[must_use]
+    pub fn drive(&self, bus: PortBus, index: usize, node: Node) -> (u8, Vec<u16>) {
+        (self.port(bus).drive)(index, node)
+    }
+}
+
+impl fmt::Debug for RigBuses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("RigBuses")
+    }
+}
+
+impl PartialEq for RigBuses {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
