@@ -18,6 +18,7 @@ use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Spiced, Target, read_as,
 };
 use crate::link::Line as _;
+use crate::rig::buses::RigBuses;
 use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
 use std::time::Duration;
@@ -32,7 +33,8 @@ pub(crate) struct LineFuzz {
     /// `fuzz replay`
     pub(crate) replay: fn(&Rig, &ReplayArguments, &mut Output) -> std::io::Result<Exit>,
     /// `shrink`
-    pub(crate) shrink: fn(&ShrinkArguments, &mut Output) -> std::io::Result<Exit>,
+    pub(crate) shrink:
+        fn(&ShrinkArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>,
     /// `promote`
     pub(crate) promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
 }
@@ -225,7 +227,11 @@ fn refused<B: LineRig>(rig: &Rig, arguments: &FuzzRunArguments) -> Option<String
 }
 
 /// Makes a finding small, and writes what came of it beside it.
-fn shrink<B: LineRig>(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
+fn shrink<B: LineRig>(
+    arguments: &ShrinkArguments,
+    buses: &'static RigBuses,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let (finding, file) = match Finding::<LineTalk<B>>::read_as(&arguments.finding) {
         Ok(read) => read,
         Err(error) => return Ok(tell(&error, output)),
@@ -261,7 +267,7 @@ fn shrink<B: LineRig>(arguments: &ShrinkArguments, output: &mut Output) -> std::
             Ok(Exit::Usage)
         }
         (true, Some(name)) => {
-            let Some(rig) = find_any_rig(name, &crate::buses::RIG_BUSES, output) else {
+            let Some(rig) = find_any_rig(name, buses, output) else {
                 return Ok(Exit::Usage);
             };
             if rig.port().map(|port| port.bus.bus()) != Some(B::BUS) {
