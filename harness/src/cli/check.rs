@@ -4,7 +4,8 @@ use super::args::CheckArguments;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::counted::counted;
-use crate::library::{Entry, sources};
+use crate::library::Entry;
+use crate::scenario::files::sources;
 use crate::scenario::settled::Settled;
 
 /// Reads scenarios and plays nothing.

@@ -7,8 +7,8 @@ use crate::buses::{cell_names, commands::deviations};
 use crate::campaign::find as campaigns;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::library;
 use crate::rig::find;
+use crate::scenario::files;
 use clap::{Arg, Command};
 use std::fmt::Write as _;
 
@@ -135,7 +135,7 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
     let name = name.map_or("", |name| name.as_str());
     Fitting {
         words: match name {
-            "SCENARIO" => library::names(),
+            "SCENARIO" => files::names(),
             "CAMPAIGN" => campaigns::names().into_iter().map(str::to_owned).collect(),
             "RIG" => {
                 let rigs = find::all(&find::folder()).into_iter();

@@ -1,7 +1,7 @@
 //! The commands as `--help` shows them, in groups, and what to suggest for a command that does not exist.
 
 use super::args::Arguments;
-use crate::library;
+use crate::scenario::files;
 use crate::scenario::problem::nearest;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -143,7 +143,7 @@ fn with_suggestion(mut error: clap::Error, command: &Command, given: &[OsString]
 }
 
 fn is_scenario(word: &str) -> bool {
-    Path::new(word).exists() || library::names().iter().any(|name| name == word)
+    Path::new(word).exists() || files::names().iter().any(|name| name == word)
 }
 
 #[cfg(test)]

@@ -14,15 +14,16 @@ use crate::command::page::writable;
 use crate::command::play::{PlayedOnce, play_entry, progress_bar};
 use crate::counted::counted;
 use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_large};
-use crate::library::{Entry, is_named, sources};
+use crate::library::Entry;
 use crate::link::Recording;
 use crate::report::finding::explain;
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
+use crate::scenario::files::{LibraryError, is_named, sources};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome};
-use crate::scenario::source::{LibraryError, Source};
+use crate::scenario::source::Source;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 

@@ -4,7 +4,8 @@
 use crate::command::exit::Exit;
 use crate::counted::counted;
 use crate::evidence::Earlier;
-use crate::library::{Entry, is_named};
+use crate::library::Entry;
+use crate::scenario::files::is_named;
 use crate::scenario::run::{Outcome, Unlock, Why, together};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

@@ -3,8 +3,8 @@
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::link::Trouble;
+use crate::scenario::files::LibraryError;
 use crate::scenario::problem::Problems;
-use crate::scenario::source::LibraryError;
 
 /// Why a command ended early.
 #[derive(Debug)]

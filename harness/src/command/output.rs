@@ -2,8 +2,8 @@
 
 use super::args::{ColourWhen, ShowProgress};
 use super::exit::Exit;
+use crate::scenario::files::LibraryError;
 use crate::scenario::problem::Problems;
-use crate::scenario::source::LibraryError;
 use crate::scenario::verdict::Verdict;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use std::io::{IsTerminal, Write};

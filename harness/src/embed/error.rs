@@ -1,8 +1,9 @@
 //! Why a call of the crate's own interface failed.
 
 use crate::rig::{FindError, SessionError};
+use crate::scenario::files::LibraryError;
 use crate::scenario::problem::Problems;
-use crate::scenario::source::{LibraryError, SourceError};
+use crate::scenario::source::SourceError;
 use crate::serve::ServeError;
 use thiserror::Error as Derived;
 

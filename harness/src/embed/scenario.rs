@@ -3,9 +3,10 @@
 use super::Error;
 use crate::buses::novobus::simulate::simulated;
 use crate::counted::counted;
-use crate::library::{Entry, sources};
+use crate::library::Entry;
 use crate::link::Link;
 use crate::report::page::page;
+use crate::scenario::files::sources;
 use crate::scenario::run::run;
 use crate::scenario::source::{Source, line_number};
 use crate::scenario::verdict::Verdict;

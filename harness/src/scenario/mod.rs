@@ -7,6 +7,7 @@
 
 pub mod argument;
 pub mod expression;
+pub mod files;
 pub mod language;
 pub mod parse;
 pub mod pattern;

@@ -1,6 +1,5 @@
-//! A scenario's text, from a file or from the binary itself, and why it cannot be had.
+//! A scenario's text, from a file or from the binary itself.
 
-use super::problem::Problems;
 use crate::regular;
 use std::io::Read;
 use std::path::Path;
@@ -64,47 +63,6 @@ pub enum SourceError {
         /// What stands there.
         byte: u8,
     },
-}
-
-/// The most files that are taken from a folder.
-pub(crate) const MAX_FILES: usize = 10_000;
-
-/// How deep folders are searched.
-pub(crate) const MAX_DEPTH: usize = 16;
-
-/// Why a scenario cannot be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum LibraryError {
-    /// Neither a path nor the name of a built-in scenario.
-    #[error("failed to find {name}: neither a file or folder nor a built-in scenario; {remedy}")]
-    NotFound {
-        /// The name as given.
-        name: String,
-        /// What to do about it.
-        remedy: String,
-    },
-    /// A folder cannot be read.
-    #[error("failed to read the folder {folder}: {error}")]
-    Folder {
-        /// The folder.
-        folder: String,
-        /// The operating system's error.
-        error: std::io::Error,
-    },
-    /// A folder holds more than we take.
-    #[error(
-        "{folder} holds more than {MAX_FILES} scenarios, or folders nest deeper than {MAX_DEPTH}"
-    )]
-    TooMany {
-        /// The folder.
-        folder: String,
-    },
-    /// A file is no scenario.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// A scenario has mistakes.
-    #[error(transparent)]
-    Mistakes(#[from] Box<Problems>),
 }
 
 /// The number of the line in which a byte of a text stands, counted from 1.

@@ -1,6 +1,7 @@
 //! Every deviation of a drive, and of its master, is found: by a scenario that passes without it and fails with it.
 
-use harness::library::{Entry, sources};
+use harness::library::Entry;
+use harness::scenario::files::sources;
 use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

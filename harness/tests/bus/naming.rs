@@ -9,13 +9,14 @@ use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
-use harness::library::{Entry, sources};
+use harness::library::Entry;
 use harness::link::{Capability, LinkEvent, Octets, Recording};
 use harness::qualify::{
     Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
     conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
 use harness::rig::{Way, play_one};
+use harness::scenario::files::sources;
 use harness::scenario::run::lacks;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;

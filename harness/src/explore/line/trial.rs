@@ -10,9 +10,10 @@ use crate::explore::{
     Bounds, Differing as _, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd,
     Spiced, Swarm, Watcher,
 };
-use crate::library::Entry;
 use crate::rig::UseOptions;
+use crate::scenario::language::Language;
 use crate::scenario::run::AtMismatch;
+use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -124,7 +125,10 @@ impl<B: LineBus> EngineTrial<B> {
 
     /// Explores drives with these deviations for ten minutes of bus time: those that were not found. What is found is made small and is a
     /// scenario.
-    pub(crate) fn missed(&self, some: impl Iterator<Item = &'static str>) -> Vec<&'static str> {
+    pub(crate) fn missed(&self, some: impl Iterator<Item = &'static str>) -> Vec<&'static str>
+    where
+        B: Language,
+    {
         let mut missed = Vec::new();
         for name in some {
             let (found, ..) = self.explored(&[], Some(name), (1, 600, 1));
@@ -141,12 +145,12 @@ impl<B: LineBus> EngineTrial<B> {
             let (own, kind) = (&small.difference, &finding.difference);
             assert!(own.is_like(kind), "{name}: {own:?} in place of {kind:?}");
             let text = LineTalk::<B>::text(&small).expect("a model");
-            let (right, why) = verdict(&text, "", &[]);
+            let (right, why) = verdict::<B>(&text, "", &[]);
             assert_eq!(right, Verdict::Passed, "{name}: {why}\n{text}");
             // The values of open points with which the model explains most are not those of the drive.
             let planted = &small.setup.deviates[0].line::<B>();
             let under = B::basis(&small.difference).1;
-            let (wrong, why) = verdict(&text, planted, under);
+            let (wrong, why) = verdict::<B>(&text, planted, under);
             assert_eq!(wrong, Verdict::Failed, "{name}: {why}\n{text}");
         }
         missed
@@ -178,7 +182,7 @@ fn bounds(seconds: u64, findings: usize) -> Bounds {
 }
 
 /// The verdict of a scenario, with one more line in its header, and without the lines `under`.
-fn verdict(text: &str, line: &str, under: &[String]) -> (Verdict, String) {
+fn verdict<L: Language>(text: &str, line: &str, under: &[String]) -> (Verdict, String) {
     let lines = text
         .lines()
         .filter(|own| under.iter().all(|other| other != own));
@@ -188,8 +192,8 @@ fn verdict(text: &str, line: &str, under: &[String]) -> (Verdict, String) {
         name: "finding".to_owned(),
         text: text.clone().into(),
     };
-    let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
-    let plan = entry.settled().expect("a plan");
+    let found = settle::<L, L>(&source, None);
+    let (_, plan) = found.unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
     let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
     (
         outcome.verdict,

@@ -4,7 +4,7 @@ use harness::buses::nordac::language::Nordac;
 use harness::buses::novobus::language::syntax::Scenario;
 use harness::buses::unitek::language::Unitek;
 use harness::fuzz::written;
-use harness::library::sources;
+use harness::scenario::files::sources;
 use harness::scenario::parse::parse;
 use harness::scenario::problem::Problems;
 use harness::scenario::source::Source;

@@ -1,9 +1,11 @@
 //! Right slaves are never accused, whatever the value of an open point; wrong ones are.
 
 use super::{JudgedSlaves, judge};
+use crate::buses::nordac::language::Nordac;
 use crate::capture::runs::{octet_time, octets, runs};
-use crate::library::{Entry, sources};
+use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
+use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 use harness_proto::time::{Instant, Span};
@@ -46,8 +48,8 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
     let mut text = source.text.to_string();
     text.insert_str(end.expect("a slave"), lines);
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
-    let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
-    let plan = entry.settled().expect("a bus that is built");
+    let found = settle::<Nordac, Nordac>(&source, None);
+    let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     link.trace(0)

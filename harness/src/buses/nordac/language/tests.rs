@@ -1,8 +1,8 @@
 //! The language of this bus: reading, writing, mistakes and verdicts.
 
 use super::Nordac;
-use crate::library::Entry;
 use crate::scenario::parse::parse;
+use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
@@ -19,9 +19,8 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let entry = Entry::new(source(&format!("{HEADER}{lines}")), None);
-    let entry = entry.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
-    let plan = entry.other.expect("a plan of this bus");
+    let found = settle::<Nordac, Nordac>(&source(&format!("{HEADER}{lines}")), None);
+    let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, crate::scenario::run::AtMismatch::Stop);
     let message = outcome.finding.map_or(String::new(), |own| own.message);
@@ -41,7 +40,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = Entry::new(source.clone(), None).expect_err(lines);
+    let found = settle::<Nordac, Nordac>(&source, None).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);

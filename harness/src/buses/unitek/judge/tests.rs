@@ -1,8 +1,10 @@
 //! Right drives are never accused, whatever the value of an open point; wrong ones are.
 
 use super::{HeardFrames, judge};
-use crate::library::{Entry, sources};
+use crate::buses::unitek::language::Unitek;
+use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
+use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -49,8 +51,8 @@ type Drives = Vec<(u8, (u16, u16))>;
 fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) {
     let text = source.text.replace(BUS, &format!("{BUS}{lines}"));
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
-    let entry = Entry::new(source.clone(), None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
-    let plan = entry.settled().expect("a bus that is built");
+    let found = settle::<Unitek, Unitek>(&source, None);
+    let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     let mut frames = link.trace(0).channels[0].frames().to_vec();

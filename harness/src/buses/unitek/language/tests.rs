@@ -1,8 +1,8 @@
 //! The language of this bus: reading, writing, mistakes and verdicts.
 
 use super::Unitek;
-use crate::library::Entry;
 use crate::scenario::parse::parse;
+use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
@@ -19,9 +19,8 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let entry = Entry::new(source(&format!("{HEADER}{lines}")), None);
-    let entry = entry.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
-    let plan = entry.other.expect("a plan of this bus");
+    let found = settle::<Unitek, Unitek>(&source(&format!("{HEADER}{lines}")), None);
+    let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, crate::scenario::run::AtMismatch::Stop);
     let message = outcome.finding.map_or(String::new(), |own| own.message);
@@ -41,7 +40,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = Entry::new(source.clone(), None).expect_err(lines);
+    let found = settle::<Unitek, Unitek>(&source, None).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);
@@ -301,8 +300,8 @@ fn several_drives() {
 #[test]
 fn a_full_bus_ends() {
     let lines = "rate 100\ndrive 1\nfor k in 1..8\n> 201 3D (k) 01\nend\n> 201 3D 01 FF\n? quiet\n";
-    let entry = Entry::new(source(&format!("{HEADER}{lines}")), None).expect("a scenario");
-    let plan = entry.other.expect("a plan of this bus");
+    let source = source(&format!("{HEADER}{lines}"));
+    let (_, plan) = settle::<Unitek, Unitek>(&source, None).expect("a scenario");
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, crate::scenario::run::AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Failed);
@@ -313,7 +312,7 @@ fn a_full_bus_ends() {
 /// Damaged scenarios are read, settled and played, or refused with a place inside the text; what is read comes back from the writer.
 #[test]
 fn damaged_scenarios() {
-    let sources = crate::library::sources(&[]).expect("built-in scenarios");
+    let sources = crate::scenario::files::sources(&[]).expect("built-in scenarios");
     let own = sources
         .into_iter()
         .filter(|own| own.name.starts_with("unitek/"));
@@ -382,9 +381,8 @@ fn damaged_scenarios() {
         if let Ok(scenario) = parse::<Unitek>(&source) {
             crate::fuzz::written(&scenario);
         }
-        match Entry::new(source, None) {
-            Ok(entry) => {
-                let plan = entry.settled().expect("a plan of this bus");
+        match settle::<Unitek, Unitek>(&source, None) {
+            Ok((_, plan)) => {
                 let mut link = plan.simulate();
                 plan.play(&mut *link, crate::scenario::run::AtMismatch::GoOn);
                 played += 1;

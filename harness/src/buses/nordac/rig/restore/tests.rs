@@ -11,6 +11,7 @@ use crate::buses::nordac::stream::telegrams;
 use crate::guard::{Guarded, Standstill};
 use crate::link::{Capability, Line as _, LinkEvent, Octets as _, Recording, Sink};
 use crate::medium::Pieces;
+use crate::scenario::files;
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -310,11 +311,11 @@ fn all_scenarios_accuse_no_slave_and_leave_nothing() {
         let mut desk = Desk::new(interface, &[], Limits::unlimited());
         let before = desk.held();
         let mut passed = 0;
-        for name in crate::library::names() {
+        for name in files::names() {
             if !name.contains("nordac") {
                 continue;
             }
-            let sources = crate::library::sources(&[name.clone().into()]).expect("built in");
+            let sources = files::sources(&[name.clone().into()]).expect("built in");
             for source in sources {
                 let (outcome, notes) = desk.play(&source);
                 let failed = outcome.verdict == Verdict::Failed;
