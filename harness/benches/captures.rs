@@ -2,10 +2,11 @@
 //! the same bytes and copies them; and the picture of the 100-axis run (ND21 9.7).
 
 use divan::counter::ItemsCount;
+use harness::buses::novobus::report::csv;
+use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
 use harness::capture::read;
-use harness::report::svg::{RowPlacing, SvgOptions, svg};
 use harness::report::vcd::Signals;
-use harness::report::{csv, pcapng, vcd};
+use harness::report::{pcapng, vcd};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
 use harness_sim::record::LineByte;

@@ -38,7 +38,6 @@ pub use scenario::verdict::Verdict;
 
 mod command;
 mod embed;
-mod html;
 #[doc(hidden)]
 pub mod listen;
 mod regular;
@@ -67,6 +66,8 @@ pub mod frames;
 pub mod fuzz;
 #[doc(hidden)]
 pub mod guard;
+#[doc(hidden)]
+pub mod html;
 #[doc(hidden)]
 pub mod library;
 #[doc(hidden)]

@@ -1,9 +1,10 @@
 //! The page of campaigns: how many cases of each class, and where in the ring which class happens, as a map of letters and colours.
 
 use crate::campaign::fault::{FaultEffect, LineBit};
-use crate::campaign::report::{WORST, happened, share};
+use crate::campaign::report::{WORST, happened};
+use crate::campaign::share::share;
 use crate::campaign::{CaseClass, PlayedCampaign};
-use crate::report::html::Html;
+use crate::html::Html;
 use crate::report::html::{FoldedPart, Section, page};
 use std::collections::BTreeMap;
 

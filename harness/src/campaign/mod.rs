@@ -15,6 +15,7 @@ pub mod part;
 pub mod plan;
 pub mod replay;
 pub(crate) mod run;
+pub(crate) mod share;
 
 pub use crate::buses::rings::campaign::class::{CaseClass, CaseEvidence, Wrong};
 pub use fault::CaseFaults;

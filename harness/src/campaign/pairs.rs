@@ -5,7 +5,7 @@ use super::fault::{CaseFaults, Injected};
 use super::file::{CampaignFile, MAX_CASES, Pairs};
 use super::plan::cases;
 use super::run::{Campaign, CaseOutcome, Contradiction};
-use crate::campaign::report::share;
+use crate::campaign::share::share;
 use crate::counted::counted;
 use crate::partition::Partition;
 use std::fmt::Write as _;

@@ -2,7 +2,7 @@
 
 use super::merge::MergeArguments;
 use crate::campaign::part::{CampaignCounts, CountsError, MergedCounts, merge};
-use crate::campaign::report::share;
+use crate::campaign::share::share;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::save;

@@ -2,6 +2,10 @@
 
 use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
 use super::run::details;
+use crate::buses::novobus::report::plot::plots;
+use crate::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
+use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
+use crate::buses::novobus::report::{csv, json};
 use crate::buses::{SharedForm, rows, write_shared};
 use crate::capture::Carries;
 use crate::capture::runs::bits_per_second;
@@ -11,11 +15,8 @@ use crate::command::page::writable;
 use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::regular;
-use crate::report::plot::plots;
-use crate::report::svg::{RowPlacing, SvgOptions, svg};
-use crate::report::table::{LEGEND, TablePart, table, wires};
+use crate::report::pcapng;
 use crate::report::vcd::{self, Signals};
-use crate::report::{csv, json, pcapng};
 use crate::scenario::files::sources;
 use crate::scenario::run::{AtMismatch, CellRecord};
 use crate::scenario::verdict::Verdict;

@@ -1,7 +1,7 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
 use crate::buses::novobus::language::run::bytes::show;
-use crate::report::table::{LEGEND, TablePart, table};
+use crate::buses::novobus::report::table::{LEGEND, TablePart, table};
 use crate::scenario::run::{ByteDifference, Mismatch};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;

@@ -9,7 +9,3 @@ pub mod pcapng;
 pub mod pcapng_frames;
 pub(crate) mod pcapng_telegrams;
 pub mod vcd;
-
-/// How the one bus that is shown today reads its bytes, and its own tables and pictures.
-pub use crate::buses::rings::report::{csv, json, meaning, plot, svg, table, walk};
-pub(crate) use crate::buses::rings::report::{diagram, lines, sequence};

@@ -1,8 +1,8 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
+use crate::buses::novobus::report::plot::plots;
+use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
 use crate::library::Entry;
-use crate::report::plot::plots;
-use crate::report::table::{LEGEND, TablePart, table, wires};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;

@@ -23,7 +23,7 @@
 //! at 1.5 Mbit/s is 66.7 of them.
 
 use super::pcapng::name;
-use crate::report::walk::{Reader, SenderState};
+use crate::buses::novobus::report::walk::{Reader, SenderState};
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};

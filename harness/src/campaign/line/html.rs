@@ -1,8 +1,9 @@
 //! The section of a campaign on a shared line in a page.
 
 use super::PlayedLine;
-use crate::campaign::report::share;
-use crate::report::html::{FoldedPart, Html, Section};
+use crate::campaign::share::share;
+use crate::html::Html;
+use crate::report::html::{FoldedPart, Section};
 
 /// Maximum number of the worst cases shown.
 const WORST: usize = 100;

@@ -1,7 +1,7 @@
 //! The results of a campaign, for people and for tools.
 
 use super::{LineOutcome, PlayedLine};
-use crate::campaign::report::share;
+use crate::campaign::share::share;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 

@@ -268,7 +268,7 @@ fn our_own_files_survive() {
         timed: true,
     };
     let mut file = Vec::new();
-    crate::report::csv::write(&traces, &mut file).expect("a Vec");
+    crate::buses::novobus::report::csv::write(&traces, &mut file).expect("a Vec");
     // A link without a byte leaves no row.
     let mut expected = capture;
     for trace in &mut expected.traces {

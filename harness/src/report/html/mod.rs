@@ -21,7 +21,6 @@ mod scenario;
 pub(crate) mod sequence;
 mod summary;
 
-pub use crate::html::{Attribute, Html};
 pub use page::{FoldedPart, MAX_PAGE, Section, page};
 pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;

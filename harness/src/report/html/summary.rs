@@ -2,7 +2,7 @@
 
 use super::page::{Section, page};
 use super::scenario::ScenarioView;
-use crate::buses::rings::locate::locate;
+use crate::buses::novobus::locate::locate;
 use crate::counted::counted;
 use crate::html::Html;
 use crate::scenario::run::Outcome;

@@ -1,9 +1,9 @@
 //! The scenario language: accepted lines, rejected lines with their messages, and the effect of each line.
 
+use harness::buses::novobus::report::json;
 use harness::buses::novobus::simulate::simulated;
 use harness::library::Entry;
 use harness::link::Link;
-use harness::report::json;
 use harness::scenario::problem::Problem;
 use harness::scenario::run::{Outcome, run};
 use harness::scenario::source::Source;

@@ -3,8 +3,8 @@
 use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};
 use crate::blind::Blind;
+use harness::buses::novobus::report::plot::plot;
 use harness::buses::novobus::simulate::simulated;
-use harness::report::plot::plot;
 use harness::scenario::run::{Outcome, run};
 use harness::scenario::verdict::Verdict;
 use harness_proto::time::Span;

@@ -1,9 +1,10 @@
 //! The forms: small examples as snapshots, the picture's XML and size, the rules of each form.
 
 use super::{DAMAGED, built_in, root, run};
+use harness::buses::novobus::report::csv;
+use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
 use harness::capture::Capture;
-use harness::report::svg::{RowPlacing, SvgOptions, svg};
-use harness::report::{csv, vcd};
+use harness::report::vcd;
 use quick_xml::Reader;
 use quick_xml::events::Event;
 

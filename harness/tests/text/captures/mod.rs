@@ -68,7 +68,7 @@ fn pcapng(capture: &Capture) -> Vec<u8> {
 
 fn json(capture: &Capture) -> Vec<u8> {
     let mut bytes = Vec::new();
-    harness::report::json::write(&capture.traces, &[], &mut bytes).expect("a Vec");
+    harness::buses::novobus::report::json::write(&capture.traces, &[], &mut bytes).expect("a Vec");
     bytes
 }
 

@@ -2,8 +2,8 @@
 
 use super::words::Reader;
 use crate::capture::runs::said;
+use crate::html::Html;
 use crate::report::chart::{Chart, Curve};
-use crate::report::html::Html;
 use harness_proto::nordac::words::{State, stw};
 use harness_proto::time::Instant;
 use harness_sim::record::Trace;

@@ -15,7 +15,7 @@ pub use words::{ProcessImage, Reader};
 
 use crate::bus::Bus;
 use crate::capture::runs::said;
-use crate::report::html::Html;
+use crate::html::Html;
 use crate::traffic::{SegmentReport, SharedForm, drawn, no_form};
 use harness_sim::record::Trace;
 use std::io::{Error, Write};

@@ -4,8 +4,9 @@
 
 use super::words::Reader;
 use crate::capture::runs::{Said, said};
+use crate::html::Html;
 use crate::report::html::sequence::{Arrow, SequenceWords};
-use crate::report::html::{self, Html};
+use crate::report::html::{self};
 use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 

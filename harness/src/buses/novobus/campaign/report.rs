@@ -2,6 +2,7 @@
 
 use super::class::{CaseClass, CaseEvidence, Wrong};
 use crate::campaign::run::{CaseOutcome, PlayedCampaign};
+use crate::campaign::share::share;
 use crate::link::link_name;
 use harness_proto::nd21::cells::cell_at;
 use serde::Serialize;
@@ -73,19 +74,6 @@ pub fn line(outcome: &CaseOutcome, drives: u8) -> String {
     let happened = happened(&outcome.evidence, drives);
     let line = format!("{:18} {name:28} {happened}", outcome.class.name());
     line.trim_end().to_owned() + "\n"
-}
-
-/// A share of all cases, to a hundredth of a percent; a share that is not nothing does not look like it.
-#[must_use]
-pub fn share(part: u64, all: u64) -> String {
-    if all == 0 {
-        return "-".to_owned();
-    }
-    let hundredths = (u128::from(part) * 20_000 / u128::from(all)).div_ceil(2);
-    if hundredths == 0 && part > 0 {
-        return "< 0.01 %".to_owned();
-    }
-    format!("{}.{:02} %", hundredths / 100, hundredths % 100)
 }
 
 /// How many cases there are of each class, what differs from the file, and the worst cases.

@@ -1,6 +1,6 @@
 //! What a capture shows of the drives: the previous contents of their cells, and the bytes that cannot be predicted.
 
-use crate::report::meaning::{self, Observer};
+use crate::buses::novobus::report::meaning::{self, Observer};
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::nd21::own::is_own;

@@ -6,7 +6,7 @@
 use super::cells::Area;
 use super::picture::{LEFT, MAX_AREAS, ROW, RingPicture, RowPlacing, TOP};
 use super::walk::SenderState;
-use crate::report::html::Html;
+use crate::html::Html;
 use crate::report::pcapng::name;
 use harness_proto::line::Rate;
 use harness_sim::record::{Channel, LineByte, Trace};

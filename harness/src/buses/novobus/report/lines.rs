@@ -1,7 +1,7 @@
 //! Recorded cells against time: a curve each, one below the other over the same times.
 
+use crate::html::Html;
 use crate::report::chart::{Chart, Curve};
-use crate::report::html::Html;
 use crate::scenario::quantity::figures;
 use crate::scenario::run::{CellRecord, Sample};
 use harness_proto::nd21::bits;

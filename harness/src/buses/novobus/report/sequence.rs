@@ -1,11 +1,11 @@
 //! A sequence diagram of the master and the drives: jobs with their answers, faults on the line, the error mode and the recovery from it
 //! (ND21 9.5, 9.7, 9.8). It is made from both links of the master and from the drives' marks.
 
-use crate::report::csv::{remark, status};
-use crate::report::html::Html;
-use crate::report::meaning::ByteRole;
+use crate::buses::novobus::report::csv::{remark, status};
+use crate::buses::novobus::report::meaning::ByteRole;
+use crate::buses::novobus::report::walk::Reader;
+use crate::html::Html;
 use crate::report::pcapng::name;
-use crate::report::walk::Reader;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
 use harness_sim::novobus::mark::Mark as _;

@@ -1,8 +1,8 @@
 //! Registers that a drive has sent several times, as curves against time.
 
 use crate::buses::unitek::value::bits;
+use crate::html::Html;
 use crate::report::chart::{Chart, Curve, HEX, Points};
-use crate::report::html::Html;
 use harness_proto::unitek::units::{Scaling, usual, value};
 use harness_proto::unitek::{Data, Register, Reply};
 use harness_sim::record::{FrameEnd, Trace};

@@ -7,7 +7,7 @@ pub(crate) mod sequence;
 pub mod table;
 
 use crate::bus::Bus;
-use crate::report::html::Html;
+use crate::html::Html;
 use crate::report::pcapng_frames;
 use crate::traffic::{SegmentReport, SharedForm, drawn};
 use harness_proto::can::Frame;

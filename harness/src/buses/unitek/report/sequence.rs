@@ -4,8 +4,9 @@
 
 use super::meaning;
 use crate::buses::unitek::language::identifier;
+use crate::html::Html;
 use crate::report::html::sequence::{Arrow, SequenceWords};
-use crate::report::html::{self, Html};
+use crate::report::html::{self};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::{BTreeMap, BTreeSet};
