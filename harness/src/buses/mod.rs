@@ -22,7 +22,7 @@ pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
-pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
+pub(crate) use novobus::{cli as commands, driver, drives, twin};
 
 use crate::bus::Bus;
 use crate::campaign::line::LineCampaign;

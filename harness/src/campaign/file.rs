@@ -1,7 +1,7 @@
 //! What may stand in a campaign file (`corpora/campaigns/*.toml`), and the check of a text.
 
 use super::fault::{LONGEST, LineBit, MAX_GAP, link_place};
-use crate::campaign::class::CaseClass;
+use crate::buses::novobus::campaign::class::CaseClass;
 use crate::file::schema::{PathStep, compare, place, syntax};
 use crate::file::values::{LinkName, Time};
 use crate::scenario::problem::{Problem, Problems};

@@ -1,10 +1,10 @@
 //! Two faults in a conversation: every pair of a campaign's cases, or a sample of them.
 
-use super::class::CaseClass;
 use super::fault::{CaseFaults, Injected};
 use super::file::{CampaignFile, MAX_CASES, Pairs};
 use super::plan::cases;
 use super::run::{Campaign, CaseOutcome, Contradiction};
+use crate::buses::novobus::campaign::class::CaseClass;
 use crate::campaign::share::share;
 use crate::counted::counted;
 use crate::partition::Partition;

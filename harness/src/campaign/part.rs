@@ -3,7 +3,8 @@
 use super::file::ExpectedCounts;
 use super::line::{LineCampaign, PlayedLine};
 use super::pairs::{Apart, MOST_SINGLES, PairCounts, PlayedPairs};
-use super::{Campaign, CaseClass, PlayedCampaign};
+use super::{Campaign, PlayedCampaign};
+use crate::buses::novobus::campaign::class::CaseClass;
 use crate::counted::counted;
 use crate::partition::{Partition, Spread};
 use crate::regular::{self, Links};

@@ -3,13 +3,13 @@
 use super::fault::CaseFaults;
 use super::file::{CampaignFile, ExpectedCounts, read};
 use super::plan::{Shape, cases};
+use crate::buses::novobus::campaign::by_driver::ByDriver;
+use crate::buses::novobus::campaign::by_manual::{ByManual, Said};
+use crate::buses::novobus::campaign::class::{CaseClass, CaseEvidence};
+use crate::buses::novobus::campaign::conversation::{MasterTalk, talk, telegrams};
+use crate::buses::novobus::campaign::sharing::Sharing;
 use crate::buses::novobus::simulate::bench;
 use crate::buses::syntax::{Setup, SetupKind};
-use crate::campaign::by_driver::ByDriver;
-use crate::campaign::by_manual::{ByManual, Said};
-use crate::campaign::class::{CaseClass, CaseEvidence};
-use crate::campaign::conversation::{MasterTalk, talk, telegrams};
-use crate::campaign::sharing::Sharing;
 use crate::library::Entry;
 use crate::scenario::files::{LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};

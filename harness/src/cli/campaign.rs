@@ -1,13 +1,14 @@
 //! `drivebench campaign`.
 
 use super::args::CampaignArguments;
+use crate::buses::novobus::campaign::class::CaseClass;
+use crate::buses::novobus::campaign::report::{json, line as case_line, table};
 use crate::buses::{line_campaign, line_campaigns};
 use crate::campaign::find::{FindCampaignError, find, names};
 use crate::campaign::line::{self, LineCampaign, PlayedLine};
 use crate::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
 use crate::campaign::replay::scenario;
-use crate::campaign::report::{json, line as case_line, table};
-use crate::campaign::{Campaign, CaseClass, CaseFaults, Contradiction, PlayedCampaign};
+use crate::campaign::{Campaign, CaseFaults, Contradiction, PlayedCampaign};
 use crate::command::args::TableFormat;
 use crate::command::exit::Exit;
 use crate::command::output::Output;

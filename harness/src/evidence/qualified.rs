@@ -4,7 +4,7 @@ use super::attempt::reached;
 use super::files::{DEVIATIONS, PROFILE, read_text, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
-use crate::buses::qualify::{Qualification, QualificationFacts, QualifiedBench, thorough};
+use crate::buses::novobus::qualify::{Qualification, QualificationFacts, QualifiedBench, thorough};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;

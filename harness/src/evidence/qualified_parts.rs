@@ -4,7 +4,7 @@ use super::error::EvidenceError;
 use super::files::sum;
 use super::qualified::{Case, cases, course, is_thorough};
 use super::verify::{Judged, Opened};
-use crate::buses::qualify::{QualifiedBench, TRIALS};
+use crate::buses::novobus::qualify::{QualifiedBench, TRIALS};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;

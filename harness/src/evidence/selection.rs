@@ -4,7 +4,7 @@ use super::attempt::reached;
 use super::files::sum;
 use super::record::RecordLine;
 use super::verify::Opened;
-use crate::buses::qualify::{TRIALS, conversations, probes, thorough};
+use crate::buses::novobus::qualify::{TRIALS, conversations, probes, thorough};
 use crate::library::Entry;
 
 /// How the scenarios of a record compare with those that were to be played.

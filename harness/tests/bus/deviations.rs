@@ -6,12 +6,12 @@
 
 use crate::blind::Blind;
 use harness::buses::novobus::language::plan::Plan;
+use harness::buses::novobus::qualify::deviating_masters;
 use harness::buses::novobus::simulate::simulated;
 use harness::buses::parse_rig as parse;
 use harness::buses::rings::rig::OnRings as _;
 use harness::library::Entry;
 use harness::link::{Capability, Line, Link};
-use harness::qualify::deviating_masters;
 use harness::rig::{PlayedScenario, Run, Session, UseOptions};
 use harness::scenario::files::sources;
 use harness::scenario::run::run;

@@ -7,14 +7,14 @@ mod eeprom;
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::syntax::Header;
+use harness::buses::novobus::qualify::{
+    Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
+    conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
+};
 use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::Entry;
 use harness::link::{Capability, LinkEvent, Octets, Recording};
-use harness::qualify::{
-    Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
-    conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
-};
 use harness::rig::{Way, play_one};
 use harness::scenario::files::sources;
 use harness::scenario::run::lacks;

@@ -3,13 +3,13 @@
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
 use harness::buses::novobus::language::syntax::Header;
+use harness::buses::novobus::qualify::{
+    Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
+};
 use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::Entry;
 use harness::link::{Line as _, Link, LinkEvent, Octets, Recording, Replay};
-use harness::qualify::{
-    Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
-};
 use harness::scenario::files::sources;
 use harness::scenario::run::{AtMismatch, Outcome, lacks};
 use harness::scenario::source::Source;

@@ -4,12 +4,13 @@
 mod cli;
 mod judge;
 
+use harness::buses::novobus::campaign::class::{CaseClass, Wrong};
+use harness::buses::novobus::campaign::report::{json, table};
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::buses::novobus::simulate::simulated;
 use harness::campaign::find::{find, names};
 use harness::campaign::pairs::Apart;
-use harness::campaign::report::{json, table};
-use harness::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign, Wrong};
+use harness::campaign::{Campaign, CaseFaults, PlayedCampaign};
 use harness::library::Entry;
 use harness::link::{Link, Octets};
 use harness::scenario::problem::Problems;
