@@ -122,11 +122,11 @@ impl Language for Novobus {
     }
 
     fn begin(runner: &mut Runner<'_>) -> Result<(), Stop> {
-        runner.begin()
+        state::begin(runner)
     }
 
     fn act(runner: &mut Runner<'_>, act: &RingAct, step: &PlannedStep) -> Result<(), Stop> {
-        runner.act_of_ring(act, step)
+        state::act_of_ring(runner, act, step)
     }
 
     fn by_hand(state: &mut RunState, ring: usize) {
@@ -179,7 +179,7 @@ impl Language for Novobus {
     }
 
     fn look(runner: &mut Runner<'_>) {
-        runner.note();
+        run::record::note(runner);
     }
 
     fn too_much(state: &RunState) -> Option<String> {
@@ -187,15 +187,15 @@ impl Language for Novobus {
     }
 
     fn in_error(runner: &Runner<'_>) -> String {
-        runner.in_error()
+        state::in_error(runner)
     }
 
     fn lacks_answers(runner: &Runner<'_>) -> bool {
-        runner.lacks_answers()
+        state::lacks_answers(runner)
     }
 
     fn complete(runner: &Runner<'_>, finding: &mut Mismatch) {
-        runner.complete(finding);
+        state::complete(runner, finding);
     }
 
     fn records(state: RunState) -> Vec<CellRecord> {

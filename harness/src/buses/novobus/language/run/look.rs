@@ -27,134 +27,131 @@ pub(crate) enum Miss {
     Unseen(String),
 }
 
-impl Runner<'_> {
-    /// Whether something holds of drives, and of which of them it does not.
-    pub(crate) fn look(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
-        self.look_at_drives(check, check.drives.clone())
-    }
+/// Whether something holds of drives, and of which of them it does not.
+pub(crate) fn look(runner: &Runner<'_>, check: &PlannedDriveCheck) -> Result<(), Miss> {
+    look_at_drives(runner, check, check.drives.clone())
+}
 
-    /// The same, but stops at the first drive for which it does not hold: for frequent checks.
-    pub(crate) fn glance(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
-        let mut drives = check.drives.clone();
-        drives.try_for_each(|drive| self.look_at_drives(check, drive..=drive))
-    }
+/// The same, but stops at the first drive for which it does not hold: for frequent checks.
+pub(crate) fn glance(runner: &Runner<'_>, check: &PlannedDriveCheck) -> Result<(), Miss> {
+    let mut drives = check.drives.clone();
+    drives.try_for_each(|drive| look_at_drives(runner, check, drive..=drive))
+}
 
-    fn look_at_drives(
-        &self,
-        check: &PlannedDriveCheck,
-        drives: RangeInclusive<u8>,
-    ) -> Result<(), Miss> {
-        if let PlannedCondition::InError(expected) = check.condition {
-            return self.look_at_errors(check.ring, drives, expected);
-        }
-        let mut first = None;
-        let mut others: u32 = 0;
-        for drive in drives {
-            match self.look_at(check, drive) {
-                Ok(()) => {}
-                // A visible fault takes precedence over a cell that cannot be seen.
-                Err(Miss::Otherwise(message)) if first.is_none() => first = Some(message),
-                Err(Miss::Otherwise(_)) => others += 1,
-                Err(unseen) if first.is_none() => return Err(unseen),
-                Err(_) => {}
-            }
-        }
-        match (first, others) {
-            (None, _) => Ok(()),
-            (Some(message), 0) => Err(Miss::Otherwise(message)),
-            (Some(message), 1) => Err(Miss::Otherwise(format!("{message} (and 1 drive more)"))),
-            (Some(message), n) => Err(Miss::Otherwise(format!("{message} (and {n} drives more)"))),
+fn look_at_drives(
+    runner: &Runner<'_>,
+    check: &PlannedDriveCheck,
+    drives: RangeInclusive<u8>,
+) -> Result<(), Miss> {
+    if let PlannedCondition::InError(expected) = check.condition {
+        return look_at_errors(runner, check.ring, drives, expected);
+    }
+    let mut first = None;
+    let mut others: u32 = 0;
+    for drive in drives {
+        match look_at(runner, check, drive) {
+            Ok(()) => {}
+            // A visible fault takes precedence over a cell that cannot be seen.
+            Err(Miss::Otherwise(message)) if first.is_none() => first = Some(message),
+            Err(Miss::Otherwise(_)) => others += 1,
+            Err(unseen) if first.is_none() => return Err(unseen),
+            Err(_) => {}
         }
     }
-
-    fn look_at_errors(
-        &self,
-        ring: usize,
-        drives: RangeInclusive<u8>,
-        expected: bool,
-    ) -> Result<(), Miss> {
-        let mut wrong = Vec::new();
-        let mut unseen = Vec::new();
-        for drive in drives {
-            let answered = || self.own.answers.contains(&(ring, drive)).then_some(None);
-            match self.shown_error(ring, drive).or_else(answered) {
-                None => unseen.push(drive),
-                Some(error) if error.is_some() != expected => wrong.push(drive),
-                Some(_) => {}
-            }
-        }
-        if !wrong.is_empty() {
-            let not = if expected { " not" } else { "" };
-            let are = if wrong.len() == 1 { "is" } else { "are" };
-            let drives = list(ring, &wrong);
-            return Err(Miss::Otherwise(format!(
-                "{drives} {are}{not} in the error mode"
-            )));
-        }
-        if !unseen.is_empty() {
-            let drives = list(ring, &unseen);
-            return Err(Miss::Unseen(format!(
-                "this link does not show whether {drives} are in the error mode"
-            )));
-        }
-        Ok(())
+    match (first, others) {
+        (None, _) => Ok(()),
+        (Some(message), 0) => Err(Miss::Otherwise(message)),
+        (Some(message), 1) => Err(Miss::Otherwise(format!("{message} (and 1 drive more)"))),
+        (Some(message), n) => Err(Miss::Otherwise(format!("{message} (and {n} drives more)"))),
     }
+}
 
-    fn look_at(&self, check: &PlannedDriveCheck, drive: u8) -> Result<(), Miss> {
-        let ring = check.ring;
-        let label = || list(ring, &[drive]);
-        let unseen =
-            |what: &str| Miss::Unseen(format!("{}: this link does not show {what}", label()));
-        match &check.condition {
-            PlannedCondition::InError(_) => Ok(()),
-            PlannedCondition::Memory(address, bytes) => {
-                for (cell, expected) in (*address..=u16::MAX).zip(bytes) {
-                    let found = self.peek(ring, drive, cell);
-                    let found = found.ok_or_else(|| unseen(&format!("cell {cell:04X}")))?;
-                    if !matches(*expected, Received::good(found)) {
-                        return Err(Miss::Otherwise(format!(
-                            "cell {cell:04X} of {} holds {found:02X}, expected {}",
-                            label(),
-                            expected
-                        )));
-                    }
+fn look_at_errors(
+    runner: &Runner<'_>,
+    ring: usize,
+    drives: RangeInclusive<u8>,
+    expected: bool,
+) -> Result<(), Miss> {
+    let mut wrong = Vec::new();
+    let mut unseen = Vec::new();
+    for drive in drives {
+        let answered = || runner.own.answers.contains(&(ring, drive)).then_some(None);
+        match super::tapped::shown_error(runner, ring, drive).or_else(answered) {
+            None => unseen.push(drive),
+            Some(error) if error.is_some() != expected => wrong.push(drive),
+            Some(_) => {}
+        }
+    }
+    if !wrong.is_empty() {
+        let not = if expected { " not" } else { "" };
+        let are = if wrong.len() == 1 { "is" } else { "are" };
+        let drives = list(ring, &wrong);
+        return Err(Miss::Otherwise(format!(
+            "{drives} {are}{not} in the error mode"
+        )));
+    }
+    if !unseen.is_empty() {
+        let drives = list(ring, &unseen);
+        return Err(Miss::Unseen(format!(
+            "this link does not show whether {drives} are in the error mode"
+        )));
+    }
+    Ok(())
+}
+
+fn look_at(runner: &Runner<'_>, check: &PlannedDriveCheck, drive: u8) -> Result<(), Miss> {
+    let ring = check.ring;
+    let label = || list(ring, &[drive]);
+    let unseen = |what: &str| Miss::Unseen(format!("{}: this link does not show {what}", label()));
+    match &check.condition {
+        PlannedCondition::InError(_) => Ok(()),
+        PlannedCondition::Memory(address, bytes) => {
+            for (cell, expected) in (*address..=u16::MAX).zip(bytes) {
+                let found = peek(runner, ring, drive, cell);
+                let found = found.ok_or_else(|| unseen(&format!("cell {cell:04X}")))?;
+                if !matches(*expected, Received::good(found)) {
+                    return Err(Miss::Otherwise(format!(
+                        "cell {cell:04X} of {} holds {found:02X}, expected {}",
+                        label(),
+                        expected
+                    )));
                 }
-                Ok(())
             }
-            PlannedCondition::Cell(cell) => {
-                let bytes = self.bytes(ring, drive, cell.address, cell.size);
-                let bytes = bytes.ok_or_else(|| unseen(&cell.name))?;
-                judge(cell, &bytes, self.plan.units(ring, drive))
-                    .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
-            }
-            PlannedCondition::Shows(showing) => {
-                let shown = self.link.shown(ring, drive);
-                let shown = shown.ok_or_else(|| unseen("what stands outside the bus"))?;
-                shows(*showing, &shown)
-                    .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
-            }
+            Ok(())
+        }
+        PlannedCondition::Cell(cell) => {
+            let bytes = bytes(runner, ring, drive, cell.address, cell.size);
+            let bytes = bytes.ok_or_else(|| unseen(&cell.name))?;
+            judge(cell, &bytes, runner.plan.units(ring, drive))
+                .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
+        }
+        PlannedCondition::Shows(showing) => {
+            let shown = runner.link.shown(ring, drive);
+            let shown = shown.ok_or_else(|| unseen("what stands outside the bus"))?;
+            shows(*showing, &shown)
+                .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
         }
     }
+}
 
-    /// A byte as the link shows it, or as it was read over the bus for this look.
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        let read = || self.own.seen.get(&(ring, drive, address)).copied();
-        self.link.peek(ring, drive, address).or_else(read)
-    }
+/// A byte as the link shows it, or as it was read over the bus for this look.
+fn peek(runner: &Runner<'_>, ring: usize, drive: u8, address: u16) -> Option<u8> {
+    let read = || runner.own.seen.get(&(ring, drive, address)).copied();
+    runner.link.peek(ring, drive, address).or_else(read)
+}
 
-    /// The bytes of a cell; `None` where the link does not show them.
-    pub(crate) fn bytes(
-        &self,
-        ring: usize,
-        drive: u8,
-        address: u16,
-        size: usize,
-    ) -> Option<Vec<u8>> {
-        (address..=u16::MAX)
-            .take(size)
-            .map(|address| self.peek(ring, drive, address))
-            .collect()
-    }
+/// The bytes of a cell; `None` where the link does not show them.
+pub(crate) fn bytes(
+    runner: &Runner<'_>,
+    ring: usize,
+    drive: u8,
+    address: u16,
+    size: usize,
+) -> Option<Vec<u8>> {
+    (address..=u16::MAX)
+        .take(size)
+        .map(|address| peek(runner, ring, drive, address))
+        .collect()
 }
 
 /// `drive 3`, `drives 0, 1`, `drive 2:3`

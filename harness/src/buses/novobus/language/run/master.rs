@@ -84,118 +84,120 @@ impl Line for Through<'_, '_> {
     }
 }
 
-impl Runner<'_> {
-    /// Lets the driver do this of these drives; commands go out together.
-    pub(crate) fn master(
-        &mut self,
-        ring: usize,
-        calls: &[(u8, PlannedCall)],
-        once: bool,
-        span: TextSpan,
-    ) -> Result<(), Stop> {
-        self.settle();
-        self.forget(ring);
-        let size = self.link.drives(ring);
-        let failed = |error: Error| Stop::failed(span, error.to_string());
-        let Ok(size) = RingSize::new(u64::from(size)) else {
-            return Err(Stop::failed(span, "the ring has no drives"));
-        };
-        let options = Options {
-            deviates: self.plan.master,
-            ..Options::default()
-        };
-        self.ask(ring, calls);
-        let gap = self.own.gap;
-        let line = Through {
-            runner: self,
-            ring,
-            halted: None,
-            left: None,
-        };
-        let (mut events, mut ended) = (Vec::new(), Vec::new());
-        let result = OpenRings::open(Box::new(line), &[size], options)
-            .map_err(failed)
-            .and_then(|bus| {
-                let result = do_all(&bus, calls, once, &mut ended)
-                    .map_err(|message| Stop::failed(span, message));
-                events = bus.take_events();
-                bus.close();
-                result
-            });
-        let faults = events.into_iter().filter_map(|(_, event)| match event {
-            Event::Disturbed { fault, .. } => Some(fault),
-            _ => None,
+/// Lets the driver do this of these drives; commands go out together.
+pub(crate) fn master(
+    runner: &mut Runner<'_>,
+    ring: usize,
+    calls: &[(u8, PlannedCall)],
+    once: bool,
+    span: TextSpan,
+) -> Result<(), Stop> {
+    runner.settle();
+    runner.forget(ring);
+    let size = runner.link.drives(ring);
+    let failed = |error: Error| Stop::failed(span, error.to_string());
+    let Ok(size) = RingSize::new(u64::from(size)) else {
+        return Err(Stop::failed(span, "the ring has no drives"));
+    };
+    let options = Options {
+        deviates: runner.plan.master,
+        ..Options::default()
+    };
+    ask(runner, ring, calls);
+    let gap = runner.own.gap;
+    let line = Through {
+        runner: runner,
+        ring,
+        halted: None,
+        left: None,
+    };
+    let (mut events, mut ended) = (Vec::new(), Vec::new());
+    let result = OpenRings::open(Box::new(line), &[size], options)
+        .map_err(failed)
+        .and_then(|bus| {
+            let result = do_all(&bus, calls, once, &mut ended)
+                .map_err(|message| Stop::failed(span, message));
+            events = bus.take_events();
+            bus.close();
+            result
         });
-        self.own.disturbed = faults.collect();
-        if !self.own.disturbed.is_empty() {
-            // Between two recoveries the driver leaves the line free (9.9).
-            self.own.gap = gap;
-        }
-        self.own.ended = ended;
-        self.settle();
-        self.forget(ring);
-        self.line_before = self.link.now();
-        result
+    let faults = events.into_iter().filter_map(|(_, event)| match event {
+        Event::Disturbed { fault, .. } => Some(fault),
+        _ => None,
+    });
+    runner.own.disturbed = faults.collect();
+    if !runner.own.disturbed.is_empty() {
+        // Between two recoveries the driver leaves the line free (9.9).
+        runner.own.gap = gap;
     }
+    runner.own.ended = ended;
+    runner.settle();
+    runner.forget(ring);
+    runner.line_before = runner.link.now();
+    result
+}
 
-    /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
-    fn ask(&mut self, ring: usize, calls: &[(u8, PlannedCall)]) {
-        let Some(own) = self.own.rings.get_mut(ring) else {
-            return;
-        };
-        let own = &mut own.asked;
-        for (drive, call) in calls {
-            match (call, &mut *own) {
-                (PlannedCall::Command(command, _), Some(asked)) => asked.push((*drive, *command)),
-                (PlannedCall::Exchange(..), _) => {}
-                (_, asked) => *asked = None,
-            }
+/// Notes what the driver is asked for; calls of several steps ask for more than is known here.
+fn ask(runner: &mut Runner<'_>, ring: usize, calls: &[(u8, PlannedCall)]) {
+    let Some(own) = runner.own.rings.get_mut(ring) else {
+        return;
+    };
+    let own = &mut own.asked;
+    for (drive, call) in calls {
+        match (call, &mut *own) {
+            (PlannedCall::Command(command, _), Some(asked)) => asked.push((*drive, *command)),
+            (PlannedCall::Exchange(..), _) => {}
+            (_, asked) => *asked = None,
         }
     }
+}
 
-    /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong. Where time is real, a gap is that
-    /// of a busy computer, and no drive's fault.
-    pub(crate) fn rules_kept(&self, ring: usize, span: TextSpan) -> Result<(), Stop> {
-        let drives = self.link.drives(ring);
-        let record = self.own.rings.get(ring);
-        let sent = record.into_iter().flat_map(|record| &record.sent);
-        let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
-        let asked = record.and_then(|record| record.asked.as_deref());
-        let own = |wrong: String| format!("of the bench's own master: {wrong}");
-        conduct(drives, &sent, asked)
-            .map_err(|wrong| Stop::failed(span, own(wrong.to_string())))?;
-        let Some(gap) = self.own.gap else {
-            return Ok(());
-        };
-        let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
-        Err(match self.link.time_tolerance() {
-            Span::ZERO => Stop::failed(span, message),
-            _ => Stop::marginal(span, message + ": the computer was busy"),
-        })
-    }
+/// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong. Where time is real, a gap is that
+/// of a busy computer, and no drive's fault.
+pub(crate) fn rules_kept(runner: &Runner<'_>, ring: usize, span: TextSpan) -> Result<(), Stop> {
+    let drives = runner.link.drives(ring);
+    let record = runner.own.rings.get(ring);
+    let sent = record.into_iter().flat_map(|record| &record.sent);
+    let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
+    let asked = record.and_then(|record| record.asked.as_deref());
+    let own = |wrong: String| format!("of the bench's own master: {wrong}");
+    conduct(drives, &sent, asked).map_err(|wrong| Stop::failed(span, own(wrong.to_string())))?;
+    let Some(gap) = runner.own.gap else {
+        return Ok(());
+    };
+    let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
+    Err(match runner.link.time_tolerance() {
+        Span::ZERO => Stop::failed(span, message),
+        _ => Stop::marginal(span, message + ": the computer was busy"),
+    })
+}
 
-    /// Lets the driver count the drives.
-    pub(crate) fn count(&mut self, ring: usize, expected: u8, span: TextSpan) -> Result<(), Stop> {
-        self.settle();
-        self.forget(ring);
-        let mut line = Through {
-            runner: self,
-            ring,
-            halted: None,
-            left: None,
-        };
-        let counted = count_drives(&mut line, 0);
-        self.settle();
-        self.forget(ring);
-        self.line_before = self.link.now();
-        match counted {
-            Ok(size) if size.drives() == expected => Ok(()),
-            Ok(size) => Err(Stop::failed(
-                span,
-                format!("the ring has {} drives, expected {expected}", size.drives()),
-            )),
-            Err(error) => Err(Stop::failed(span, error.to_string())),
-        }
+/// Lets the driver count the drives.
+pub(crate) fn count(
+    runner: &mut Runner<'_>,
+    ring: usize,
+    expected: u8,
+    span: TextSpan,
+) -> Result<(), Stop> {
+    runner.settle();
+    runner.forget(ring);
+    let mut line = Through {
+        runner: runner,
+        ring,
+        halted: None,
+        left: None,
+    };
+    let counted = count_drives(&mut line, 0);
+    runner.settle();
+    runner.forget(ring);
+    runner.line_before = runner.link.now();
+    match counted {
+        Ok(size) if size.drives() == expected => Ok(()),
+        Ok(size) => Err(Stop::failed(
+            span,
+            format!("the ring has {} drives, expected {expected}", size.drives()),
+        )),
+        Err(error) => Err(Stop::failed(span, error.to_string())),
     }
 }
 

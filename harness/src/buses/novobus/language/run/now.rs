@@ -52,7 +52,7 @@ fn look(plan: &Plan, link: &mut dyn Link, check: &PlannedCheck, step: &PlannedSt
         }
     }
     let mut runner = Runner::new(plan, link, AtMismatch::Stop);
-    let result = runner.check(check, false, step.span);
+    let result = super::check::check(&mut runner, check, false, step.span);
     match (result, runner.unseen.take()) {
         (Ok(()), None) => Now::Done,
         (Err(stop), _) | (Ok(()), Some(stop)) => Now::Otherwise(stop.into_message()),

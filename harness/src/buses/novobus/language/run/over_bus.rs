@@ -29,92 +29,90 @@ use harness_proto::time::{Instant, Span};
 /// How long an answer may take, in addition to the time that the ring itself needs.
 const PATIENCE: Span = Span::from_millis(1_000);
 
-impl Runner<'_> {
-    /// Whether a check is on something that the link shows only in the answer to a telegram.
-    fn is_asked_for(&self, check: &PlannedDriveCheck) -> bool {
-        let address = match &check.condition {
-            PlannedCondition::Memory(address, _) => *address,
-            PlannedCondition::Cell(cell) => cell.address,
-            PlannedCondition::InError(false) => nd21::ram::STATUS,
-            PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return false,
-        };
-        let in_error = matches!(check.condition, PlannedCondition::InError(_));
-        let shown = |drive| {
-            self.link.peek(check.ring, drive, address).is_some()
-                || in_error && self.own.tapped.contains_key(&(check.ring, drive))
-        };
-        !check.drives.clone().all(shown)
-    }
+/// Whether a check is on something that the link shows only in the answer to a telegram.
+fn is_asked_for(runner: &Runner<'_>, check: &PlannedDriveCheck) -> bool {
+    let address = match &check.condition {
+        PlannedCondition::Memory(address, _) => *address,
+        PlannedCondition::Cell(cell) => cell.address,
+        PlannedCondition::InError(false) => nd21::ram::STATUS,
+        PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return false,
+    };
+    let in_error = matches!(check.condition, PlannedCondition::InError(_));
+    let shown = |drive| {
+        runner.link.peek(check.ring, drive, address).is_some()
+            || in_error && runner.own.tapped.contains_key(&(check.ring, drive))
+    };
+    !check.drives.clone().all(shown)
+}
 
-    /// What was asked before says nothing of now.
-    pub(crate) fn forget_answers(&mut self) {
-        self.own.seen.clear();
-        self.own.answers.clear();
-        self.own.tapped.clear();
-    }
+/// What was asked before says nothing of now.
+pub(crate) fn forget_answers(runner: &mut Runner<'_>) {
+    runner.own.seen.clear();
+    runner.own.answers.clear();
+    runner.own.tapped.clear();
+}
 
-    /// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
-    pub(crate) fn asking_time(&self, check: &PlannedDriveCheck) -> Span {
-        if !self.is_asked_for(check) {
-            return Span::ZERO;
-        }
-        let drives = u64::from(self.link.drives(check.ring));
-        let bytes = match &check.condition {
-            PlannedCondition::Memory(_, bytes) => bytes.len(),
-            PlannedCondition::Cell(cell) => cell.size,
-            _ => 1,
-        };
-        let asked = check.drives.clone().count() as u64 * bytes as u64;
-        let one = self.link.byte_time() * (2 * drives + 8) + self.link.time_tolerance();
-        one * asked
+/// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
+pub(crate) fn asking_time(runner: &Runner<'_>, check: &PlannedDriveCheck) -> Span {
+    if !is_asked_for(runner, check) {
+        return Span::ZERO;
     }
+    let drives = u64::from(runner.link.drives(check.ring));
+    let bytes = match &check.condition {
+        PlannedCondition::Memory(_, bytes) => bytes.len(),
+        PlannedCondition::Cell(cell) => cell.size,
+        _ => 1,
+    };
+    let asked = check.drives.clone().count() as u64 * bytes as u64;
+    let one = runner.link.byte_time() * (2 * drives + 8) + runner.link.time_tolerance();
+    one * asked
+}
 
-    /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
-    /// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
-    pub(crate) fn ask_for(&mut self, check: &PlannedDriveCheck) {
-        if matches!(check.condition, PlannedCondition::InError(_)) {
-            self.tap(check.ring, check.drives.clone());
-        }
-        let status = nd21::ram::STATUS;
-        let (address, size) = match &check.condition {
-            PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),
-            PlannedCondition::Cell(cell) => (cell.address, cell.size),
-            PlannedCondition::InError(false) => (status, 1),
-            PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return,
-        };
-        if !self.is_asked_for(check) {
-            return;
-        }
-        let ring = check.ring;
-        self.settle();
-        let tapped = std::mem::take(&mut self.own.tapped);
-        self.forget_answers();
-        self.own.tapped = tapped;
-        let Ok(size_of_ring) = RingSize::new(u64::from(self.link.drives(ring))) else {
-            return;
-        };
-        let damaged = self.plan.fault_links().next().is_some() && self.own.corrected == 0;
-        if damaged || !at_rest(size_of_ring, &self.own.rings[ring].sent) {
-            return;
-        }
-        let received = self.ports[ring].received.len();
-        for drive in check.drives.clone() {
-            for address in (address..=u16::MAX).take(size) {
-                // The sum of the address passes through BusAddr (FF36) of every drive: a telegram that asks for it
-                // changes it.
-                if address == nd21::ram::BUS_ADDR {
-                    continue;
-                }
-                let read = exchange(self.link, ring, drive, Command::ReadByte { address });
-                if let Some([byte]) = read.as_deref() {
-                    self.own.seen.insert((ring, drive, address), *byte);
-                    self.own.answers.insert((ring, drive));
-                }
+/// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
+/// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
+pub(crate) fn ask_for(runner: &mut Runner<'_>, check: &PlannedDriveCheck) {
+    if matches!(check.condition, PlannedCondition::InError(_)) {
+        super::tapped::tap(runner, check.ring, check.drives.clone());
+    }
+    let status = nd21::ram::STATUS;
+    let (address, size) = match &check.condition {
+        PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),
+        PlannedCondition::Cell(cell) => (cell.address, cell.size),
+        PlannedCondition::InError(false) => (status, 1),
+        PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return,
+    };
+    if !is_asked_for(runner, check) {
+        return;
+    }
+    let ring = check.ring;
+    runner.settle();
+    let tapped = std::mem::take(&mut runner.own.tapped);
+    forget_answers(runner);
+    runner.own.tapped = tapped;
+    let Ok(size_of_ring) = RingSize::new(u64::from(runner.link.drives(ring))) else {
+        return;
+    };
+    let damaged = runner.plan.fault_links().next().is_some() && runner.own.corrected == 0;
+    if damaged || !at_rest(size_of_ring, &runner.own.rings[ring].sent) {
+        return;
+    }
+    let received = runner.ports[ring].received.len();
+    for drive in check.drives.clone() {
+        for address in (address..=u16::MAX).take(size) {
+            // The sum of the address passes through BusAddr (FF36) of every drive: a telegram that asks for it
+            // changes it.
+            if address == nd21::ram::BUS_ADDR {
+                continue;
+            }
+            let read = exchange(runner.link, ring, drive, Command::ReadByte { address });
+            if let Some([byte]) = read.as_deref() {
+                runner.own.seen.insert((ring, drive, address), *byte);
+                runner.own.answers.insert((ring, drive));
             }
         }
-        self.ports[ring].received.truncate(received);
-        self.line_before = self.line_before.max(self.link.now());
     }
+    runner.ports[ring].received.truncate(received);
+    runner.line_before = runner.line_before.max(runner.link.now());
 }
 
 /// Sends a command to a drive and returns the data of its answer; `None` if the answer is not as in ND21 10.1 and 10.2.

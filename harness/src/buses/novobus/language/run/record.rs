@@ -40,67 +40,71 @@ impl Recorder {
     }
 }
 
-impl Runner<'_> {
-    /// Begins or ends records. A cell has one record at a time.
-    pub(crate) fn record(&mut self, record: &PlannedRecord) {
-        for drive in record.drives.clone() {
-            let recorder = &mut self.own.recorder;
-            recorder.running.retain(|(index, _)| {
-                let other = &recorder.records[*index];
-                (other.ring, other.drive, other.address) != (record.ring, drive, record.address)
-            });
-            let every = match record.looks {
-                PlannedLooks::Off => continue,
-                PlannedLooks::Every(every) => Some(every),
-                PlannedLooks::Changes => None,
-            };
-            recorder
-                .running
-                .push((recorder.records.len(), self.link.now()));
-            recorder.records.push(CellRecord {
-                ring: record.ring,
-                drive,
-                name: record.name.clone(),
-                address: record.address,
-                size: record.size,
-                scale: record.scale,
-                units: self.plan.units(record.ring, drive),
-                every,
-                samples: Vec::new(),
-            });
-        }
-        self.note();
+/// Begins or ends records. A cell has one record at a time.
+pub(crate) fn record(runner: &mut Runner<'_>, record: &PlannedRecord) {
+    for drive in record.drives.clone() {
+        let recorder = &mut runner.own.recorder;
+        recorder.running.retain(|(index, _)| {
+            let other = &recorder.records[*index];
+            (other.ring, other.drive, other.address) != (record.ring, drive, record.address)
+        });
+        let every = match record.looks {
+            PlannedLooks::Off => continue,
+            PlannedLooks::Every(every) => Some(every),
+            PlannedLooks::Changes => None,
+        };
+        recorder
+            .running
+            .push((recorder.records.len(), runner.link.now()));
+        recorder.records.push(CellRecord {
+            ring: record.ring,
+            drive,
+            name: record.name.clone(),
+            address: record.address,
+            size: record.size,
+            scale: record.scale,
+            units: runner.plan.units(record.ring, drive),
+            every,
+            samples: Vec::new(),
+        });
     }
+    note(runner);
+}
 
-    /// Samples the cells that are due.
-    pub(crate) fn note(&mut self) {
-        let now = self.link.now();
-        if self.own.recorder.next() > now {
-            return;
+/// Samples the cells that are due.
+pub(crate) fn note(runner: &mut Runner<'_>) {
+    let now = runner.link.now();
+    if runner.own.recorder.next() > now {
+        return;
+    }
+    runner.own.recorder.count_look();
+    for place in 0..runner.own.recorder.running.len() {
+        let (index, at) = runner.own.recorder.running[place];
+        if at > now {
+            continue;
         }
-        self.own.recorder.count_look();
-        for place in 0..self.own.recorder.running.len() {
-            let (index, at) = self.own.recorder.running[place];
-            if at > now {
-                continue;
-            }
-            let record = &self.own.recorder.records[index];
-            let step = record.every.unwrap_or(LOOK);
-            let found = self.bytes(record.ring, record.drive, record.address, record.size);
-            let next = at + step;
-            self.own.recorder.running[place].1 = if next > now { next } else { now + step };
-            // A cell that the link does not show gets no sample.
-            let Some(found) = found else { continue };
-            let sample = Sample::new(now, &found);
-            let record = &mut self.own.recorder.records[index];
-            let same = record
-                .samples
-                .last()
-                .is_some_and(|last| last.bytes() == sample.bytes());
-            if record.every.is_some() || !same {
-                record.samples.push(sample);
-                self.own.recorder.samples += 1;
-            }
+        let record = &runner.own.recorder.records[index];
+        let step = record.every.unwrap_or(LOOK);
+        let found = super::look::bytes(
+            runner,
+            record.ring,
+            record.drive,
+            record.address,
+            record.size,
+        );
+        let next = at + step;
+        runner.own.recorder.running[place].1 = if next > now { next } else { now + step };
+        // A cell that the link does not show gets no sample.
+        let Some(found) = found else { continue };
+        let sample = Sample::new(now, &found);
+        let record = &mut runner.own.recorder.records[index];
+        let same = record
+            .samples
+            .last()
+            .is_some_and(|last| last.bytes() == sample.bytes());
+        if record.every.is_some() || !same {
+            record.samples.push(sample);
+            runner.own.recorder.samples += 1;
         }
     }
 }

@@ -146,131 +146,138 @@ pub(crate) fn difference(
     }
 }
 
-impl Runner<'_> {
-    /// What the header lets happen; and a fault at a byte, which is armed from the start, wherever its line stands: its byte is counted
-    /// from the start too.
-    pub(crate) fn begin(&mut self) -> Result<(), Stop> {
-        let plan = self.plan;
-        for (ring, drives, influence) in plan.influences() {
-            influence.act(self.link, ring, drives);
-        }
-        for step in &plan.steps {
-            if let PlannedAction::Own(RingAct::Fault(
-                ring,
-                fault,
-                moment @ (Moment::Byte(_) | Moment::At(_)),
-            )) = step.action
-            {
-                self.place = step.span;
-                self.link.inject(ring, fault, moment);
-                self.halted()?;
-            }
-        }
-        Ok(())
+/// What the header lets happen; and a fault at a byte, which is armed from the start, wherever its line stands: its byte is counted
+/// from the start too.
+pub(crate) fn begin(runner: &mut Runner<'_>) -> Result<(), Stop> {
+    let plan = runner.plan;
+    for (ring, drives, influence) in plan.influences() {
+        influence.act(runner.link, ring, drives);
     }
-
-    /// Plays a step of this bus.
-    pub(crate) fn act_of_ring(&mut self, act: &RingAct, step: &PlannedStep) -> Result<(), Stop> {
-        match act {
-            RingAct::Fault(ring, fault, Moment::Now) => {
-                // With a time in front it is the byte at that time, without one the first byte of the lines behind.
-                let moment = match step.when {
-                    PlannedWhen::Now => Moment::Now,
-                    _ => Moment::At(self.link.now()),
-                };
-                self.link.inject(*ring, *fault, moment);
-                Ok(())
-            }
-            RingAct::Fault(..) => Ok(()),
-            RingAct::Influence(ring, drives, influence) => {
-                influence.act(self.link, *ring, drives.clone());
-                Ok(())
-            }
-            RingAct::Record(record) => {
-                self.record(record);
-                Ok(())
-            }
-            RingAct::Until(check, within) => self.until(check, *within, step.span),
-            RingAct::Check(check) => {
-                if step.when == PlannedWhen::Now {
-                    self.settle();
-                    self.line_before = self.line_before.max(self.link.now());
-                }
-                let result = self.check(check, step.when != PlannedWhen::Now, step.span);
-                self.own.sent = 0;
-                result
-            }
-            RingAct::Telegram(ring, bytes, expected, reading) => {
-                self.own.by_hand(*ring);
-                self.settle();
-                let asked = self.nothing_unasked(step.span);
-                if asked.is_err() && self.stops_at_mismatch() {
-                    return asked;
-                }
-                self.forget(*ring);
-                self.transmit(*ring, bytes);
-                asked
-                    .and(self.expect(step.span, *ring, expected, None))
-                    .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
-            }
-            RingAct::Recover(ring) => self.recover(*ring, step.span),
-            RingAct::Master(ring, calls, once) => self.master(*ring, calls, *once, step.span),
-            RingAct::Count(ring, drives) => self.count(*ring, *drives, step.span),
+    for step in &plan.steps {
+        if let PlannedAction::Own(RingAct::Fault(
+            ring,
+            fault,
+            moment @ (Moment::Byte(_) | Moment::At(_)),
+        )) = step.action
+        {
+            runner.place = step.span;
+            runner.link.inject(ring, fault, moment);
+            runner.halted()?;
         }
     }
+    Ok(())
+}
 
-    /// ND21 9.8: 17 zeros and the five bytes; they must come back.
-    fn recover(&mut self, ring: usize, span: TextSpan) -> Result<(), Stop> {
-        self.settle();
-        let before = self.own.corrected;
-        self.transmit(ring, &CHECK_SEQUENCE);
-        self.settle();
-        self.forget(ring);
-        self.line_before = self.link.now();
-        if self.own.corrected > before {
-            return Ok(());
+/// Plays a step of this bus.
+pub(crate) fn act_of_ring(
+    runner: &mut Runner<'_>,
+    act: &RingAct,
+    step: &PlannedStep,
+) -> Result<(), Stop> {
+    match act {
+        RingAct::Fault(ring, fault, Moment::Now) => {
+            // With a time in front it is the byte at that time, without one the first byte of the lines behind.
+            let moment = match step.when {
+                PlannedWhen::Now => Moment::Now,
+                _ => Moment::At(runner.link.now()),
+            };
+            runner.link.inject(*ring, *fault, moment);
+            Ok(())
         }
-        Err(Stop::failed(
-            span,
-            "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
-        ))
+        RingAct::Fault(..) => Ok(()),
+        RingAct::Influence(ring, drives, influence) => {
+            influence.act(runner.link, *ring, drives.clone());
+            Ok(())
+        }
+        RingAct::Record(record) => {
+            super::record::record(runner, record);
+            Ok(())
+        }
+        RingAct::Until(check, within) => super::drives::until(runner, check, *within, step.span),
+        RingAct::Check(check) => {
+            if step.when == PlannedWhen::Now {
+                runner.settle();
+                runner.line_before = runner.line_before.max(runner.link.now());
+            }
+            let result =
+                super::check::check(runner, check, step.when != PlannedWhen::Now, step.span);
+            runner.own.sent = 0;
+            result
+        }
+        RingAct::Telegram(ring, bytes, expected, reading) => {
+            runner.own.by_hand(*ring);
+            runner.settle();
+            let asked = runner.nothing_unasked(step.span);
+            if asked.is_err() && runner.stops_at_mismatch() {
+                return asked;
+            }
+            runner.forget(*ring);
+            runner.transmit(*ring, bytes);
+            asked
+                .and(runner.expect(step.span, *ring, expected, None))
+                .and_then(|()| {
+                    super::drives::read(runner, *ring, expected.len(), reading.as_ref(), step.span)
+                })
+        }
+        RingAct::Recover(ring) => recover(runner, *ring, step.span),
+        RingAct::Master(ring, calls, once) => {
+            super::master::master(runner, *ring, calls, *once, step.span)
+        }
+        RingAct::Count(ring, drives) => super::master::count(runner, *ring, *drives, step.span),
     }
+}
 
-    /// Whether fewer bytes have come round a ring than were sent into it, PAUSE left out (9.1, 9.2).
-    pub(crate) fn lacks_answers(&self) -> bool {
-        let mut rings = self.own.rings.iter().zip(&self.ports);
-        rings.any(|(ring, port)| {
-            let answered = ring.sent.iter().filter(|(byte, _)| *byte != PAUSE);
-            port.received.len() < answered.count()
-        })
+/// ND21 9.8: 17 zeros and the five bytes; they must come back.
+fn recover(runner: &mut Runner<'_>, ring: usize, span: TextSpan) -> Result<(), Stop> {
+    runner.settle();
+    let before = runner.own.corrected;
+    runner.transmit(ring, &CHECK_SEQUENCE);
+    runner.settle();
+    runner.forget(ring);
+    runner.line_before = runner.link.now();
+    if runner.own.corrected > before {
+        return Ok(());
     }
+    Err(Stop::failed(
+        span,
+        "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
+    ))
+}
 
-    /// The drives in the error mode, in ring order.
-    pub(crate) fn in_error(&self) -> String {
-        let mut named = Vec::new();
-        for ring in 0..self.ports.len() {
-            for drive in (0..self.link.drives(ring)).rev() {
-                if let Some(Some(error)) = self.link.error_of(ring, drive) {
-                    let prefix = if ring == 0 { "" } else { "2:" };
-                    named.push(format!("{prefix}{drive} ({error})"));
-                }
+/// Whether fewer bytes have come round a ring than were sent into it, PAUSE left out (9.1, 9.2).
+pub(crate) fn lacks_answers(runner: &Runner<'_>) -> bool {
+    let mut rings = runner.own.rings.iter().zip(&runner.ports);
+    rings.any(|(ring, port)| {
+        let answered = ring.sent.iter().filter(|(byte, _)| *byte != PAUSE);
+        port.received.len() < answered.count()
+    })
+}
+
+/// The drives in the error mode, in ring order.
+pub(crate) fn in_error(runner: &Runner<'_>) -> String {
+    let mut named = Vec::new();
+    for ring in 0..runner.ports.len() {
+        for drive in (0..runner.link.drives(ring)).rev() {
+            if let Some(Some(error)) = runner.link.error_of(ring, drive) {
+                let prefix = if ring == 0 { "" } else { "2:" };
+                named.push(format!("{prefix}{drive} ({error})"));
             }
         }
-        let more = named.len().saturating_sub(NAMED);
-        named.truncate(NAMED);
-        if more > 0 {
-            named.push(format!("and {more} more"));
-        }
-        named.join(", ")
     }
+    let more = named.len().saturating_sub(NAMED);
+    named.truncate(NAMED);
+    if more > 0 {
+        named.push(format!("and {more} more"));
+    }
+    named.join(", ")
+}
 
-    /// Adds to a finding what has been received meanwhile.
-    pub(crate) fn complete(&self, finding: &mut Mismatch) {
-        if let Some(difference) = &mut finding.difference {
-            let first = difference.byte - 1 - difference.index;
-            let wanted = difference.expected.len().max(1);
-            let received = self.ports[difference.ring].received.iter();
-            difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
-        }
+/// Adds to a finding what has been received meanwhile.
+pub(crate) fn complete(runner: &Runner<'_>, finding: &mut Mismatch) {
+    if let Some(difference) = &mut finding.difference {
+        let first = difference.byte - 1 - difference.index;
+        let wanted = difference.expected.len().max(1);
+        let received = runner.ports[difference.ring].received.iter();
+        difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
     }
 }

@@ -19,56 +19,54 @@ use std::ops::RangeInclusive;
 const PATIENCE: Span = Span::from_millis(1_000);
 const LOOK: Span = Span::from_millis(10);
 
-impl Runner<'_> {
-    /// Looks at the links around drives, where the link itself does not show their error mode.
-    pub(crate) fn tap(&mut self, ring: usize, drives: RangeInclusive<u8>) {
-        let size = self.link.drives(ring);
-        let listens = |own: &Self, drive: u8| {
-            let place = usize::from(size.saturating_sub(drive));
-            drive < size
-                && [place - 1, place]
-                    .iter()
-                    .all(|p| own.link.listens(ring, *p))
-        };
-        self.forget_answers();
-        let hidden = |own: &Self, drive: u8| own.link.error_of(ring, drive).is_none();
-        let wanted: Vec<_> = drives
-            .filter(|drive| hidden(self, *drive) && listens(self, *drive))
-            .collect();
-        if wanted.is_empty() {
-            return;
-        }
-        self.settle();
-        for drive in wanted {
-            let place = usize::from(size - drive);
-            let columns = [place - 1, place].map(|place| self.column(ring, place));
-            if let [Some(input), Some(output)] = columns
-                && let Some(shown) = shown(&input, &output)
-            {
-                self.own.tapped.insert((ring, drive), shown);
-            }
+/// Looks at the links around drives, where the link itself does not show their error mode.
+pub(crate) fn tap(runner: &mut Runner<'_>, ring: usize, drives: RangeInclusive<u8>) {
+    let size = runner.link.drives(ring);
+    let listens = |own: &Runner<'_>, drive: u8| {
+        let place = usize::from(size.saturating_sub(drive));
+        drive < size
+            && [place - 1, place]
+                .iter()
+                .all(|p| own.link.listens(ring, *p))
+    };
+    super::over_bus::forget_answers(runner);
+    let hidden = |own: &Runner<'_>, drive: u8| own.link.error_of(ring, drive).is_none();
+    let wanted: Vec<_> = drives
+        .filter(|drive| hidden(runner, *drive) && listens(runner, *drive))
+        .collect();
+    if wanted.is_empty() {
+        return;
+    }
+    runner.settle();
+    for drive in wanted {
+        let place = usize::from(size - drive);
+        let columns = [place - 1, place].map(|place| column(runner, ring, place));
+        if let [Some(input), Some(output)] = columns
+            && let Some(shown) = shown(&input, &output)
+        {
+            runner.own.tapped.insert((ring, drive), shown);
         }
     }
+}
 
-    /// What a link has carried. The port of a tap may be slower than that of the ring: each link carries as many bytes as have come round.
-    fn column(&mut self, ring: usize, place: usize) -> Option<Vec<Received>> {
-        let round = self.ports.get(ring).map_or(0, |own| own.received.len());
-        let end = self.link.now() + PATIENCE;
-        loop {
-            let column = self.link.tapped(ring, place)?;
-            let now = self.link.now();
-            if column.len() >= round || now >= end || self.full.is_some() {
-                return Some(column);
-            }
-            self.wait(end.min(now + LOOK));
+/// What a link has carried. The port of a tap may be slower than that of the ring: each link carries as many bytes as have come round.
+fn column(runner: &mut Runner<'_>, ring: usize, place: usize) -> Option<Vec<Received>> {
+    let round = runner.ports.get(ring).map_or(0, |own| own.received.len());
+    let end = runner.link.now() + PATIENCE;
+    loop {
+        let column = runner.link.tapped(ring, place)?;
+        let now = runner.link.now();
+        if column.len() >= round || now >= end || runner.full.is_some() {
+            return Some(column);
         }
+        runner.wait(end.min(now + LOOK));
     }
+}
 
-    /// The error mode of a drive, as the link or its taps show it.
-    pub(crate) fn shown_error(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        let tapped = || self.own.tapped.get(&(ring, drive)).copied();
-        self.link.error_of(ring, drive).or_else(tapped)
-    }
+/// The error mode of a drive, as the link or its taps show it.
+pub(crate) fn shown_error(runner: &Runner<'_>, ring: usize, drive: u8) -> Option<Option<BusError>> {
+    let tapped = || runner.own.tapped.get(&(ring, drive)).copied();
+    runner.link.error_of(ring, drive).or_else(tapped)
 }
 
 /// The error of a drive that received and sent these bytes since it waited for a sync byte: `Some(None)` where it is not in the error mode,
