@@ -7,7 +7,6 @@ use super::record::{RecordLine, RunPart, capabilities};
 use crate::buses::rings::rig::limits;
 use crate::buses::twin::Exactness;
 use crate::buses::{SimulatedLink, judge_of};
-use crate::guard::Limits;
 use crate::link::Capability;
 use crate::medium::ErrorMarks;
 use crate::rig::file::{Endpoint, Transport};
@@ -16,6 +15,7 @@ use crate::rig::segment::OnSegment;
 use crate::rig::{Rig, Way, line_rate};
 use crate::scenario::run::sizes;
 use harness_proto::line::Rate;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 
 /// What a record is judged by.

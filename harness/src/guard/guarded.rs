@@ -110,7 +110,7 @@ impl<L: Line> Guarded<L> {
         self.trouble().is_none() && self.gates.iter().all(|gate| gate.at_rest())
     }
 
-    /// After a denial: lets permitted pieces pass again, for the [safe state](super::safe_state).
+    /// After a denial: lets permitted pieces pass again, for the safe state.
     pub fn reset_after_denial(&mut self) {
         if !matches!(self.trouble, Some(Trouble::Interlock(_))) {
             self.trouble = None;
@@ -120,7 +120,7 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Lets nothing stop the way to a [safe state](super::safe_state): no watch, no deadline, no number of pieces. Trouble from an
+    /// Lets nothing stop the way to a safe state: no watch, no deadline, no number of pieces. Trouble from an
     /// interlock is cleared.
     pub fn clear_the_way(&mut self) {
         self.watch = None;

@@ -13,9 +13,6 @@ mod safe;
 mod standstill;
 mod watch;
 
-pub use crate::buses::rings::guard::{
-    Denial, Found, Guard, Limits, Need, NotSafe, SafeConfirmation, blind_stop, safe_state,
-};
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
 pub(crate) use guarded::OVERDUE;

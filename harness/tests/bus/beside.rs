@@ -1,12 +1,13 @@
 //! What stands beside a bus, and a record that does not show it.
 
 use harness::buses::SimulatedLink;
+use harness::buses::novobus::gate::guard_rings;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::evidence::RecordLine as Written;
-use harness::guard::{Guarded, Limits};
 use harness::link::{Line as _, Link, LinkEvent, Recording, Replay};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::bench::Bench;
@@ -29,7 +30,7 @@ fn only_a_recording_of_a_rig_hides_the_simulation() {
         cell.is_some()
     };
     assert!(sees(&link()));
-    let mut guarded = Guarded::new(link(), Limits::default());
+    let mut guarded = guard_rings(link(), Limits::default());
     assert!(sees(&guarded));
     let mut events = Vec::new();
     assert!(sees(&Recording::whole(&mut guarded, &mut events)));

@@ -181,15 +181,21 @@ pub fn guarded<L: Link>(
     Guarded::behind(inner, vec![Box::new(gate)], capabilities)
 }
 
-impl<L: Line> Guarded<L> {
+/// A line behind the gate of NORDAC inverters.
+pub(crate) trait GuardsSlaves {
     /// What the gate of a line of NORDAC inverters knows, if this line has one.
-    #[must_use]
-    pub fn slaves(&self) -> Option<&guard::Gate> {
+    fn slaves(&self) -> Option<&guard::Gate>;
+
+    /// The same, to tell it what was read.
+    fn slaves_mut(&mut self) -> Option<&mut guard::Gate>;
+}
+
+impl<L: Line> GuardsSlaves for Guarded<L> {
+    fn slaves(&self) -> Option<&guard::Gate> {
         self.gate::<LineGate>(0).map(|own| &own.gate)
     }
 
-    /// The same, to tell it what was read.
-    pub fn slaves_mut(&mut self) -> Option<&mut guard::Gate> {
+    fn slaves_mut(&mut self) -> Option<&mut guard::Gate> {
         self.gate_mut::<LineGate>(0).map(|own| &mut own.gate)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::rig::talk::{Talk, TalkError};
 use super::rig::{MASTER, RigSlave};
+use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
 use harness_proto::nordac::master::{ExchangeError, StartError};

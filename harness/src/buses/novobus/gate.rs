@@ -264,31 +264,50 @@ impl Gate for RingGate {
     }
 }
 
-impl<L: Link> Guarded<L> {
-    /// A guarded link of rings, in doubt until it was [synchronised](Self::synchronise). What the limits deny is no capability of it.
-    pub fn new(inner: L, limits: Limits) -> Self {
-        // A link has one ring or two; a ring that it does not have has no drives.
-        let size = |ring: usize| RingSize::new(inner.drives(ring).into()).ok();
-        let gates = (0..2)
-            .map_while(|ring| Some(Box::new(RingGate::new(ring, size(ring)?, limits)) as _))
-            .collect();
-        let has = |capability: &Capability| match capability {
-            Capability::Motion => limits.motion,
-            Capability::Eeprom => limits.eeprom,
-            // A reset ends block and stop (ND21 11.8).
-            Capability::Reset => limits.reset && limits.motion,
-            _ => true,
-        };
-        let own = inner.capabilities().iter().copied();
-        let capabilities = own.filter(has).collect();
-        Self::behind(inner, gates, capabilities)
-    }
+/// A guarded link of rings, in doubt until it was [synchronised](GuardsRings::synchronise). What the limits deny is no capability of it.
+pub fn guard_rings<L: Link>(inner: L, limits: Limits) -> Guarded<L> {
+    // A link has one ring or two; a ring that it does not have has no drives.
+    let size = |ring: usize| RingSize::new(inner.drives(ring).into()).ok();
+    let gates = (0..2)
+        .map_while(|ring| Some(Box::new(RingGate::new(ring, size(ring)?, limits)) as _))
+        .collect();
+    let has = |capability: &Capability| match capability {
+        Capability::Motion => limits.motion,
+        Capability::Eeprom => limits.eeprom,
+        // A reset ends block and stop (ND21 11.8).
+        Capability::Reset => limits.reset && limits.motion,
+        _ => true,
+    };
+    let own = inner.capabilities().iter().copied();
+    let capabilities = own.filter(has).collect();
+    Guarded::behind(inner, gates, capabilities)
 }
 
-impl<L: Line> Guarded<L> {
+/// A line behind the gates of rings.
+pub trait GuardsRings {
     /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
     /// it commands pass, as far as they are allowed.
-    pub fn synchronise(&mut self) {
+    fn synchronise(&mut self);
+
+    /// What it allows; nothing without a ring.
+    fn limits(&self) -> Limits;
+
+    /// The rings.
+    fn sizes(&self) -> Vec<RingSize>;
+
+    /// What may have changed in drives since the last call.
+    fn take_touched(&mut self) -> BTreeSet<(Axis, Touched)>;
+
+    /// Learns what was read of a drive.
+    fn learn_of(&mut self, axis: Axis, learn: impl FnOnce(&mut Guard, u8));
+}
+
+fn rings<L: Line>(line: &Guarded<L>) -> impl Iterator<Item = &RingGate> {
+    (0..2).map_while(|ring| line.gate(ring))
+}
+
+impl<L: Line> GuardsRings for Guarded<L> {
+    fn synchronise(&mut self) {
         for (ring, size) in self.sizes().into_iter().enumerate() {
             let sent = self.send_octets(ring, &CHECK_SEQUENCE);
             let end = sent + self.byte_time() * (u64::from(size.drives()) + 8);
@@ -297,24 +316,17 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    fn rings(&self) -> impl Iterator<Item = &RingGate> {
-        (0..2).map_while(|ring| self.gate(ring))
-    }
-
-    /// What it allows; nothing without a ring.
-    pub(crate) fn limits(&self) -> Limits {
-        self.rings()
+    fn limits(&self) -> Limits {
+        rings(self)
             .next()
             .map_or_else(Limits::default, |gate| gate.limits)
     }
 
-    /// The rings.
-    pub(crate) fn sizes(&self) -> Vec<RingSize> {
-        self.rings().map(|gate| gate.size).collect()
+    fn sizes(&self) -> Vec<RingSize> {
+        rings(self).map(|gate| gate.size).collect()
     }
 
-    /// What may have changed in drives since the last call.
-    pub(crate) fn take_touched(&mut self) -> BTreeSet<(Axis, Touched)> {
+    fn take_touched(&mut self) -> BTreeSet<(Axis, Touched)> {
         let mut all = BTreeSet::new();
         for ring in 0..2 {
             let Some(gate) = self.gate_mut::<RingGate>(ring) else {
@@ -328,8 +340,7 @@ impl<L: Line> Guarded<L> {
         all
     }
 
-    /// Learns what was read of a drive.
-    pub(crate) fn learn_of(&mut self, axis: Axis, learn: impl FnOnce(&mut Guard, u8)) {
+    fn learn_of(&mut self, axis: Axis, learn: impl FnOnce(&mut Guard, u8)) {
         let Some(gate) = self.gate_mut::<RingGate>(axis.ring()) else {
             return;
         };

@@ -187,15 +187,21 @@ pub fn guarded<L: Link>(
     Guarded::behind(inner, vec![Box::new(gate)], capabilities)
 }
 
-impl<L: Line> Guarded<L> {
-    /// The gate of a segment, if this line has one.
-    #[must_use]
-    pub fn segment(&self) -> Option<&guard::Gate> {
+/// A line behind the gate of a segment.
+pub(crate) trait GuardsSegment {
+    /// What the gate of a segment knows, if this line has one.
+    fn segment(&self) -> Option<&guard::Gate>;
+
+    /// The same, to tell it what was read.
+    fn segment_mut(&mut self) -> Option<&mut guard::Gate>;
+}
+
+impl<L: Line> GuardsSegment for Guarded<L> {
+    fn segment(&self) -> Option<&guard::Gate> {
         self.gate::<SegmentGate>(0).map(SegmentGate::known)
     }
 
-    /// The same, to tell it what was read.
-    pub fn segment_mut(&mut self) -> Option<&mut guard::Gate> {
+    fn segment_mut(&mut self) -> Option<&mut guard::Gate> {
         self.gate_mut::<SegmentGate>(0).map(SegmentGate::known_mut)
     }
 }

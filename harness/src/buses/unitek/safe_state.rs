@@ -3,6 +3,7 @@
 use super::driver::{Driver, Error};
 use super::rig::Axis;
 use super::whereabouts::{Search, still_sent};
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::guard::{Guarded, Safe, Standstill, StandstillStep};
 use crate::link::Line;
 use crate::medium::Medium;

@@ -1,5 +1,6 @@
 //! Where a drive is whose identifiers were written (68 and 69, UNITEK 3.1), and its way back to those of the rig's file.
 
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::guard::Guarded;
 use crate::link::Line;
 use crate::medium::{Heard, Out};

@@ -11,9 +11,9 @@ use crate::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
 use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::explore::ExploreError;
-use crate::guard::Limits;
 use crate::regular::{self, Links};
 use crate::rig::{Rig, UseOptions};
+use harness_proto::novobus::guard::Limits;
 use std::path::Path;
 
 /// The largest file of a corpus.

@@ -15,10 +15,10 @@ use crate::command::fuzz::tell;
 use crate::command::output::Output;
 use crate::command::page::writable;
 use crate::explore::{Planted, Spiced as _, read_as, rig_of};
-use crate::guard::Limits;
 use crate::partition::Partition;
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::problem::nearest;
+use harness_proto::novobus::guard::Limits;
 
 /// A deviation of a drive, which a bus must have.
 pub(super) fn planted(text: &str) -> Result<Planted, String> {

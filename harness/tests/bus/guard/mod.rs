@@ -8,11 +8,13 @@ mod trouble;
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Axis, OpenRings, Options};
-use harness::guard::{Guarded, Limits};
+use harness::buses::novobus::gate::{GuardsRings as _, guard_rings};
+use harness::guard::Guarded;
 use harness::link::Link;
 use harness_proto::line::Rate;
 use harness_proto::nd21::io::Input;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::properties::Properties;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
 use harness_sim::novobus::bench::Bench;
@@ -47,7 +49,7 @@ fn link(drives: u64) -> SimulatedLink {
 
 /// The same behind a guard, synchronised.
 fn guarded(drives: u64, limits: Limits) -> Guarded<SimulatedLink> {
-    let mut guarded = Guarded::new(link(drives), limits);
+    let mut guarded = guard_rings(link(drives), limits);
     guarded.synchronise();
     assert_eq!(guarded.drives(0), size(drives).drives());
     guarded

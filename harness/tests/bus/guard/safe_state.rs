@@ -3,12 +3,15 @@
 use super::{axis, bus, guarded, ring, size};
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::OpenRings;
+use harness::buses::novobus::gate::guard_rings;
+use harness::buses::novobus::guard::{SafeConfirmation, blind_stop, safe_state};
 use harness::buses::novobus::link::BesideTheBus as _;
-use harness::guard::{Guarded, Limits, SafeConfirmation, Standstill, blind_stop, safe_state};
+use harness::guard::{Guarded, Standstill};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
 use harness_sim::novobus::bench::Bench;
@@ -188,7 +191,7 @@ fn a_motion_of_the_positioning_controller_ends() {
 #[test]
 fn two_rings() {
     let bench = Bench::two(ring(1), ring(3));
-    let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
+    let mut line = guard_rings(SimulatedLink::new(bench), Limits::default());
     let rings = [size(1), size(3)];
     line.assume_fresh();
     for ring in 0..2 {
@@ -217,7 +220,7 @@ fn two_rings() {
 fn plain_drives_are_not_confirmed() {
     let plain = |_| Drive::Plain(PlainDrive::new(Properties::default(), [0; 256]));
     let bench = Bench::one(Ring::new(size(2), Rate::Baud38400, plain));
-    let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
+    let mut line = guard_rings(SimulatedLink::new(bench), Limits::default());
     let begin = line.now();
     let SafeConfirmation::NotConfirmed(drives) =
         safe_state(&mut line, &[size(2)], &Standstill::default())

@@ -3,9 +3,10 @@
 use super::{axis, bus, guarded, link, size};
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Error, OpenRings, count_drives, recover};
+use harness::buses::novobus::gate::guard_rings;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::buses::novobus::simulate::simulated;
-use harness::guard::{Guarded, Limits};
+use harness::guard::Guarded;
 use harness::library::Entry;
 use harness::link::{Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble};
 use harness::scenario::run::run;
@@ -13,6 +14,7 @@ use harness::scenario::source::Source;
 use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::time::Span;
 use harness_sim::fault::Flips;
@@ -119,7 +121,7 @@ const CALLS: &[(&str, Call, &str)] = &[
 fn the_driver_s_functions_in_their_classes() {
     for (name, call, needs) in CALLS {
         // Without the error 0504 of a recovery, which some of them would ask for first.
-        let mut line = Guarded::new(link(2), Limits::default());
+        let mut line = guard_rings(link(2), Limits::default());
         line.assume_fresh();
         let result = {
             let bus = bus(&mut line, 2);
@@ -318,7 +320,7 @@ fn faults_that_nobody_can_judge() {
 
 #[test]
 fn capabilities_follow_the_limits() {
-    let has = |limits| Guarded::new(link(1), limits).capabilities().to_vec();
+    let has = |limits| guard_rings(link(1), limits).capabilities().to_vec();
     let denied = [Capability::Motion, Capability::Eeprom, Capability::Reset];
     let none = has(Limits::default());
     assert!(denied.iter().all(|capability| !none.contains(capability)));
@@ -376,7 +378,7 @@ fn corpus(limits: Limits) -> Vec<(String, Option<String>)> {
         let Some(plan) = entry.plan.as_ref() else {
             continue;
         };
-        let mut line: Guarded<SimulatedLink> = Guarded::new(simulated(plan), limits);
+        let mut line: Guarded<SimulatedLink> = guard_rings(simulated(plan), limits);
         line.assume_fresh();
         let _verdict = run(plan, &mut line);
         let denied = line.trouble().map(ToString::to_string);

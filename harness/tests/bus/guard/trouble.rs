@@ -2,10 +2,10 @@
 //! notice it.
 
 use super::link;
+use harness::buses::novobus::gate::guard_rings;
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::run::over_bus::play_over_bus;
 use harness::buses::novobus::simulate::bench;
-use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{
     Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
@@ -15,6 +15,7 @@ use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::guard::Limits;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 
@@ -30,7 +31,7 @@ fn plan(text: &str) -> Plan {
 /// Plays on a guarded link, and again from what was recorded.
 fn guarded(text: &str, limits: Limits) -> Outcome {
     let plan = plan(text);
-    let mut line = Guarded::new(bench(&plan), limits);
+    let mut line = guard_rings(bench(&plan), limits);
     line.assume_fresh();
     twice(&plan, &mut line)
 }
@@ -91,7 +92,7 @@ fn a_denial_is_noticed_at_the_line_that_it_meets() {
     aborts("ring 2\nwrite-word 1 nsoll = 0400\n", "`allow_motion`");
     // A cell of the header, before the first step.
     let plan = plan("ring 2\ndrive 1 memory FF08 = 04\n> 80\n");
-    let mut line = Guarded::new(link(2), none());
+    let mut line = guard_rings(link(2), none());
     line.assume_fresh();
     ends(&twice(&plan, &mut line), Verdict::Aborted, "`allow_motion`");
 }

@@ -8,6 +8,7 @@ use super::act::{Counts, TelegramActKind};
 use super::generate::TelegramSpice;
 use super::oracle::TelegramDifference;
 use super::{TelegramTalk, TelegramsSeen};
+use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::judge::{Breach, judge_runs};
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::rig::{Inverters, Session, limits, slaves};

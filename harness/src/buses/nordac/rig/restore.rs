@@ -8,6 +8,7 @@ use super::known::{ADDRESS, INTERFACE, Known, PPO_TYPE, WIPES, answer, value};
 use super::observed::Written;
 use super::player::{Begun, Player, idle};
 use super::talk::{Talk, TalkError};
+use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::safe_state::{found, last_words};
 use crate::buses::nordac::value::shown;
 use crate::guard::Guarded;

@@ -4,6 +4,7 @@ use super::interlock::InverterInterlocks;
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
 use crate::buses::nordac::cli::Parked;
+use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;

@@ -6,12 +6,12 @@ use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of};
-use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::wrong_parity;
 use crate::rig::{Rig, Run, Session, UseOptions};
 use crate::signals::interrupt_flag;
+use harness_proto::novobus::guard::Limits;
 
 /// Opens a rig with ports, works on it, and gives it back in its safe state.
 pub(crate) fn on_ports(

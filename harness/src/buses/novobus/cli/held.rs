@@ -1,6 +1,7 @@
 //! Rings that a session holds.
 
 use super::rig::OpenBench;
+use crate::buses::novobus::gate::GuardsRings as _;
 use crate::buses::novobus::language::plan::{Plan, PlannedStep, RingAct};
 use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;

@@ -9,6 +9,7 @@ use super::play::MasterView;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::explore::features;
 use crate::buses::novobus::explore::{Rehearsal, Tried};
+use crate::buses::novobus::gate::guard_rings;
 use crate::buses::novobus::language::run::over_bus::monitors;
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::buses::novobus::link::BesideTheBus;
@@ -16,7 +17,7 @@ use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::SILENCED;
 use crate::explore::ExploreError;
 use crate::explore::Target;
-use crate::guard::{Guarded, OVERDUE};
+use crate::guard::OVERDUE;
 use crate::link::{Capability, Lead, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::rig::{Run, examine};
 use harness_proto::line::Received;
@@ -177,7 +178,7 @@ impl OnRig<'_, '_> {
 
 impl Target<Case> for OnRig<'_, '_> {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
-        let mut link = Guarded::new(self.model.clone(), self.limits);
+        let mut link = guard_rings(self.model.clone(), self.limits);
         link.know_as(self.run.session().guarded());
         let way = self.run.way();
         if !self.limits.allow_everything() {

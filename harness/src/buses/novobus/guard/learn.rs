@@ -1,6 +1,7 @@
 //! What a guard has to know of drives, read from them.
 
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, Width};
+use crate::buses::novobus::gate::GuardsRings as _;
 use crate::guard::Guarded;
 use crate::link::Line;
 use harness_proto::nd21::{ee, ram};
@@ -23,45 +24,43 @@ const CELLS: [(u16, Width); 9] = [
     (ram::DATA_IN, Width::Byte),
 ];
 
-impl<L: Line> Guarded<L> {
-    /// Reads from every drive at which speeds it would turn, so that the guard can hold it to `max_speed`: the range of speeds,
-    /// `nsoll` and its source, the speeds of positioning and referencing, `DataIn`; where resets are allowed, also the
-    /// configuration in the EEPROM. Without a `max_speed` it is `DataIn` alone, and nothing where everything is allowed or where motors
-    /// must not turn: process data need that they may.
-    ///
-    /// A drive that does not answer is not known: what could make it turn is denied.
-    ///
-    /// # Errors
-    /// See [`Error`]: the first drive that did not answer.
-    pub fn learn(&mut self) -> Result<(), Error> {
-        let limits = self.limits();
-        if !limits.motion || limits.allow_everything() {
-            return Ok(());
-        }
-        let sizes = self.sizes();
-        let (found, data_in) = {
-            let options = Options {
-                patience: PATIENCE,
-                ..Options::default()
-            };
-            let bus = OpenRings::open(Box::new(&mut *self), &sizes, options)?;
-            let found = match limits.max_speed {
-                Some(_) => read(&bus, limits.reset).map(|found| (found, Vec::new())),
-                None => read_data_in(&bus).map(|data_in| (Vec::new(), data_in)),
-            };
-            bus.close();
-            found?
-        };
-        for (axis, found) in found {
-            self.learn_of(axis, |guard, address| guard.learn(address, &found));
-        }
-        for (axis, data_in) in data_in {
-            self.learn_of(axis, |guard, address| {
-                guard.learn_data_in(address, data_in);
-            });
-        }
-        Ok(())
+/// Reads from every drive at which speeds it would turn, so that the guard can hold it to `max_speed`: the range of speeds,
+/// `nsoll` and its source, the speeds of positioning and referencing, `DataIn`; where resets are allowed, also the
+/// configuration in the EEPROM. Without a `max_speed` it is `DataIn` alone, and nothing where everything is allowed or where motors
+/// must not turn: process data need that they may.
+///
+/// A drive that does not answer is not known: what could make it turn is denied.
+///
+/// # Errors
+/// See [`Error`]: the first drive that did not answer.
+pub fn learn<L: Line>(line: &mut Guarded<L>) -> Result<(), Error> {
+    let limits = line.limits();
+    if !limits.motion || limits.allow_everything() {
+        return Ok(());
     }
+    let sizes = line.sizes();
+    let (found, data_in) = {
+        let options = Options {
+            patience: PATIENCE,
+            ..Options::default()
+        };
+        let bus = OpenRings::open(Box::new(&mut *line), &sizes, options)?;
+        let found = match limits.max_speed {
+            Some(_) => read(&bus, limits.reset).map(|found| (found, Vec::new())),
+            None => read_data_in(&bus).map(|data_in| (Vec::new(), data_in)),
+        };
+        bus.close();
+        found?
+    };
+    for (axis, found) in found {
+        line.learn_of(axis, |guard, address| guard.learn(address, &found));
+    }
+    for (axis, data_in) in data_in {
+        line.learn_of(axis, |guard, address| {
+            guard.learn_data_in(address, data_in);
+        });
+    }
+    Ok(())
 }
 
 fn read_data_in(bus: &OpenRings<'_>) -> Result<Vec<(Axis, u8)>, Error> {

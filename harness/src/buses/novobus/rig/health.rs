@@ -207,14 +207,15 @@ mod tests {
     use super::*;
     use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options, SpellingCause};
+    use crate::buses::novobus::gate::guard_rings;
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::buses::novobus::simulate;
-    use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
     use crate::link::{Line, LinkFault, Moment, PlacedFault};
     use crate::medium::{Heard, Medium, Out};
     use crate::scenario::source::Source;
     use harness_proto::line::Rate;
+    use harness_proto::novobus::guard::Limits;
     use harness_proto::novobus::sync::SYNCO;
     use harness_proto::time::Instant;
 
@@ -237,7 +238,7 @@ mod tests {
             let mut link = monitoring(drives, "0..last");
             link.send_octets(0, &[SYNCO]);
             link.run_until(link.now() + Span::from_millis(300));
-            let mut link = Guarded::new(link, Limits::default());
+            let mut link = guard_rings(link, Limits::default());
             link.keep_lines();
             assert!(matches!(link.error_of(0, drives - 1), Some(Some(_))));
             let health = examine(&mut link, &[size], 1).expect("a healthy ring");
@@ -275,7 +276,7 @@ mod tests {
             ("0", 1, SpellingCause::Fault),
             ("0", 2, SpellingCause::Fault),
         ] {
-            let mut link = Guarded::new(monitoring(3, monitor), Limits::unlimited());
+            let mut link = guard_rings(monitoring(3, monitor), Limits::unlimited());
             link.keep_lines();
             let _health = examine(&mut link, &[size], 1).expect("a healthy ring");
             let fault = PlacedFault::Link(usize::from(2 - drive), LinkFault::Replace(0x11));

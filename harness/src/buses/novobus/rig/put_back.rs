@@ -6,6 +6,7 @@
 
 use super::session::{Session, come_round};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, Width};
+use crate::buses::novobus::gate::GuardsRings as _;
 use crate::buses::novobus::guard::safe_state::telegram;
 use crate::guard::Guarded;
 use crate::link::{Line, Octets as _};

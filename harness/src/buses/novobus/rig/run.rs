@@ -9,6 +9,7 @@ use super::put_back::within;
 use super::session::Session;
 use super::sim;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::gate::{GuardsRings as _, guard_rings};
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::run::over_bus::{come_home, play_over_bus, start_anew};
 use crate::buses::novobus::language::syntax::Header;
@@ -365,7 +366,7 @@ impl<'s> Run<'s> {
         let rig = self.session.rig();
         // A simulated drive that is wrong on purpose is rehearsed as a right one too.
         let model = twin(rig, &known(rig)).ok()?.into_link();
-        let mut guarded = Guarded::new(model, limits);
+        let mut guarded = guard_rings(model, limits);
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());

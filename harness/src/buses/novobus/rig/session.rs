@@ -7,8 +7,10 @@ use super::limits;
 use super::line_test::{self, RingPace};
 use super::put_back::Before;
 use crate::buses::novobus::driver::{Axis, count_behind};
-use crate::guard::Limits;
-use crate::guard::{Guarded, Watch, blind_stop};
+use crate::buses::novobus::gate::guard_rings;
+use crate::buses::novobus::guard::blind_stop;
+use crate::buses::novobus::guard::learn::learn;
+use crate::guard::{Guarded, Watch};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::medium::{ErrorMarks, Pieces};
 use crate::rig::around::Around;
@@ -20,6 +22,7 @@ use crate::rig::watchdog::{Watchdog, watch_over};
 use crate::rig::{Alarm, Ends, Rig, SessionError, UseOptions, state, stated_rate};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -163,7 +166,7 @@ impl Session {
             .collect();
         let mut session = Self {
             rig: rig.clone(),
-            link: Guarded::new(opened.ends, limits(rig, options.allow_motion)),
+            link: guard_rings(opened.ends, limits(rig, options.allow_motion)),
             rings,
             deadline: rig.deadline(Instant::now()),
             allow_motion: options.allow_motion,
@@ -520,7 +523,7 @@ impl Session {
     /// lost link is its own trouble.
     fn learn(&mut self) {
         self.link.begin();
-        let _unlearnt = self.link.learn();
+        let _unlearnt = learn(&mut self.link);
         self.link.begin();
     }
 

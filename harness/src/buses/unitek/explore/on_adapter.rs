@@ -5,6 +5,7 @@ use super::generate::FrameSpice;
 use super::oracle::FrameDifference;
 use super::{FrameTalk, FramesSeen};
 use crate::buses::unitek::driver::Error;
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::buses::unitek::judge::{Breach, Follower};
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives, axes, limits};

@@ -3,6 +3,7 @@
 use super::interlock::RegisterInterlocks;
 use super::{Axis, axes, limits, rate, setup};
 use crate::buses::unitek::driver::Driver;
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;

@@ -1,9 +1,9 @@
 //! Ways in which a master can make a motor turn faster, one by one, in the manual's order of sections where there is one.
 
 use super::{GO, Left, MOST, OVERSHOOT, and, bench, byte, limits, or, play, telegram, word};
-use harness::guard::Limits;
 use harness::link::Line;
 use harness_proto::nd21::ram;
+use harness_proto::novobus::guard::Limits;
 
 /// Each attack: what was left in the drive, what is sent, and the telegram that must not pass.
 fn attacks() -> Vec<(&'static str, Left, Vec<Vec<u8>>, usize)> {

@@ -6,8 +6,10 @@ mod random;
 use super::size;
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{OpenRings, Options};
+use harness::buses::novobus::gate::{GuardsRings as _, guard_rings};
+use harness::buses::novobus::guard::learn::learn;
 use harness::buses::novobus::link::BesideTheBus as _;
-use harness::guard::{Guarded, Limits};
+use harness::guard::Guarded;
 use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::bits::status;
@@ -16,6 +18,7 @@ use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, Stimulus, factory};
@@ -133,10 +136,10 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
         bus.close();
     }
     link.begin();
-    let mut line = Guarded::new(link, limits);
+    let mut line = guard_rings(link, limits);
     line.synchronise();
     line.begin();
-    line.learn().expect("learnt");
+    learn(&mut line).expect("learnt");
     line.begin();
     line
 }
@@ -277,7 +280,7 @@ fn the_range_of_speeds() {
             assert!(why.contains(text) && why.contains("(nsoll)"), "{why}");
         }
     }
-    let mut line = Guarded::new(super::link(1), limits());
+    let mut line = guard_rings(super::link(1), limits());
     line.synchronise();
     line.send_octets(0, &word(ram::NSOLL, 567));
     let why = line.trouble().expect("denied").to_string();

@@ -3,6 +3,7 @@
 use super::{
     GO, Left, MOST, OVERSHOOT, and, bench, byte, limits, or, order_by_plc, telegram, watch, word,
 };
+use harness::buses::novobus::gate::GuardsRings as _;
 use harness::link::{Line, Octets, Trouble};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::ram;

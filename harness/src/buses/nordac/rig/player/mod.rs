@@ -21,6 +21,7 @@ use super::observed::{Came, Observed, Written};
 use super::profile::Profiled;
 use super::settle;
 use super::talk::{Talk, TalkError};
+use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::simulate::{self, Bench};

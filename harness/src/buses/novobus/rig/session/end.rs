@@ -2,8 +2,10 @@
 
 use super::super::sim;
 use super::{Session, come_round};
+use crate::buses::novobus::gate::guard_rings;
+use crate::buses::novobus::guard::safe_state;
 use crate::buses::simulated;
-use crate::guard::{Guarded, Safe, safe_state};
+use crate::guard::Safe;
 use crate::link::{Line as _, Link as _};
 use crate::rig::{End, Ends, file, standing, state};
 use std::io::Write as _;
@@ -84,7 +86,7 @@ impl Session {
             return None;
         }
         let ends = Ends::Simulated(simulated(&self.rig.plan().ok()?));
-        let mut fresh = Guarded::new(ends, self.limits());
+        let mut fresh = guard_rings(ends, self.limits());
         let standing = standing(&self.rig.file.safe_state);
         let safe = Safe::from(safe_state(&mut fresh, &self.rings, &standing));
         (!safe.confirmed).then_some(safe)

@@ -18,6 +18,7 @@ use super::observed::{FrameNotes, Observed, Written};
 use super::profile::Profiled;
 use super::set_back::foretell;
 use crate::buses::unitek::driver::Error;
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::language::Unitek;
 use crate::buses::unitek::language::plan::{node, octet_time};

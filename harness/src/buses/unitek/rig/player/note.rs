@@ -7,6 +7,7 @@ use super::super::known::Known;
 use super::super::observed::Observed;
 use super::{Gone, Own, PHASES, Player};
 use crate::buses::unitek::driver::{Driver, Error};
+use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::simulate::{self, Bench, DriveSetup};
 use crate::link::{Line as _, Link as _, LinkEvent, Recording};
