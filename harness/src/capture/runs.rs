@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 
 /// What a station sent without a pause.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Said {
+pub struct HeardTelegram {
     /// The slave that sent it; `None` for the master.
     pub from: Option<u8>,
     /// When its last stop bit had passed.
@@ -21,7 +21,7 @@ pub struct Said {
     pub error: Option<(usize, LineError)>,
 }
 
-impl Said {
+impl HeardTelegram {
     /// The telegram that a receiver reads; `None` where there is a line error or no telegram.
     #[must_use]
     pub fn telegram(&self) -> Option<Telegram> {
@@ -64,7 +64,7 @@ impl TelegramRun {
     }
 
     /// What the other stations read; `None` where nothing arrived.
-    pub(crate) fn said(&self) -> Option<Said> {
+    pub(crate) fn said(&self) -> Option<HeardTelegram> {
         let arrived = self
             .octets
             .iter()
@@ -72,7 +72,7 @@ impl TelegramRun {
         let arrived: Vec<_> = arrived.collect();
         let (_, last) = arrived.last()?;
         let mut errors = arrived.iter().zip(1..);
-        Some(Said {
+        Some(HeardTelegram {
             from: self.from,
             at: last.at,
             octets: arrived.iter().map(|(byte, _)| *byte).collect(),
@@ -138,7 +138,7 @@ pub(crate) fn runs(trace: &Trace) -> Vec<TelegramRun> {
 
 /// The telegrams of a trace: its runs of octets of which something arrived.
 #[must_use]
-pub fn said(trace: &Trace) -> Vec<Said> {
+pub fn said(trace: &Trace) -> Vec<HeardTelegram> {
     runs(trace).iter().filter_map(TelegramRun::said).collect()
 }
 

@@ -13,7 +13,7 @@ use crate::buses::nordac::manual::MANUAL;
 use crate::buses::nordac::rig::rate;
 use crate::buses::nordac::serve;
 use crate::buses::nordac::simulate::Setup;
-use crate::capture::runs::Said;
+use crate::capture::runs::HeardTelegram;
 use crate::explore::line::{ActBounds, LineBus};
 use crate::explore::pool::hash;
 use crate::explore::{Dice, Differing};
@@ -81,7 +81,7 @@ impl LineBus for Nordac {
     type Station = Station;
     type Setup = Setup;
     type Properties = Properties;
-    type Said = Said;
+    type Said = HeardTelegram;
     type Done = Done;
     type Difference = TelegramDifference;
 
@@ -207,11 +207,11 @@ impl LineBus for Nordac {
         oracle::lines(setup, values)
     }
 
-    fn same(expected: &Said, seen: &Said) -> bool {
+    fn same(expected: &HeardTelegram, seen: &HeardTelegram) -> bool {
         expected == seen
     }
 
-    fn unlike(expected: &Said, seen: &Said) -> i64 {
+    fn unlike(expected: &HeardTelegram, seen: &HeardTelegram) -> i64 {
         oracle::unlike(expected, seen)
     }
 

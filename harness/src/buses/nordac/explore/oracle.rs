@@ -4,7 +4,7 @@ use super::hex;
 use super::play::{Done, TelegramsSeen};
 use crate::buses::nordac::judge::{ReplySubject, Symptom};
 use crate::buses::nordac::simulate::Setup;
-use crate::capture::runs::Said;
+use crate::capture::runs::HeardTelegram;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES, Properties};
 use harness_proto::profibus::Telegram;
 use serde::{Deserialize, Serialize};
@@ -77,12 +77,12 @@ pub(super) fn lines(under_test: &Setup, assignment: &[Properties]) -> Vec<String
 }
 
 /// How unlike two telegrams are.
-pub(super) fn unlike(a: &Said, b: &Said) -> i64 {
+pub(super) fn unlike(a: &HeardTelegram, b: &HeardTelegram) -> i64 {
     let sender = i64::from(a.from != b.from);
     let length = a.octets.len().abs_diff(b.octets.len()) as i64;
     let error = i64::from(a.error != b.error);
     // The sum at the end says the same again.
-    let body = |own: &Said| own.octets.len().saturating_sub(2);
+    let body = |own: &HeardTelegram| own.octets.len().saturating_sub(2);
     let octets = a.octets[..body(a)].iter().zip(&b.octets[..body(b)]);
     let bits: u32 = octets.map(|(a, b)| (a ^ b).count_ones()).sum();
     let time = i64::from(a.at != b.at);
@@ -112,8 +112,8 @@ pub(super) fn difference(
     let request = asked(of, about_it).and_then(|own| of.done[own].sent.as_ref());
     let request = request.and_then(|own| Telegram::decode(&own.octets).value());
     let place = match (
-        wanted.and_then(Said::telegram),
-        came.and_then(Said::telegram),
+        wanted.and_then(HeardTelegram::telegram),
+        came.and_then(HeardTelegram::telegram),
     ) {
         (Some(Telegram::Pdu(a)), Some(Telegram::Pdu(b))) if what == Symptom::Value => {
             let slaves = &setup.slaves;
@@ -123,7 +123,7 @@ pub(super) fn difference(
         }
         _ => ReplySubject::of(request.as_ref()),
     };
-    let said = |own: Option<&Said>| {
+    let said = |own: Option<&HeardTelegram>| {
         own.map_or("no telegram".to_owned(), |own| {
             let error = own.error.map_or(String::new(), |(octet, error)| {
                 format!(" with a {error} error in octet {octet}")
@@ -153,12 +153,12 @@ pub(super) fn difference(
 }
 
 /// Behind which act a telegram was sent, counted as they happened.
-fn asked(seen: &TelegramsSeen, own: &Said) -> Option<usize> {
+fn asked(seen: &TelegramsSeen, own: &HeardTelegram) -> Option<usize> {
     let before = |done: &Done| done.sent.is_some() && done.at < own.at;
     seen.done.iter().rposition(before)
 }
 
-fn symptom(wanted: &Said, came: &Said) -> Symptom {
+fn symptom(wanted: &HeardTelegram, came: &HeardTelegram) -> Symptom {
     if wanted.error != came.error {
         Symptom::Damaged
     } else if wanted.octets == came.octets {
@@ -167,7 +167,7 @@ fn symptom(wanted: &Said, came: &Said) -> Symptom {
             false => Symptom::Sender,
         }
     } else {
-        let decoded = [wanted, came].map(Said::telegram);
+        let decoded = [wanted, came].map(HeardTelegram::telegram);
         match decoded {
             [Some(Telegram::Pdu(a)), Some(Telegram::Pdu(b))]
                 if (a.da(), a.sa(), a.fc(), a.dsap(), a.ssap(), a.data().len())

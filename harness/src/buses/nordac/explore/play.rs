@@ -4,7 +4,7 @@ use super::act::{Counts, OutgoingTelegram, TelegramActKind, TelegramTalk, slot};
 use crate::buses::nordac::language::Nordac;
 use crate::buses::nordac::language::plan::SentTelegram;
 use crate::buses::nordac::simulate::{Bench, Setup};
-use crate::capture::runs::{Said, said};
+use crate::capture::runs::{HeardTelegram, said};
 use crate::explore::line::LineSeen;
 use crate::link::{AnyStimulus, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::scenario::language::Language as _;
@@ -15,7 +15,7 @@ use harness_sim::nordac::Stimulus;
 const TAIL: Span = Span::from_millis(20);
 
 /// What a case has shown: what the slaves sent, and each act as often as it happened.
-pub type TelegramsSeen = LineSeen<Said, Done>;
+pub type TelegramsSeen = LineSeen<HeardTelegram, Done>;
 
 /// An act that has happened.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::act::{TelegramActKind, TelegramTalk};
 use super::hex;
 use super::play::{Done, TelegramsSeen};
-use crate::capture::runs::Said;
+use crate::capture::runs::HeardTelegram;
 use harness_proto::line::LineError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
@@ -69,7 +69,7 @@ fn harm(fault: LinkFault) -> String {
 }
 
 /// A reply; `timed` where it must come exactly at its time.
-fn reply(own: &Said, timed: Option<Span>, text: &mut String) {
+fn reply(own: &HeardTelegram, timed: Option<Span>, text: &mut String) {
     let when = timed.map_or(String::new(), |octet| {
         // Where its first octet ends.
         let first = own.at - octet * (own.octets.len() as u64 - 1);

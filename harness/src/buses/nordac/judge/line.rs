@@ -7,7 +7,7 @@ use super::standing::{Standing, standings};
 use super::symptom::ReplySubject;
 use super::symptom::Symptom::{self, Missing, NoTelegram, Unasked};
 use crate::capture::gap;
-use crate::capture::runs::{Said, TelegramRun, runs};
+use crate::capture::runs::{HeardTelegram, TelegramRun, runs};
 use crate::counted::counted;
 use harness_proto::decode::Decoded;
 use harness_proto::profibus::Telegram;
@@ -99,7 +99,7 @@ pub fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
 }
 
 /// Whether octets are a telegram, or as many as one has: a wrong check sum or end is in them and not one octet too few.
-fn is_complete(said: &Said) -> bool {
+fn is_complete(said: &HeardTelegram) -> bool {
     let left = match Telegram::decode(&said.octets) {
         Decoded::Value { .. } => return true,
         Decoded::NeedMore => return false,
@@ -110,7 +110,7 @@ fn is_complete(said: &Said) -> bool {
 
 /// Whether octets are as their sender sent them, though they are no telegram: all checks of a tap hold, and an address or a control octet is
 /// one that no slave may answer.
-fn is_undamaged(said: &Said) -> bool {
+fn is_undamaged(said: &HeardTelegram) -> bool {
     let reasons = [
         Reason::Source,
         Reason::Control,
@@ -488,7 +488,7 @@ impl Judge {
     }
 
     /// The slave that replies, switched off and on in its last silence, if it can have sent this; it was not switched off if it cannot.
-    fn explained(&mut self, request: &Pdu, said: &Said) -> Option<(Instant, Follower)> {
+    fn explained(&mut self, request: &Pdu, said: &HeardTelegram) -> Option<(Instant, Follower)> {
         let (silent, mut restarted) = self.restarted.remove(&request.da())?;
         let reply = said.telegram()?;
         let found = restarted.judge(request, &reply, &said.octets);

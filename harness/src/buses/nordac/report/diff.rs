@@ -2,7 +2,7 @@
 
 use super::table::station;
 use super::words::Reader;
-use crate::capture::runs::{Said, said};
+use crate::capture::runs::{HeardTelegram, said};
 use crate::counted::counted;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -24,7 +24,7 @@ pub struct TraceDifference {
 pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TraceDifference {
     let sides = [left, right].map(|traces| traces.iter().flat_map(said).collect::<Vec<_>>());
     let [left, right] = &sides;
-    let same = |one: &Said, other: &Said| {
+    let same = |one: &HeardTelegram, other: &HeardTelegram| {
         (one.from, &one.octets, one.error) == (other.from, &other.octets, other.error)
     };
     let pairs = || left.iter().zip(right);
@@ -43,7 +43,7 @@ pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TraceDiff
 }
 
 /// The telegram at a place, as a row of the table.
-fn words(all: &[Said], place: usize) -> String {
+fn words(all: &[HeardTelegram], place: usize) -> String {
     let mut reader = Reader::default();
     let mut read = all.iter().map(|own| (own, reader.read(own)));
     let Some((own, words)) = read.nth(place) else {

@@ -3,7 +3,7 @@
 //! Exchanges that repeat the one before them are folded: the first has arrows of its own, and says how many came after it.
 
 use super::words::Reader;
-use crate::capture::runs::{Said, said};
+use crate::capture::runs::{HeardTelegram, said};
 use crate::html::Html;
 use crate::report::html::sequence::{Arrow, SequenceWords};
 use crate::report::html::{self};
@@ -15,7 +15,7 @@ const WORDS: usize = 900;
 
 /// A telegram, what it means, and the later ones that are folded into it.
 struct Folded {
-    said: Said,
+    said: HeardTelegram,
     words: String,
     to: Option<u8>,
     more: usize,

@@ -1,7 +1,7 @@
 //! A trace as a table: a row a telegram.
 
 use super::words::{Reader, Words};
-use crate::capture::runs::{Said, said};
+use crate::capture::runs::{HeardTelegram, said};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -37,12 +37,12 @@ pub(super) fn station(slave: Option<u8>) -> String {
     slave.map_or("master".to_owned(), |own| format!("slave {own}"))
 }
 
-fn line(said: &Said, words: &Words) -> String {
+fn line(said: &HeardTelegram, words: &Words) -> String {
     format!("{:>14}  {}\n", said.at.to_string(), row(said, words))
 }
 
 /// A row without its time.
-pub(super) fn row(said: &Said, words: &Words) -> String {
+pub(super) fn row(said: &HeardTelegram, words: &Words) -> String {
     let to = match (said.from, words.to) {
         (None, Some(127)) => "all".to_owned(),
         (None, Some(to)) => format!("slave {to}"),

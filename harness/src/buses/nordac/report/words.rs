@@ -1,6 +1,6 @@
 //! What telegrams say, in words: service, diagnosis, process words, parameter channel.
 
-use crate::capture::runs::Said;
+use crate::capture::runs::HeardTelegram;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::words::{State, ZSW, stw, zsw};
 use harness_proto::nordac::{Answer, Image, Parameter, Pkw, PpoType, Task};
@@ -59,7 +59,7 @@ pub struct Words {
 
 impl Reader {
     /// Reads the next telegram.
-    pub fn read(&mut self, said: &Said) -> Words {
+    pub fn read(&mut self, said: &HeardTelegram) -> Words {
         if let Some((place, error)) = said.error {
             return Words {
                 service: "damaged".to_owned(),
@@ -93,7 +93,7 @@ impl Reader {
 
     /// The process data of the telegram that was read last, if it was one of a Data_Exchange.
     #[must_use]
-    pub fn exchanged(&self, said: &Said) -> Option<ProcessImage> {
+    pub fn exchanged(&self, said: &HeardTelegram) -> Option<ProcessImage> {
         let telegram = said.telegram()?;
         let pdu = telegram.pdu()?;
         let (asked, service) = self.asked?;

@@ -340,7 +340,7 @@ impl Session {
     }
 }
 
-/// Does something with the drives of open rings. What was sent before is let back first: it would be taken for bytes that nobody has sent.
+/// Does something with the drives of open rings. What was sent before is let back first: it would be taken for bytes without a sender.
 fn with_bus<T>(
     link: &mut Guarded<Ends>,
     rings: &[RingSize],
