@@ -5,10 +5,6 @@
 //! Every file gives a capture or an error that names the place. The memory of a capture is bounded by the size of its file, and
 //! that by [`MAX_FILE`].
 
-#[cfg(test)]
-mod field_levels_tests;
-#[cfg(test)]
-mod field_tests;
 pub(crate) mod files;
 pub mod frame_diff;
 mod frames;

@@ -2,6 +2,10 @@
 
 pub mod campaign;
 pub(crate) mod capture;
+#[cfg(test)]
+mod captured_levels_tests;
+#[cfg(test)]
+mod captured_tests;
 pub(crate) mod cli;
 pub(crate) mod deviations;
 pub(crate) mod dissector;

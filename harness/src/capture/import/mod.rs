@@ -474,4 +474,4 @@ mod hostile_tests;
 #[cfg(test)]
 mod log_tests;
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

@@ -69,7 +69,7 @@ fn shown(capture: &Capture) -> String {
 }
 
 /// The changes of a line that carries octets at these bit times: time in bits, level.
-pub(in crate::capture) fn drawn(octets: &[u8], parity: Parity, gap: u64) -> Vec<(u64, bool)> {
+pub(super) fn drawn(octets: &[u8], parity: Parity, gap: u64) -> Vec<(u64, bool)> {
     let mut changes = vec![(0, true)];
     let mut at = 20;
     for byte in octets {

@@ -5,6 +5,8 @@ pub(crate) mod curves;
 pub mod json;
 pub(crate) mod sequence;
 pub mod table;
+#[cfg(test)]
+mod tests;
 
 use crate::bus::Bus;
 use crate::html::Html;

@@ -1,11 +1,10 @@
 //! Levels and octets of lines as other people's analysers export them.
 
-use super::field_tests::{
+use super::captured_tests::{
     OCTET, PASSED, imported, judged, refused, settings, start, timed, verdict,
 };
-use super::{ReadSettings, read_with};
+use crate::capture::{ReadSettings, read_with};
 use crate::scenario::verdict::Verdict;
-use harness_proto::line::Parity;
 use std::fmt::Write as _;
 
 /// The changes of a line that carries telegrams at 500 kbit/s, with even parity: nanoseconds and the level. `quiet` is the level between
@@ -14,12 +13,12 @@ fn levels(telegrams: &[(u64, Vec<u8>)], quiet: bool) -> Vec<(u64, bool)> {
     let mut changes: Vec<(u64, bool)> = vec![(0, quiet)];
     for (at, octets) in telegrams {
         changes.push((at - 2_000, true));
-        let drawn = super::import::tests::drawn(octets, Parity::Even, 0);
-        changes.extend(
-            drawn[1..]
-                .iter()
-                .map(|(bit, level)| (at + (bit - 20) * 2_000, *level)),
-        );
+        let bits = octets.iter().flat_map(|octet| {
+            let data = (0..8).map(move |bit| octet >> bit & 1 == 1);
+            let parity = octet.count_ones() % 2 == 1;
+            [false].into_iter().chain(data).chain([parity, true])
+        });
+        changes.extend((0..).map(|bit: u64| at + bit * 2_000).zip(bits));
         changes.push((at + OCTET * octets.len() as u64, quiet));
     }
     changes.dedup_by_key(|own| own.1);

@@ -1,8 +1,7 @@
 //! Captures as other people's adapters, analysers and programs write them: a master 3, a NORDAC inverter 5, and other devices.
 
-use super::{Imported, ReadSettings, read_with};
-use crate::buses::judge_shared;
-use crate::capture::JudgedFrames;
+use super::capture;
+use crate::capture::{Imported, JudgedFrames, ReadSettings, read_with};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 
@@ -158,8 +157,7 @@ pub(super) fn refused(file: &[u8], links: &[&str], words: &str) {
 
 /// The verdict, how many replies were compared, and of how many; with what there is to say about it.
 pub(super) fn judged(imported: &Imported, named: &[u8]) -> ((Verdict, usize, usize), JudgedFrames) {
-    let judged =
-        judge_shared(&imported.capture.traces, None, (named, Span::ZERO)).expect("telegrams");
+    let judged = capture::judged(&imported.capture.traces, (named, Span::ZERO));
     let (verdict, _) = imported.settle(judged.verdict);
     let count = (verdict, judged.compared, judged.replies);
     (count, judged)
