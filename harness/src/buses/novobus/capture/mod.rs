@@ -8,3 +8,5 @@ pub mod judge;
 mod open;
 pub mod scenario;
 pub(crate) mod stimuli;
+#[cfg(test)]
+mod tests;
