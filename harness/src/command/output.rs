@@ -5,6 +5,7 @@ use super::exit::Exit;
 use crate::scenario::files::LibraryError;
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
+use crate::serve::ServeHost;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use std::io::{IsTerminal, Write};
 
@@ -312,6 +313,16 @@ pub(crate) fn columns(heading: &[&str], rows: &[impl AsRef<[String]>]) -> String
         text.push_str(&line(&mut row.as_ref().iter().map(String::as_str)));
     }
     text
+}
+
+impl ServeHost for Output {
+    fn tell(&mut self, line: &str) -> std::io::Result<()> {
+        self.result(&format!("{line}\n"))
+    }
+
+    fn say(&mut self, line: &str) {
+        Self::say(self, &format!("{line}\n"));
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use super::port_file::{PortBus, PortLimits, Ports};
 use crate::file::values::{LinkName, MaxSpeed, Speed, Time};
 use crate::medium::ErrorMarks;
+use harness_proto::line::Rate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -206,6 +207,16 @@ pub enum LineFormat {
     /// 9600 baud.
     #[serde(rename = "9600 8O1")]
     Baud9600,
+}
+
+impl From<LineFormat> for Rate {
+    fn from(line: LineFormat) -> Self {
+        match line {
+            LineFormat::Baud38400 => Self::Baud38400,
+            LineFormat::Baud19200 => Self::Baud19200,
+            LineFormat::Baud9600 => Self::Baud9600,
+        }
+    }
 }
 
 impl LineFormat {

@@ -6,6 +6,7 @@ mod eeprom;
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::language::plan::Plan;
+use harness::buses::novobus::language::plan::asks_the_driver;
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::qualify::{
     Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
@@ -88,14 +89,14 @@ fn plans() -> &'static [Plan] {
             plan.rings.len() == 1
                 && plan.rings[0].drives() == DRIVES
                 && !plan.needs.contains(&Capability::Interposer)
-                && !plan.asks_the_driver()
+                && !asks_the_driver(plan)
                 && lacks(plan, &recording).is_none()
                 && play_one(&mut recording, plan, &as_they_are())
                     .is_ok_and(|outcome| outcome.took < SHORT)
         };
         let built_in = built_in.filter(fits);
         let own = own.into_iter().filter_map(|entry| entry.plan);
-        let own = own.filter(|plan| !plan.asks_the_driver());
+        let own = own.filter(|plan| !asks_the_driver(plan));
         own.chain(built_in).collect()
     })
 }

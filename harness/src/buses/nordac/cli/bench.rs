@@ -1,6 +1,7 @@
 //! The master of a bench.
 
 use crate::buses::nordac::driver::{Driver, Options, Timing};
+use crate::buses::nordac::rig::OfNordac as _;
 use crate::buses::nordac::rig::interlock::InverterInterlock;
 use crate::buses::nordac::rig::{Session, rate};
 use crate::link::Line;

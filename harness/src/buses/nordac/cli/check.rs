@@ -1,5 +1,6 @@
 //! `drivebench rig check` of NORDAC inverters: the bench is opened, and every slave is asked for its diagnosis and its configuration.
 
+use crate::buses::nordac::rig::OfNordac as _;
 use crate::buses::nordac::rig::Session;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;

@@ -11,6 +11,7 @@ use super::{TelegramTalk, TelegramsSeen};
 use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::judge::{Breach, judge_runs};
 use crate::buses::nordac::language::Nordac;
+use crate::buses::nordac::rig::OfNordac as _;
 use crate::buses::nordac::rig::{Inverters, Session, limits, slaves};
 use crate::capture::runs::TelegramRun;
 use crate::explore::ExploreError;

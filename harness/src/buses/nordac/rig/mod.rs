@@ -15,7 +15,7 @@ pub(crate) mod talk;
 
 pub use permitted::limits;
 pub(crate) use player::Player;
-pub use session::{Inverters, Session};
+pub use session::{Inverters, OfNordac, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;

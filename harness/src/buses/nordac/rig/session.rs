@@ -4,7 +4,6 @@ use super::interlock::InverterInterlocks;
 use super::talk::Talk;
 use super::{RigSlave, limits, rate, setup, slaves};
 use crate::buses::nordac::cli::Parked;
-use crate::buses::nordac::gate::GuardsSlaves as _;
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
@@ -20,7 +19,7 @@ use crate::rig::port_session::{
     PortDrives, PortSession, failed, lock, patience, setup_text, unopened,
 };
 use crate::rig::{Ends, Rig, SessionError, UseOptions};
-use harness_proto::nordac::guard::{GuardedSlave, Limits};
+use harness_proto::nordac::guard::GuardedSlave;
 use harness_proto::profibus::dp::Diagnosis;
 use harness_proto::time::Span;
 
@@ -94,28 +93,28 @@ impl PortDrives for Inverters {
     }
 }
 
-impl Session {
+/// What a session of these drives has beside what all have.
+pub trait OfNordac {
     /// Its slaves. Their PPO types are those that they were found with.
-    #[must_use]
-    pub fn slaves(&self) -> &[RigSlave] {
+    fn slaves(&self) -> &[RigSlave];
+
+    /// How long a reply may take beside its own time on the line.
+    fn patience(&self) -> Span;
+
+    /// A master for single requests.
+    fn talk(&mut self) -> Talk<'_>;
+}
+
+impl OfNordac for Session {
+    fn slaves(&self) -> &[RigSlave] {
         &self.drives().slaves
     }
 
-    /// How long a reply may take beside its own time on the line.
-    #[must_use]
-    pub const fn patience(&self) -> Span {
+    fn patience(&self) -> Span {
         self.drives().patience
     }
 
-    /// What the rig's file and the command line allow together.
-    #[must_use]
-    pub fn limits(&self) -> Limits {
-        let gate = self.guarded().slaves();
-        gate.map(|own| *own.limits()).unwrap_or_default()
-    }
-
-    /// A master for single requests.
-    pub fn talk(&mut self) -> Talk<'_> {
+    fn talk(&mut self) -> Talk<'_> {
         let patience = self.patience();
         Talk::new(Box::new(self.link()), patience)
     }

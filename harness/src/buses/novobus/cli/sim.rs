@@ -10,8 +10,8 @@ use crate::command::sim::{SimArguments, SimSpeed};
 use crate::medium::ErrorMarks;
 use crate::scenario::source::Source;
 use crate::serve::{
-    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt,
-    Server, serve,
+    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, Server,
+    serve,
 };
 
 /// The seats at inner links with their places, in the order of the command line: taps first.
@@ -216,14 +216,4 @@ fn rings(
     let places = places(arguments, sizes.len()).chain(inner);
     let options = options(arguments, places.collect());
     Ok(serve(server, &options, output))
-}
-
-impl ServeHost for Output {
-    fn tell(&mut self, line: &str) -> std::io::Result<()> {
-        self.result(&format!("{line}\n"))
-    }
-
-    fn say(&mut self, line: &str) {
-        Output::say(self, &format!("{line}\n"));
-    }
 }

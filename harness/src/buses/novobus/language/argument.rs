@@ -3,6 +3,7 @@
 
 use super::plan::{in_memory, number_bytes};
 use crate::buses::novobus::language::parse::value::{bytes, eeprom_place, place, value};
+use crate::buses::novobus::language::scale::dimension_of;
 use crate::buses::novobus::language::syntax::{CellPlace, Written};
 use crate::scenario::expression::{self, Scope};
 use crate::scenario::parse::words::equals;
@@ -185,7 +186,7 @@ fn own_value(
         && !quantity::ahead(scanner)
         && quantity::ambiguous(scanner).is_none();
     let cell = location.cell().and_then(|cell| cell.number());
-    let unit = location.scale.or(cell).and_then(Dimension::of);
+    let unit = location.scale.or(cell).and_then(dimension_of);
     let Some(unit) = unit.filter(|_| bare).map(Dimension::unit) else {
         return value(scanner, scale, &location.place);
     };

@@ -97,11 +97,11 @@ impl Language for Novobus {
     }
 
     fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize, LinkFault)> {
-        plan.fault_links().collect()
+        plan::fault_links(plan).collect()
     }
 
     fn heard_links(plan: &Plan<Self>) -> Vec<(usize, usize)> {
-        plan.heard_links().collect()
+        plan::heard_links(plan).collect()
     }
 
     fn link_name(plan: &Plan<Self>, ring: usize, link: usize) -> String {

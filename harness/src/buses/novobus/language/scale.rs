@@ -3,28 +3,24 @@
 use crate::scenario::quantity::{Dimension, figures};
 use harness_proto::nd21::units::{Scale, Value};
 
-impl Dimension {
-    /// What the values of a scale measure; `None` for plain numbers and dates.
-    #[must_use]
-    pub const fn of(scale: Scale) -> Option<Self> {
-        Some(match scale {
-            Scale::Speed | Scale::MaxSpeed | Scale::AnalogueSpeed => Self::Speed,
-            Scale::Ramp => Self::Ramp,
-            Scale::MomentaryCurrent
-            | Scale::EffectiveCurrent
-            | Scale::TorqueLimit
-            | Scale::Torque => Self::Current,
-            Scale::Turns | Scale::Angle | Scale::Position | Scale::SlippingError => Self::Angle,
-            Scale::CoolerTemperature => Self::Temperature,
-            Scale::MotorSensor => Self::Resistance,
-            Scale::Emf => Self::Voltage,
-            Scale::TachoFilter | Scale::ScopePeriod => Self::Time,
-            Scale::Hours => Self::Hours,
-            Scale::MotorPoles | Scale::EncoderImpulses | Scale::SerialNumber | Scale::Date => {
-                return None;
-            }
-        })
-    }
+/// What the values of a scale measure; `None` for plain numbers and dates.
+pub(crate) const fn dimension_of(scale: Scale) -> Option<Dimension> {
+    Some(match scale {
+        Scale::Speed | Scale::MaxSpeed | Scale::AnalogueSpeed => Dimension::Speed,
+        Scale::Ramp => Dimension::Ramp,
+        Scale::MomentaryCurrent | Scale::EffectiveCurrent | Scale::TorqueLimit | Scale::Torque => {
+            Dimension::Current
+        }
+        Scale::Turns | Scale::Angle | Scale::Position | Scale::SlippingError => Dimension::Angle,
+        Scale::CoolerTemperature => Dimension::Temperature,
+        Scale::MotorSensor => Dimension::Resistance,
+        Scale::Emf => Dimension::Voltage,
+        Scale::TachoFilter | Scale::ScopePeriod => Dimension::Time,
+        Scale::Hours => Dimension::Hours,
+        Scale::MotorPoles | Scale::EncoderImpulses | Scale::SerialNumber | Scale::Date => {
+            return None;
+        }
+    })
 }
 
 /// The value of a cell as text, in the unit of its scale: `1500.1 rpm`, `off`, `1996-01-31`.

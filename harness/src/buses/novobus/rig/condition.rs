@@ -1,11 +1,12 @@
 //! The conditions of interlocks in a rig's file: cells and inputs of an ND21, and the mistakes that can stand there.
 
+use crate::buses::novobus::language::scale::dimension_of;
 use crate::file::schema::PathStep;
 use crate::file::values::ValueError;
 use crate::rig::check::RigCheck;
 use crate::rig::file::{Interlock, Level};
 use crate::scenario::problem::Problem;
-use crate::scenario::quantity::{Dimension, parse as quantity};
+use crate::scenario::quantity::parse as quantity;
 use harness_proto::nd21::cells::{Cell, RAM, cell};
 use harness_proto::nd21::io::Input;
 
@@ -59,7 +60,7 @@ fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
         message,
         expected: expected.to_owned(),
     };
-    let Some(dimension) = cell.scale.and_then(Dimension::of) else {
+    let Some(dimension) = cell.scale.and_then(dimension_of) else {
         return text.trim().parse::<i32>().map(f64::from).map_err(|_| {
             wrong(
                 format!("`{text}` is not a whole number"),

@@ -5,6 +5,7 @@
 
 use super::run::{Way, play_one};
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::language::plan::asks_the_driver;
 use crate::link::{Capability, Line as _, LinkEvent, Replay};
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
@@ -39,7 +40,7 @@ impl Driven {
     ) -> Option<Self> {
         let unplayed = [Verdict::Skipped, Verdict::Aborted, Verdict::RigError];
         let played = outcome.unready.is_none() && !unplayed.contains(&outcome.verdict);
-        (played && plan.asks_the_driver()).then(|| Self {
+        (played && asks_the_driver(plan)).then(|| Self {
             plan: plan.clone(),
             events: events.to_vec(),
             way: way.clone(),

@@ -2,7 +2,6 @@
 
 use crate::buses::novobus::driver::{COUNT, unasked};
 use crate::link::{self, Octets, wait_keeping};
-use crate::rig::file::LineFormat;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -39,16 +38,6 @@ pub(crate) struct LineTestBytes {
     pub unasked: Vec<Received>,
     /// What came back for [`SENT`] SYNCO, twice.
     pub passes: [Pass; 2],
-}
-
-impl From<LineFormat> for Rate {
-    fn from(line: LineFormat) -> Self {
-        match line {
-            LineFormat::Baud38400 => Self::Baud38400,
-            LineFormat::Baud19200 => Self::Baud19200,
-            LineFormat::Baud9600 => Self::Baud9600,
-        }
-    }
 }
 
 /// Listens, and sends SYNCO twice.

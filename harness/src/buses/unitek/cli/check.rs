@@ -1,5 +1,6 @@
 //! `drivebench rig check` of UNITEK drives: the bench is opened, and every drive is asked.
 
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::Session;
 use crate::command::axes::Axes;
 use crate::command::exit::Exit;

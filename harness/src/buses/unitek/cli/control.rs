@@ -2,6 +2,7 @@
 
 use super::write::{Order, refuse_denied};
 use crate::buses::unitek::driver::{Driver, Error, Stopped};
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use crate::command::exit::Exit;

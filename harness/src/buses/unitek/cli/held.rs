@@ -1,5 +1,6 @@
 //! Drives of a port that a session holds.
 
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::Player;
 use crate::buses::unitek::rig::UnitekDrives;
 use crate::command::drive::DriveCommand;

@@ -3,6 +3,7 @@
 use super::control::how;
 use super::read::{Found, find};
 use crate::buses::unitek::live;
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::UnitekDrives;
 use crate::buses::unitek::value::hex;
 use crate::capture::Piece;

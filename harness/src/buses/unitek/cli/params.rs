@@ -8,6 +8,7 @@
 
 use super::read::{Found, find};
 use super::write::{Order, refuse_denied};
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{hex, is_parameter, register};
 use crate::command::axes::Axes;

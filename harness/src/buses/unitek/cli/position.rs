@@ -3,6 +3,7 @@
 use super::control::start_up;
 use super::write::refuse_denied;
 use crate::buses::unitek::driver::Driver;
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::command::drive::PositionArguments;
 use crate::command::exit::Exit;

@@ -1,6 +1,7 @@
 //! `drivebench read` on UNITEK drives: registers with their units and bits.
 
 use super::bench::scaling;
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers, words};
 use crate::command::drive::{OutputForm, ReadArguments};

@@ -1,6 +1,7 @@
 //! `drivebench watch` on UNITEK drives: the values of registers, again and again.
 
 use super::read::{Found, find};
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives};
 use crate::buses::unitek::value::{bits, hex, registers};
 use crate::command::drive::WatchArguments;

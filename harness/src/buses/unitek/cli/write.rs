@@ -2,6 +2,7 @@
 
 use super::bench::scaling;
 use crate::buses::unitek::driver::Driver;
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, UnitekDrives};
 use crate::buses::unitek::value::{assignment, hex, words};
 use crate::command::drive::WriteArguments;

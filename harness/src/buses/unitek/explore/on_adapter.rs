@@ -8,6 +8,7 @@ use crate::buses::unitek::driver::Error;
 use crate::buses::unitek::gate::GuardsSegment as _;
 use crate::buses::unitek::judge::{Breach, Follower};
 use crate::buses::unitek::language::Unitek;
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::rig::{Axis, Session, UnitekDrives, axes, limits};
 use crate::explore::ExploreError;
 use crate::explore::line::{LineRig, pass};

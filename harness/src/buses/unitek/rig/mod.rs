@@ -15,7 +15,7 @@ mod set_back;
 pub use permitted::limits;
 use permitted::special_register;
 pub(crate) use player::Player;
-pub use session::{Session, UnitekDrives};
+pub use session::{OfUnitek, Session, UnitekDrives};
 
 use super::language::Unitek;
 use super::serve;

@@ -18,7 +18,7 @@ use crate::rig::port_session::{
 use crate::rig::{Ends, Rig, SessionError, UseOptions};
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
-use harness_proto::unitek::guard::{Gate, Limits};
+use harness_proto::unitek::guard::Gate;
 
 /// Which firmware a drive has: the register that every drive is asked for at first.
 const FIRMWARE: u8 = 0x1B;
@@ -97,22 +97,21 @@ impl PortDrives for UnitekDrives {
     }
 }
 
-impl Session {
+/// What a session of these drives has beside what all have.
+pub trait OfUnitek {
     /// Its drives.
-    #[must_use]
-    pub fn axes(&self) -> &[Axis] {
+    fn axes(&self) -> &[Axis];
+
+    /// A driver of its drives.
+    fn driver(&mut self) -> Driver<'_>;
+}
+
+impl OfUnitek for Session {
+    fn axes(&self) -> &[Axis] {
         &self.drives().axes
     }
 
-    /// What the rig's file and the command line allow together.
-    #[must_use]
-    pub fn limits(&self) -> Limits {
-        let gate = self.guarded().segment();
-        gate.map(|own| own.limits().clone()).unwrap_or_default()
-    }
-
-    /// A driver of its drives.
-    pub fn driver(&mut self) -> Driver<'_> {
+    fn driver(&mut self) -> Driver<'_> {
         let (link, drives) = self.parts();
         Driver::new(Box::new(link), &drives.axes, drives.patience)
     }

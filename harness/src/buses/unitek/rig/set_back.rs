@@ -6,6 +6,7 @@ use super::observed::{Given, Written};
 use super::player::Player;
 use super::{Axis, Session};
 use crate::buses::unitek::driver::{Driver, Error};
+use crate::buses::unitek::rig::OfUnitek as _;
 use crate::buses::unitek::safe_state::last_words;
 use crate::medium::Pieces;
 use crate::rig::Rig;

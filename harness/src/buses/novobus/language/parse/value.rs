@@ -1,10 +1,11 @@
 //! Cells by name or address, and their values: bytes, or a number with a unit.
 
 use super::words::equals;
+use crate::buses::novobus::language::scale::dimension_of;
 use crate::buses::novobus::language::syntax::{CellCheck, CellPlace, Relation, Written};
 use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
-use crate::scenario::quantity::{self, Dimension, Tolerance};
+use crate::scenario::quantity::{self, Tolerance};
 use crate::scenario::scanner::Scanner;
 use harness_proto::nd21::cells::{self, Cell};
 use harness_proto::nd21::eeprom;
@@ -166,7 +167,7 @@ pub(crate) fn value(
     if matches!(scale, Some(Scale::Ramp | Scale::SlippingError)) && scanner.eat_word("off") {
         return Ok(Written::Off(scanner.since(here)));
     }
-    let dimension = scale.and_then(Dimension::of);
+    let dimension = scale.and_then(dimension_of);
     if let Some((digits, unit)) = quantity::ambiguous(scanner)
         && place.named
         && dimension == Some(unit.dimension())

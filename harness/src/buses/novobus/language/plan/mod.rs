@@ -12,11 +12,11 @@ pub(crate) use job::Exchange;
 pub(crate) use planner::Planner;
 pub use planner::plan_header;
 pub(crate) use setup::{in_memory, number_bytes};
-pub(crate) use types::PlannedSetupKind;
 pub use types::{
     CellTest, LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck,
-    PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct,
+    PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct, asks_the_driver,
 };
+pub(crate) use types::{PlannedSetupKind, fault_links, heard_links};
 
 use super::Novobus;
 use crate::scenario::plan;

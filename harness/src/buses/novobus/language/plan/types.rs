@@ -1,11 +1,10 @@
 //! What a plan consists of.
 
-use crate::buses::novobus::language::Novobus;
-use crate::buses::novobus::language::plan::PlannedStep;
+use crate::buses::novobus::language::plan::{Plan, PlannedStep};
 use crate::buses::novobus::language::syntax::{CellPlace, Ending, Influence, Relation, Showing};
 use crate::link::{Capability, LinkFault, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Plan, PlannedAction};
+use crate::scenario::plan::PlannedAction;
 use crate::scenario::problem::TextSpan;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use harness_proto::line::Rate;
@@ -303,48 +302,45 @@ pub enum PlannedCheck {
     Received(u64),
 }
 
-impl Plan<Novobus> {
-    /// Whether the bench's own master has a part in it.
-    #[must_use]
-    pub fn asks_the_driver(&self) -> bool {
-        let asks =
-            |step: &PlannedStep| matches!(step.action, PlannedAction::Own(RingAct::Master(..)));
-        self.steps.iter().any(asks)
-    }
+/// Whether the bench's own master has a part in it.
+#[must_use]
+pub fn asks_the_driver(plan: &Plan) -> bool {
+    let asks = |step: &PlannedStep| matches!(step.action, PlannedAction::Own(RingAct::Master(..)));
+    plan.steps.iter().any(asks)
+}
 
-    /// The faults on links, by ring and place.
-    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize, LinkFault)> + '_ {
-        self.steps.iter().filter_map(|step| match step.action {
-            PlannedAction::Own(RingAct::Fault(ring, PlacedFault::Link(link, fault), _)) => {
-                Some((ring, link, fault))
-            }
-            _ => None,
-        })
-    }
+/// The faults on links, by ring and place.
+pub(crate) fn fault_links(plan: &Plan) -> impl Iterator<Item = (usize, usize, LinkFault)> + '_ {
+    plan.steps.iter().filter_map(|step| match step.action {
+        PlannedAction::Own(RingAct::Fault(ring, PlacedFault::Link(link, fault), _)) => {
+            Some((ring, link, fault))
+        }
+        _ => None,
+    })
+}
 
-    /// The links in front of and behind the drives whose error mode must be seen, by ring and place; none where no drive must be seen in it,
-    /// as a drive that answers is in none.
-    pub(crate) fn heard_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let wanted = self.needs.contains(&Capability::Tap);
-        let steps = self.steps.iter().filter(move |_| wanted);
-        let acts = steps.filter_map(|step| match &step.action {
-            PlannedAction::Own(act) => Some(act),
-            _ => None,
-        });
-        let drives = acts.filter_map(|act| match act {
-            RingAct::Check(PlannedCheck::Error(ring, drive, _)) => Some((*ring, *drive..=*drive)),
-            RingAct::Check(PlannedCheck::Drive(check)) | RingAct::Until(check, _) => {
-                let seen = matches!(check.condition, PlannedCondition::InError(_));
-                seen.then(|| (check.ring, check.drives.clone()))
-            }
-            _ => None,
-        });
-        drives.flat_map(|(ring, drives)| {
-            let size = self.rings.get(ring).map_or(0, |ring| ring.drives());
-            let behind = drives.map(move |drive| usize::from(size.saturating_sub(drive)));
-            behind.flat_map(move |place| [(ring, place.saturating_sub(1)), (ring, place)])
-        })
-    }
+/// The links in front of and behind the drives whose error mode must be seen, by ring and place; none where no drive must be seen in it,
+/// as a drive that answers is in none.
+pub(crate) fn heard_links(plan: &Plan) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let wanted = plan.needs.contains(&Capability::Tap);
+    let steps = plan.steps.iter().filter(move |_| wanted);
+    let acts = steps.filter_map(|step| match &step.action {
+        PlannedAction::Own(act) => Some(act),
+        _ => None,
+    });
+    let drives = acts.filter_map(|act| match act {
+        RingAct::Check(PlannedCheck::Error(ring, drive, _)) => Some((*ring, *drive..=*drive)),
+        RingAct::Check(PlannedCheck::Drive(check)) | RingAct::Until(check, _) => {
+            let seen = matches!(check.condition, PlannedCondition::InError(_));
+            seen.then(|| (check.ring, check.drives.clone()))
+        }
+        _ => None,
+    });
+    drives.flat_map(|(ring, drives)| {
+        let size = plan.rings.get(ring).map_or(0, |ring| ring.drives());
+        let behind = drives.map(move |drive| usize::from(size.saturating_sub(drive)));
+        behind.flat_map(move |place| [(ring, place.saturating_sub(1)), (ring, place)])
+    })
 }
 
 impl PlannedBench {

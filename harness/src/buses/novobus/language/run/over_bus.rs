@@ -3,6 +3,7 @@
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
 use super::Runner;
+use crate::buses::novobus::language::plan::fault_links;
 use crate::buses::novobus::language::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
@@ -92,7 +93,7 @@ pub(crate) fn ask_for(runner: &mut Runner<'_>, check: &PlannedDriveCheck) {
     let Ok(size_of_ring) = RingSize::new(u64::from(runner.link.drives(ring))) else {
         return;
     };
-    let damaged = runner.plan.fault_links().next().is_some() && runner.own.corrected == 0;
+    let damaged = fault_links(runner.plan).next().is_some() && runner.own.corrected == 0;
     if damaged || !at_rest(size_of_ring, &runner.own.rings[ring].sent) {
         return;
     }
