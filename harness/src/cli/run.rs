@@ -8,6 +8,7 @@ use super::tally::{EarlierVerdicts, Tally};
 use crate::bus::Bus;
 use crate::buses::find_any_rig;
 use crate::buses::novobus::report::plot::plot;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;

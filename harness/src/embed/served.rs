@@ -2,10 +2,9 @@
 
 use super::Error;
 use crate::buses::drives::released;
+use crate::buses::novobus::serve::Server;
 use crate::medium::ErrorMarks;
-use crate::serve::{
-    EndRequest, Pace, ServeError, ServeHost, ServeOptions, ServedAt, Server, serve_until,
-};
+use crate::serve::{EndRequest, Pace, ServeError, ServeHost, ServeOptions, ServedAt, serve_until};
 use std::io;
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;

@@ -3,6 +3,7 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::rings::rig::Beside;
 use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::LinkName;

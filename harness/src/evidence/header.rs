@@ -4,6 +4,7 @@ use super::files::{RIG, sum};
 use super::keep::Keep;
 use super::part;
 use super::record::{RecordLine, RunPart, capabilities};
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::rings::rig::limits;
 use crate::buses::twin::Exactness;
 use crate::buses::{SimulatedLink, judge_of};

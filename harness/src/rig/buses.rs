@@ -1,9 +1,11 @@
 //! What the files of rigs ask of the buses: a table that the program hands in.
 
+use super::check::RigCheck;
 use super::condition::Mistake;
 use super::file::{Interlock, RigFile};
 use super::port_file::{Node, Port, PortBus};
 use super::profile::{ProfileError, ProfileLines};
+use crate::file::schema::PathStep;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::{Source, line_number};
 use std::fmt;
@@ -63,6 +65,8 @@ pub(crate) struct RingRow {
     pub(crate) profile: fn(&str) -> Result<ProfileLines, ProfileError>,
     /// The mistakes of the lines of `[sim]` behind those of the profile.
     pub(crate) mistakes: fn(&RigFile, Option<&[String]>, &Source) -> RingMistakes,
+    /// Checks an entry of `[[interlock]]` at its place.
+    pub(crate) interlock: fn(&mut RigCheck<'_>, &[PathStep<'_>], &Interlock),
 }
 
 /// The buses, as the files of rigs know them.

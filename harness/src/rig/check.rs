@@ -237,7 +237,11 @@ impl RigCheck<'_> {
         self.ports();
         self.drives();
         for (index, interlock) in file.interlock.iter().enumerate() {
-            self.interlock(&["interlock".into(), index.into()], interlock);
+            (self.buses.rings.interlock)(
+                &mut *self,
+                &["interlock".into(), index.into()],
+                interlock,
+            );
         }
         self.safe_state();
         self.programs();

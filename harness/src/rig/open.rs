@@ -6,6 +6,7 @@ use super::lock::{PortLock, PortLockError};
 use super::scan::{self, FoundPort, MatchError};
 use super::{Rig, SessionError};
 use crate::buses;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::link::{InnerLink, InnerPorts};
 use crate::medium::ErrorMarks;
 use crate::port::{self, OpenError, PortSettings, Wire};

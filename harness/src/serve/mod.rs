@@ -16,7 +16,6 @@ mod shell;
 mod stage;
 mod tcp;
 
-pub use crate::buses::rings::serve::Server;
 pub use control::ControlAnswer;
 pub(crate) use control::first;
 pub use place::{ClientRole, ControlPlace, Inner, Pace, ServedAt};

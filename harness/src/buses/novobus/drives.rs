@@ -7,6 +7,7 @@ use crate::buses::find_rig_in;
 use crate::buses::novobus::language::argument::{assignments, cells, encode};
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::embed::Error;
 use crate::rig::{self, Session, Shared};

@@ -7,6 +7,7 @@ use super::people::{self, Turn};
 use super::people_output;
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
 use crate::bus::Bus;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::help::command;
 use crate::command::exit::Exit;

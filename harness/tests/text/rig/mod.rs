@@ -114,7 +114,7 @@ fn what_a_file_says_is_what_is_read() {
         .file
         .interlock
         .iter()
-        .map(|one| one.condition().expect("checked"))
+        .map(|one| harness::buses::novobus::rig::condition(one).expect("checked"))
         .collect();
     assert!(
         matches!(conditions[0], InterlockCondition::Cell { min: None, max: Some(max), .. } if (max - 75.0).abs() < 1e-9)

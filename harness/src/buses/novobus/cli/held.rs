@@ -5,6 +5,7 @@ use crate::buses::novobus::gate::GuardsRings as _;
 use crate::buses::novobus::language::plan::{Plan, PlannedStep, RingAct};
 use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;

@@ -8,6 +8,7 @@ use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::command::drive::RigArguments;
 use crate::command::exit::Exit;

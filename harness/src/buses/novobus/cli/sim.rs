@@ -2,6 +2,7 @@
 
 use super::rig;
 use crate::bus::Bus;
+use crate::buses::novobus::serve::Server;
 use crate::buses::{self};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
@@ -10,8 +11,7 @@ use crate::command::sim::{SimArguments, SimSpeed};
 use crate::medium::ErrorMarks;
 use crate::scenario::source::Source;
 use crate::serve::{
-    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, Server,
-    serve,
+    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, serve,
 };
 
 /// The seats at inner links with their places, in the order of the command line: taps first.

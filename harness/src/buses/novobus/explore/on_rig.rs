@@ -13,6 +13,7 @@ use crate::buses::novobus::gate::guard_rings;
 use crate::buses::novobus::language::run::over_bus::monitors;
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::SILENCED;
 use crate::explore::ExploreError;

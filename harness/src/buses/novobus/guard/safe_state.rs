@@ -157,13 +157,13 @@ fn once(line: &mut OneRing<'_>, size: RingSize, standing: &Standstill) -> Vec<No
     let mut drives: Vec<_> = axes.map(Told::new).collect();
     let mut told = 0;
     for step in &standing.order {
-        for command in step.commands() {
+        for command in commands(*step) {
             let answers = together(&bus, &drives, command);
             for (drive, answer) in drives.iter_mut().zip(answers) {
                 drive.note(answer.err());
             }
         }
-        told |= step.flag();
+        told |= flag(*step);
         wait_until_seen(&bus, &mut drives, told, standing);
     }
     bus.close();
@@ -361,29 +361,27 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
 /// How long `Flags` may take to follow a command; a drive updates them in its next cycle.
 const FLAGS: Span = Span::from_millis(500);
 
-impl StandstillStep {
-    /// The commands of this step (11.8, 14.10).
-    fn commands(self) -> Vec<Command> {
-        let status = |data| Command::Or {
-            address_low: ram::STATUS.to_be_bytes()[1],
-            data,
-        };
-        let stand = Command::WriteWord {
-            address: ram::NSOLL,
-            data: 0,
-        };
-        match self {
-            Self::Stop => vec![status(status::STOP)],
-            Self::Block => vec![stand, status(status::BLOCK)],
-        }
+/// The commands of this step (11.8, 14.10).
+fn commands(step: StandstillStep) -> Vec<Command> {
+    let status = |data| Command::Or {
+        address_low: ram::STATUS.to_be_bytes()[1],
+        data,
+    };
+    let stand = Command::WriteWord {
+        address: ram::NSOLL,
+        data: 0,
+    };
+    match step {
+        StandstillStep::Stop => vec![status(status::STOP)],
+        StandstillStep::Block => vec![stand, status(status::BLOCK)],
     }
+}
 
-    /// What `Flags` show of it (14.4.2).
-    const fn flag(self) -> u8 {
-        match self {
-            Self::Stop => flags::STOP,
-            Self::Block => flags::BLOCK,
-        }
+/// What `Flags` show of it (14.4.2).
+const fn flag(step: StandstillStep) -> u8 {
+    match step {
+        StandstillStep::Stop => flags::STOP,
+        StandstillStep::Block => flags::BLOCK,
     }
 }
 

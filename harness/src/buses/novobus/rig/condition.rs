@@ -10,27 +10,25 @@ use crate::scenario::quantity::parse as quantity;
 use harness_proto::nd21::cells::{Cell, RAM, cell};
 use harness_proto::nd21::io::Input;
 
-impl Interlock {
-    /// What must hold; `None` only where the file was not checked.
-    #[must_use]
-    pub fn condition(&self) -> Option<InterlockCondition> {
-        if let Some(name) = &self.input {
-            return Some(InterlockCondition::Input {
-                input: Input::from_name(name)?,
-                level: self.level?,
-            });
-        }
-        let cell = cell(self.cell.as_deref()?)?;
-        let bound = |text: &Option<String>| {
-            text.as_deref()
-                .and_then(|text| self::bound(cell, text).ok())
-        };
-        Some(InterlockCondition::Cell {
-            cell,
-            min: bound(&self.min),
-            max: bound(&self.max),
-        })
+/// What must hold; `None` only where the file was not checked.
+#[must_use]
+pub fn condition(interlock: &Interlock) -> Option<InterlockCondition> {
+    if let Some(name) = &interlock.input {
+        return Some(InterlockCondition::Input {
+            input: Input::from_name(name)?,
+            level: interlock.level?,
+        });
     }
+    let cell = cell(interlock.cell.as_deref()?)?;
+    let bound = |text: &Option<String>| {
+        text.as_deref()
+            .and_then(|text| self::bound(cell, text).ok())
+    };
+    Some(InterlockCondition::Cell {
+        cell,
+        min: bound(&interlock.min),
+        max: bound(&interlock.max),
+    })
 }
 
 /// What an interlock looks at.
@@ -79,87 +77,85 @@ fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     }
 }
 
-impl RigCheck<'_> {
-    /// One entry of `[[interlock]]`.
-    pub(crate) fn interlock(&mut self, path: &[PathStep<'_>], interlock: &Interlock) {
-        let at = |key| [path, &[PathStep::Key(key)]].concat();
-        self.drive(&at("drive"), interlock.ring, interlock.drive);
-        let bounds = [("min", &interlock.min), ("max", &interlock.max)];
-        match (&interlock.cell, &interlock.input) {
-            (Some(name), None) => {
-                let Some(cell) = cell(name) else {
-                    let known: Vec<_> = RAM.iter().map(|cell| cell.printed).collect();
-                    let place = self.place(&at("cell"));
-                    let problem = Problem::new(
-                        place,
-                        format!("there is no cell `{name}`"),
-                        "the name of a RAM cell expected here (`drivebench cells`)",
-                    );
-                    self.problems.push(problem.did_you_mean(name, &known));
-                    return;
-                };
-                if interlock.min.is_none() && interlock.max.is_none() {
-                    self.wrong(
-                        &at("cell"),
-                        "nothing bounds this cell",
-                        "`min`, `max` or both expected beside it",
-                    );
-                }
-                if interlock.level.is_some() {
-                    self.wrong(
-                        &at("level"),
-                        "`level` is for inputs",
-                        "`min` or `max` expected in its place",
-                    );
-                }
-                let mut values = Vec::new();
-                for (key, text) in bounds {
-                    let Some(text) = text else { continue };
-                    match bound(cell, text) {
-                        Ok(value) => values.push(value),
-                        Err(error) => self.wrong(&at(key), error.message, error.expected),
-                    }
-                }
-                if values.len() == 2 && values[0] > values[1] {
-                    self.wrong(
-                        &at("min"),
-                        "`min` is above `max`",
-                        "a smaller value expected here",
-                    );
+/// One entry of `[[interlock]]`.
+pub(super) fn check(rig: &mut RigCheck<'_>, path: &[PathStep<'_>], interlock: &Interlock) {
+    let at = |key| [path, &[PathStep::Key(key)]].concat();
+    rig.drive(&at("drive"), interlock.ring, interlock.drive);
+    let bounds = [("min", &interlock.min), ("max", &interlock.max)];
+    match (&interlock.cell, &interlock.input) {
+        (Some(name), None) => {
+            let Some(cell) = cell(name) else {
+                let known: Vec<_> = RAM.iter().map(|cell| cell.printed).collect();
+                let place = rig.place(&at("cell"));
+                let problem = Problem::new(
+                    place,
+                    format!("there is no cell `{name}`"),
+                    "the name of a RAM cell expected here (`drivebench cells`)",
+                );
+                rig.problems.push(problem.did_you_mean(name, &known));
+                return;
+            };
+            if interlock.min.is_none() && interlock.max.is_none() {
+                rig.wrong(
+                    &at("cell"),
+                    "nothing bounds this cell",
+                    "`min`, `max` or both expected beside it",
+                );
+            }
+            if interlock.level.is_some() {
+                rig.wrong(
+                    &at("level"),
+                    "`level` is for inputs",
+                    "`min` or `max` expected in its place",
+                );
+            }
+            let mut values = Vec::new();
+            for (key, text) in bounds {
+                let Some(text) = text else { continue };
+                match bound(cell, text) {
+                    Ok(value) => values.push(value),
+                    Err(error) => rig.wrong(&at(key), error.message, error.expected),
                 }
             }
-            (None, Some(name)) => {
-                if Input::from_name(name).is_none() {
-                    let known = Input::ALL.map(Input::name);
-                    let problem = Problem::new(
-                        self.place(&at("input")),
-                        format!("there is no input `{name}`"),
-                        format!("one of {} expected here", known.join(", ")),
-                    );
-                    self.problems.push(problem.did_you_mean(name, &known));
-                }
-                if interlock.level.is_none() {
-                    self.wrong(
-                        &at("input"),
-                        "the level that the input must hold is missing",
-                        "`level` expected beside it",
-                    );
-                }
-                for (key, text) in bounds {
-                    if text.is_some() {
-                        self.wrong(
-                            &at(key),
-                            format!("`{key}` is for cells"),
-                            "`level` expected in its place",
-                        );
-                    }
-                }
+            if values.len() == 2 && values[0] > values[1] {
+                rig.wrong(
+                    &at("min"),
+                    "`min` is above `max`",
+                    "a smaller value expected here",
+                );
             }
-            _ => self.wrong(
-                path,
-                "an interlock looks at one thing",
-                "either `cell` or `input` expected in here",
-            ),
         }
+        (None, Some(name)) => {
+            if Input::from_name(name).is_none() {
+                let known = Input::ALL.map(Input::name);
+                let problem = Problem::new(
+                    rig.place(&at("input")),
+                    format!("there is no input `{name}`"),
+                    format!("one of {} expected here", known.join(", ")),
+                );
+                rig.problems.push(problem.did_you_mean(name, &known));
+            }
+            if interlock.level.is_none() {
+                rig.wrong(
+                    &at("input"),
+                    "the level that the input must hold is missing",
+                    "`level` expected beside it",
+                );
+            }
+            for (key, text) in bounds {
+                if text.is_some() {
+                    rig.wrong(
+                        &at(key),
+                        format!("`{key}` is for cells"),
+                        "`level` expected in its place",
+                    );
+                }
+            }
+        }
+        _ => rig.wrong(
+            path,
+            "an interlock looks at one thing",
+            "either `cell` or `input` expected in here",
+        ),
     }
 }

@@ -3,6 +3,8 @@
 use super::condition::InterlockCondition;
 use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::buses::novobus::language::scale::shown;
+use crate::buses::novobus::rig::condition;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::guard::Watch;
 use crate::link::{Line, Trouble};
 use crate::rig::file::Level;
@@ -47,7 +49,7 @@ impl Interlocks {
                 ring,
                 drive: entry.drive,
                 drives: plan.rings.get(ring)?.drives(),
-                condition: entry.condition()?,
+                condition: condition(entry)?,
                 every: Span::from_nanos(every),
                 next: Instant::START,
                 message: entry.message.clone(),

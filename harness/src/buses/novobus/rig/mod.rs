@@ -21,10 +21,11 @@ pub(crate) mod wrong_parity;
 
 pub use beside::{Beside, OnRings, PlayedOnRings};
 pub use cause::LikelyCause;
-pub use condition::InterlockCondition;
+pub use condition::{InterlockCondition, condition};
 pub use driven::Driven;
 pub use health::{RingHealth, Unhealthy, examine};
 pub(crate) use permitted::limits;
 pub use run::{Run, Way, play_one};
 pub use session::Session;
 pub(crate) use sim::RINGS;
+pub use sim::RigOfRings;

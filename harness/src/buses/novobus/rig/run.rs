@@ -13,6 +13,7 @@ use crate::buses::novobus::gate::{GuardsRings as _, guard_rings};
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::run::over_bus::{come_home, play_over_bus, start_anew};
 use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin, answered};
 use crate::counted::counted;

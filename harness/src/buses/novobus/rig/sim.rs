@@ -1,6 +1,6 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
-use super::limits;
+use super::{condition, limits};
 use crate::buses::novobus::language::parse::drive::DEVICES;
 use crate::buses::novobus::language::parse::header::{for_other_rings, parse_lines};
 use crate::buses::novobus::language::plan::{Plan, plan_header};
@@ -13,11 +13,28 @@ use crate::scenario::problem::{Problem, Problems, TextSpan};
 use crate::scenario::source::{Source, line_number};
 use harness_sim::nd21::Stimulus;
 
-impl Rig {
+/// A rig with rings.
+pub trait RigOfRings {
     /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, and allows
     /// everything, so that every scenario may bring drives of its own.
-    #[must_use]
-    pub fn is_bare(&self) -> bool {
+    fn is_bare(&self) -> bool;
+
+    /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
+    /// no model.
+    ///
+    /// # Errors
+    /// None of a rig that was read: its lines were settled then.
+    fn plan(&self) -> Result<Plan, Problems>;
+
+    /// The same with another header behind that of the file.
+    ///
+    /// # Errors
+    /// The other header has mistakes.
+    fn plan_with(&self, more: &Header) -> Result<Plan, Problems>;
+}
+
+impl RigOfRings for Rig {
+    fn is_bare(&self) -> bool {
         let file = &self.file;
         if self.port().is_some() {
             // Of a file of its own the drives are set up, or the limits are to be tried.
@@ -43,20 +60,11 @@ impl Rig {
             && setup(self).only(|own| !is_input(own)).is_empty()
     }
 
-    /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
-    /// no model.
-    ///
-    /// # Errors
-    /// None of a rig that was read: its lines were settled then.
-    pub fn plan(&self) -> Result<Plan, Problems> {
+    fn plan(&self) -> Result<Plan, Problems> {
         self.plan_with(&Header::default())
     }
 
-    /// The same with another header behind that of the file.
-    ///
-    /// # Errors
-    /// The other header has mistakes.
-    pub fn plan_with(&self, more: &Header) -> Result<Plan, Problems> {
+    fn plan_with(&self, more: &Header) -> Result<Plan, Problems> {
         if self.port().is_some() {
             let message = "the rig has no rings";
             let problem = Problem::new(TextSpan::default(), message, "a table [ring.1] expected");
@@ -109,6 +117,7 @@ fn header(file: &RigFile, profile: Option<&[String]>, own: &Header) -> Header {
 pub(crate) const RINGS: RingRow = RingRow {
     profile: |text| Ok(Profile::<Header>::parse(text)?.header().lines()),
     mistakes,
+    interlock: condition::check,
 };
 
 impl ProfileSetup for Header {

@@ -4,6 +4,7 @@ use super::super::sim;
 use super::{Session, come_round};
 use crate::buses::novobus::gate::guard_rings;
 use crate::buses::novobus::guard::safe_state;
+use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::simulated;
 use crate::guard::Safe;
 use crate::link::{Line as _, Link as _};
