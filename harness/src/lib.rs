@@ -33,66 +33,30 @@
 
 pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
+#[doc(hidden)]
+pub use harness_bench::{
+    bus, capture, explore, file, frames, guard, html, link, listen, manual, medium, partition,
+    port, qualify, regular, scenario, serve, signals, top, traffic, trouble, web,
+};
 use harness_proto::counted;
 pub use scenario::verdict::Verdict;
 
 mod command;
 mod embed;
-#[doc(hidden)]
-pub mod listen;
-mod regular;
-mod signals;
-mod trouble;
 
-#[doc(hidden)]
-pub mod bus;
 #[doc(hidden)]
 pub mod buses;
 #[doc(hidden)]
 pub mod campaign;
 #[doc(hidden)]
-pub mod capture;
-#[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]
 pub mod evidence;
 #[doc(hidden)]
-pub mod explore;
-#[doc(hidden)]
-pub mod file;
-#[doc(hidden)]
-pub mod frames;
-#[doc(hidden)]
 pub mod fuzz;
 #[doc(hidden)]
-pub mod guard;
-#[doc(hidden)]
-pub mod html;
-#[doc(hidden)]
 pub mod library;
-#[doc(hidden)]
-pub mod link;
-#[doc(hidden)]
-pub mod manual;
-#[doc(hidden)]
-pub mod medium;
-#[doc(hidden)]
-pub mod partition;
-#[doc(hidden)]
-pub mod port;
-#[doc(hidden)]
-pub mod qualify;
 #[doc(hidden)]
 pub mod report;
 #[doc(hidden)]
 pub mod rig;
-#[doc(hidden)]
-pub mod scenario;
-#[doc(hidden)]
-pub mod serve;
-#[doc(hidden)]
-pub mod top;
-#[doc(hidden)]
-pub mod traffic;
-#[doc(hidden)]
-pub mod web;

@@ -5,7 +5,7 @@ use harness_proto::nordac::{IDENT, PpoType};
 use harness_proto::profibus::BusRate;
 use std::path::Path;
 
-const GSD: &str = include_str!("../../src/buses/nordac/nordac.gsd");
+const GSD: &str = include_str!("../../nordac/src/nordac.gsd");
 
 /// GSD: ident number, rates with their longest reply delays, lengths and modules are those of the model; what the print says stands in the file.
 #[test]

@@ -5,11 +5,11 @@ mod contents;
 mod interrupt_tests;
 #[cfg(test)]
 mod live_tests;
-pub mod nordac;
+pub use harness_nordac as nordac;
 pub mod novobus;
 #[cfg(test)]
 mod toy;
-pub mod unitek;
+pub use harness_unitek as unitek;
 
 /// The bus whose drives stand in rings: what rooms take of it by type.
 pub use novobus as rings;

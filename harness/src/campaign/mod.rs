@@ -4,17 +4,17 @@
 //! ring and the conversation. [`replay`] prints one case as a scenario. The folder of a bus says how a case is played and what its outcomes
 //! are.
 
+pub use harness_bench::campaign::*;
+
 pub mod fault;
 pub mod file;
 pub mod find;
 mod html;
-pub mod line;
 pub mod pairs;
 pub mod part;
 pub mod plan;
 pub mod replay;
 pub(crate) mod run;
-pub(crate) mod share;
 
 pub use fault::CaseFaults;
 pub use html::campaigns;

@@ -16,48 +16,32 @@
 //!
 //! `drivebench schema record` prints the JSON schema of a line of the record.
 
+pub use harness_bench::evidence::*;
+
 mod attempt;
 mod cases;
 mod derive;
 mod earlier;
-mod error;
-mod events;
-mod files;
 mod folder;
 pub mod fuzz;
 mod gather;
 mod header;
-mod junit;
 mod keep;
 mod merge;
-mod names;
 mod part;
 mod qualified;
 mod qualified_parts;
-mod read;
 mod read_parts;
-mod record;
 mod reports;
 mod rerun;
-mod sealed;
 mod selection;
-mod signature;
 mod verify;
 
 pub use cases::too_large;
 pub use derive::{Derived, derive};
 pub use earlier::Earlier;
-pub use error::{EvidenceError, RecordError};
-pub use files::{DEVIATIONS, PAGE, PROFILE, RIG, size};
-pub(crate) use files::{SIGNATURE, SUMS};
 pub use folder::{AboutRun, Folder, KeptAttempts};
-pub use junit::{JunitCase, junit};
 pub use keep::Keep;
 pub use merge::{MERGE, Merged, merge, verify_merged};
 pub use part::SplitRun;
-pub use read::{MAX_SIZE, MAX_TIME, read};
-pub use record::{PartItem, RecordLine, RunPart, Writer, schema};
-pub(crate) use sealed::unsigned;
-pub use sealed::{can_sign, seal, sealed, unseal};
-pub use signature::Signer;
 pub use verify::{Beside, Rejudged, Verified, judge_record, verify};

@@ -5,11 +5,10 @@
 //! [`coverage`] compares the kept inputs with the matrix of protocol transitions and sums up what they reach. [`distil`](mod@distil) chooses
 //! the inputs to keep.
 
-pub mod distil;
-pub mod input;
+pub use harness_bench::fuzz::*;
 mod text;
 
-pub use text::{rig, scenario, written};
+pub use text::{rig, scenario};
 
 use crate::buses;
 /// The matrix of protocol transitions is that of the ring.

@@ -464,7 +464,7 @@ fn citations_resolve() {
 
 #[test]
 fn every_property_is_exercised_and_described() {
-    let page = read(&root().join("harness/src/scenario/LANGUAGE.md"));
+    let page = read(&root().join("harness/bench/src/scenario/LANGUAGE.md"));
     let texts: String = files("corpora/scenarios", "scn")
         .iter()
         .map(|path| read(path))
@@ -477,7 +477,7 @@ fn every_property_is_exercised_and_described() {
         let set = format!("property {name} =");
         assert!(texts.contains(&set), "no scenario sets {name}");
     }
-    let page = read(&root().join("harness/src/buses/unitek/LANGUAGE.md"));
+    let page = read(&root().join("harness/unitek/src/LANGUAGE.md"));
     for property in harness_proto::unitek::properties::PROPERTIES {
         let name = property.name;
         assert!(page.contains(&format!("| `{name}` |")), "{name}");
@@ -490,7 +490,7 @@ fn every_property_is_exercised_and_described() {
             assert!(texts.contains(&set), "no scenario has the line: {set}");
         }
     }
-    let page = read(&root().join("harness/src/buses/nordac/LANGUAGE.md"));
+    let page = read(&root().join("harness/nordac/src/LANGUAGE.md"));
     for property in harness_proto::nordac::properties::PROPERTIES {
         let name = property.name;
         assert!(page.contains(&format!("| `{name}` |")), "{name}");

@@ -16,12 +16,9 @@
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
 
-mod page;
+pub use harness_bench::report::html::*;
 mod scenario;
-pub(crate) mod sequence;
 mod summary;
-
-pub use page::{FoldedPart, MAX_PAGE, Section, page};
 pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;
 pub use summary::{Head, ShownScenario, run};

@@ -492,7 +492,7 @@ fn values_are_written_in_units() {
 /// Every line of the page's tables that begins with `drive` is a line of the language.
 #[test]
 fn the_lines_of_the_page_are_accepted() {
-    let page = include_str!("../../../src/scenario/LANGUAGE.md");
+    let page = include_str!("../../../bench/src/scenario/LANGUAGE.md");
     let rows = page
         .lines()
         .filter_map(|line| line.strip_prefix("| `drive "));

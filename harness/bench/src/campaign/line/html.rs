@@ -1,0 +1,133 @@
+//! The section of a campaign on a shared line in a page.
+
+use super::PlayedLine;
+use crate::campaign::share::share;
+use crate::html::Html;
+use crate::report::html::{FoldedPart, Section};
+
+/// Maximum number of the worst cases shown.
+const WORST: usize = 100;
+
+/// A campaign as a section; `number` counts the sections of the page from 1.
+#[must_use]
+pub fn section(number: usize, played: &PlayedLine) -> Section {
+    let name = &played.name;
+    let mut html = Html::new();
+    html.line("p", &[], &played.title);
+    html.line(
+        "p",
+        &[],
+        format_args!(
+            "{} cases: 1 drive, {} {}.",
+            played.outcomes.len(),
+            played.count,
+            played.units
+        ),
+    );
+    classes(&mut html, played);
+    let instead = format!("It is in: drivebench campaign {name} --format json");
+    let part = |heading: &str, html: Html| FoldedPart {
+        heading: heading.to_owned(),
+        html,
+        instead: instead.clone(),
+    };
+    let gravest = played
+        .outcomes
+        .iter()
+        .map(|own| played.of(own).gravity)
+        .max();
+    let differs = !played.differs().is_empty();
+    Section {
+        heading: name.to_owned(),
+        id: format!("s{number}"),
+        gravity: gravest.unwrap_or(0) + if differs { 10 } else { 0 },
+        html,
+        parts: vec![
+            part(
+                &format!("Where: faults across, {} down", played.units),
+                map(played),
+            ),
+            part("The worst", worst(played)),
+        ],
+    }
+}
+
+fn classes(html: &mut Html, played: &PlayedLine) {
+    let all = played.outcomes.len() as u64;
+    html.element("table", &[], |html| {
+        html.line("caption", &[], "Cases by class");
+        html.heads(&["Letter", "Class", "Cases", "Share", "What it means"]);
+        for (place, class) in played.classes.iter().enumerate() {
+            let count = played.count(place);
+            html.element("tr", &[], |html| {
+                html.line("td", &[("class", &colour(class.gravity))], class.letter);
+                html.line("th", &[("scope", &"row")], class.name);
+                html.line("td", &[("class", &"n")], count);
+                html.line("td", &[("class", &"n")], share(count, all));
+                html.line("td", &[], class.about);
+            });
+        }
+    });
+    for (name, expected, found) in played.differs() {
+        html.line(
+            "p",
+            &[("class", &"bad")],
+            format_args!("{name} is {found}, the file pins {expected}"),
+        );
+    }
+}
+
+/// The class's colour is that of a class as serious in the ring's campaigns.
+fn colour(gravity: u8) -> String {
+    format!("k{gravity}")
+}
+
+/// A row for each thing that was disturbed, a column a fault. Colours only repeat the letters.
+fn map(played: &PlayedLine) -> Html {
+    let mut faults: Vec<&str> = Vec::new();
+    for outcome in &played.outcomes {
+        if !faults.contains(&outcome.fault.as_str()) {
+            faults.push(&outcome.fault);
+        }
+    }
+    let mut html = Html::new();
+    html.element("table", &[], |html| {
+        html.line("caption", &[], "The class of each case");
+        let mut heads = vec!["Number", played.heading];
+        heads.extend(&faults);
+        html.heads(&heads);
+        for row in played.outcomes.chunk_by(|a, b| a.place == b.place) {
+            html.element("tr", &[], |html| {
+                html.line("th", &[("scope", &"row")], row[0].place);
+                html.line("td", &[], &row[0].disturbed);
+                for fault in &faults {
+                    match row.iter().find(|own| own.fault == *fault) {
+                        Some(own) => {
+                            let class = played.of(own);
+                            html.line("td", &[("class", &colour(class.gravity))], class.letter)
+                        }
+                        None => html.line("td", &[], ""),
+                    }
+                }
+            });
+        }
+    });
+    html
+}
+
+fn worst(played: &PlayedLine) -> Html {
+    let mut html = Html::new();
+    html.element("table", &[], |html| {
+        html.line("caption", &[], "The worst cases");
+        html.heads(&["Class", "Case", "Disturbed", "What happened"]);
+        for own in played.serious().into_iter().take(WORST) {
+            html.element("tr", &[], |html| {
+                html.line("th", &[("scope", &"row")], played.of(own).name);
+                html.line("td", &[], &own.case);
+                html.line("td", &[], &own.disturbed);
+                html.line("td", &[], &own.happened);
+            });
+        }
+    });
+    html
+}

@@ -1,0 +1,100 @@
+//! The results of a campaign, for people and for tools.
+
+use super::{LineOutcome, PlayedLine};
+use crate::campaign::share::share;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// How many of the worst cases a table shows.
+const WORST: usize = 10;
+
+/// How many cases there are of each class, what differs from the file, and the worst cases.
+#[must_use]
+pub fn table(played: &PlayedLine) -> String {
+    let all = played.outcomes.len() as u64;
+    let (name, title) = (&played.name, &played.title);
+    let (count, units) = (played.count, played.units);
+    let mut text = format!("{title}\n{name}: {all} cases; 1 drive, {count} {units}\n\n");
+    // Writing to a String cannot fail.
+    let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
+    for (place, class) in played.classes.iter().enumerate() {
+        let count = played.count(place);
+        let (name, share) = (class.name, share(count, all));
+        let _infallible = writeln!(text, "  {name:18} {count:>8} {share:>9}  {}", class.about);
+    }
+    for (name, expected, found) in played.differs() {
+        let _infallible = writeln!(
+            text,
+            "  differs: {name} is {found}, the file pins {expected}"
+        );
+    }
+    let worst = played.serious();
+    if !worst.is_empty() {
+        text.push_str("\n  the worst\n");
+    }
+    for outcome in worst.into_iter().take(WORST) {
+        let (
+            class,
+            LineOutcome {
+                case,
+                disturbed,
+                happened,
+                ..
+            },
+        ) = (played.of(outcome).name, outcome);
+        let _infallible = writeln!(text, "  {class:18} {case:20} {disturbed:22} {happened}");
+    }
+    text
+}
+
+/// The cases of a class, one a line.
+#[must_use]
+pub fn only(played: &PlayedLine, class: usize) -> String {
+    let own = played.outcomes.iter().filter(|own| own.class == class);
+    let line = |own: &LineOutcome| {
+        let (
+            class,
+            LineOutcome {
+                case,
+                disturbed,
+                happened,
+                ..
+            },
+        ) = (played.of(own).name, own);
+        format!("{class:10} {case:20} {disturbed:22} {happened}\n")
+    };
+    own.map(line).collect()
+}
+
+/// A campaign for tools.
+#[must_use]
+pub fn json(played: &PlayedLine, only: Option<usize>) -> Value {
+    let unit = played.units.trim_end_matches('s');
+    let case = |outcome: &LineOutcome| {
+        json!({
+            "case": outcome.case,
+            unit: outcome.disturbed,
+            "class": played.of(outcome).name,
+            "steps": outcome.steps,
+            "troubles": outcome.troubles,
+        })
+    };
+    let counts = played.classes.iter().enumerate();
+    let counts =
+        counts.map(|(place, class)| json!({ "class": class.name, "cases": played.count(place) }));
+    let wanted = |own: &&LineOutcome| only.is_none_or(|only| own.class == only);
+    let shown = played.outcomes.iter().filter(wanted);
+    let differs = played.differs().into_iter();
+    let differs = differs.map(
+        |(name, expected, found)| json!({ "class": name, "expected": expected, "found": found }),
+    );
+    json!({
+        "name": played.name,
+        "bus": played.bus,
+        "title": played.title,
+        played.units: played.count,
+        "classes": counts.collect::<Vec<_>>(),
+        "differs": differs.collect::<Vec<_>>(),
+        "cases": shown.map(case).collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,146 @@
+//! The bench of a command on drives behind `[port.1]`: taken, used, and given back in the state that the command asks for.
+
+use super::exit::Exit;
+use super::failure::Failure;
+use super::output::Output;
+use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
+use crate::command::axes::Axes;
+use crate::command::drive::RigArguments;
+use crate::command::rig_name::Use;
+use crate::link::Line as _;
+use crate::rig::port_session::{PortDrives, PortSession};
+use crate::rig::{Rig, UseOptions};
+use crate::scenario::source::Source;
+use crate::signals::interrupt_flag;
+use std::time::Duration;
+
+/// Where a command runs.
+pub enum PortBench<'b, D: PortDrives> {
+    /// On a rig that is taken for this command.
+    Rig(&'b Rig),
+    /// On a rig that a session holds.
+    Held(&'b mut PortSession<D>),
+}
+
+/// Runs `act` on a bench. A rig is taken for it and given back: its drives stay as they are if `as_what` says so and `act` succeeds, or if
+/// nothing was done. In all other cases it is given back in its safe state. What a session holds stays as `act` leaves it.
+///
+/// # Errors
+/// [`Failure`]: the rig cannot be taken. Of a session also that of `act`.
+pub fn on<D: PortDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &RigArguments,
+    as_what: Use,
+    output: &mut Output,
+    act: impl FnOnce(&mut PortSession<D>, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    let rig = match bench {
+        PortBench::Rig(rig) => rig,
+        PortBench::Held(session) => return act(session, output),
+    };
+    let mut rig = rig.clone();
+    if let Some(path) = &arguments.setup {
+        let simulated = rig.origin.starts_with("sim:");
+        let Some((port, row)) = rig.port().zip(rig.port_row()).filter(|_| simulated) else {
+            let bus = rig.port().map_or("", |port| port.bus.name());
+            return Err(Failure::refused(format!(
+                "--setup is for sim:{bus}:N; what stands in a rig's file is set up by its [sim] setup",
+            )));
+        };
+        let source = Source::read(path).map_err(|error| Failure::File(error.into()))?;
+        if let Some(problems) = (row.setup_mistakes)(port, &source) {
+            return Err(problems.into());
+        }
+        if let Some(sim) = &mut rig.file.sim {
+            sim.setup = vec![source.text.to_string()];
+        }
+    }
+    let options = UseOptions {
+        purpose: as_what.purpose.to_owned(),
+        wait: Duration::from_nanos(arguments.patience.as_nanos()),
+        allow_motion: as_what.moves,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+        ..UseOptions::default()
+    };
+    let session = PortSession::open(&rig, &options);
+    let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
+    session.look_at_interlocks();
+    let result = act(&mut session, output);
+    Ok(give_back(session, as_what, result, output))
+}
+
+fn give_back<D: PortDrives>(
+    mut session: PortSession<D>,
+    as_what: Use,
+    result: Result<Exit, Failure>,
+    output: &mut Output,
+) -> Exit {
+    let (exit, leave) = match result {
+        Ok(exit) => (exit, as_what.holds),
+        // Impossible requests and missing permissions are refused before anything is done.
+        Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
+            (failure.tell(output), true)
+        }
+        Err(failure) => (failure.tell(output), as_what.looks_only()),
+    };
+    let exit = exit_of_end(session.link().trouble(), exit, output);
+    let end = match leave {
+        true => session.release(),
+        false => session.close(matches!(exit, Exit::RigError | Exit::Interlock)),
+    };
+    tell_end(&end, exit, output)
+}
+
+/// The drives that are meant, each once, in the order in which they are named.
+///
+/// # Errors
+/// The rig has no such drive.
+pub fn select<D: PortDrives>(
+    wanted: &[Axes],
+    session: &PortSession<D>,
+) -> Result<Vec<D::Drive>, Failure> {
+    let [drive, line] = D::WORDS;
+    let all = session.drives().listed();
+    let of = |number: u8| all.iter().find(|own| D::number(own) == number).copied();
+    let mut selected = Vec::new();
+    for axes in wanted {
+        let named: Vec<_> = match axes {
+            Axes::All => all.clone(),
+            Axes::Some(0, numbers) => {
+                if let Some(missing) = numbers.clone().find(|own| of(*own).is_none()) {
+                    let known: Vec<_> = all.iter().map(|own| D::number(own).to_string()).collect();
+                    return Err(Failure::refused(format!(
+                        "the rig has no {drive} {missing}: {} expected",
+                        known.join(", ")
+                    )));
+                }
+                numbers.clone().filter_map(of).collect()
+            }
+            Axes::Some(ring, _) => {
+                let message = format!("a {line} has no ring {}", ring + 1);
+                return Err(Failure::refused(message));
+            }
+        };
+        for own in named {
+            if !selected.contains(&own) {
+                selected.push(own);
+            }
+        }
+    }
+    Ok(selected)
+}
+
+/// The only drive that is meant.
+///
+/// # Errors
+/// The rig has no such drive, or several are meant.
+pub fn single<D: PortDrives>(wanted: &Axes, session: &PortSession<D>) -> Result<D::Drive, Failure> {
+    match select(std::slice::from_ref(wanted), session)?[..] {
+        [drive] => Ok(drive),
+        _ => Err(Failure::refused(format!(
+            "one {} expected here, not several",
+            D::WORDS[0]
+        ))),
+    }
+}

@@ -1,0 +1,50 @@
+//! Names of scenarios in a folder: each leads to one file.
+
+use std::collections::{BTreeSet, VecDeque};
+
+/// The names that a folder has given.
+#[derive(Debug, Default)]
+pub struct Names {
+    /// Those of a part of a run, which are the names in the folder of the whole run.
+    planned: VecDeque<String>,
+    given: BTreeSet<String>,
+}
+
+impl Names {
+    /// Of a part of a run: these names come first, in this order, and no other scenario has a name of `all`.
+    pub fn planned(own: VecDeque<String>, all: BTreeSet<String>) -> Self {
+        Self {
+            planned: own,
+            given: all,
+        }
+    }
+
+    /// The name of the next scenario, whose file has this name.
+    pub fn next(&mut self, name: &str) -> String {
+        match self.planned.pop_front() {
+            Some(planned) => planned,
+            None => self.unique(name),
+        }
+    }
+
+    fn unique(&mut self, name: &str) -> String {
+        let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
+        let bare = name.strip_suffix(".scn").unwrap_or(name);
+        let own: String = bare
+            .chars()
+            .map(|c| if safe(c) { c } else { '_' })
+            .take(120)
+            .collect();
+        let own = match own.trim_matches(['_', '.']) {
+            "" => "scenario".to_owned(),
+            own => own.to_owned(),
+        };
+        let mut unique = own.clone();
+        let mut number = 1;
+        while !self.given.insert(unique.clone()) {
+            number += 1;
+            unique = format!("{own}_{number}");
+        }
+        unique
+    }
+}

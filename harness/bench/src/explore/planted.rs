@@ -1,0 +1,24 @@
+//! A deviation that is planted in a drive.
+
+use serde::{Deserialize, Serialize};
+
+/// A deviation that is planted in a drive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Planted {
+    /// In which ring, counted from 0.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub ring: usize,
+    /// Which drive.
+    pub drive: u8,
+    /// The name of the deviation.
+    pub name: String,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+pub const fn is_first(ring: &usize) -> bool {
+    *ring == 0
+}

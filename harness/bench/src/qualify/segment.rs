@@ -1,0 +1,438 @@
+//! Drives that share a segment: which known deviation explains every attempt of a qualification.
+//!
+//! A bus supplies its attempts and what it knows of wrong drives ([`Attempts`]); the rules when a deviation is named are the same for all.
+
+use crate::counted::counted;
+use crate::rig::Rig;
+use crate::rig::profile::{Profile, ProfileLines};
+use crate::rig::segment::Qualified;
+use crate::scenario::verdict::Verdict;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The most deviations that are listed where several explain everything.
+const MOST_TOLD: usize = 8;
+
+/// The attempts of a qualification, by their places.
+pub trait Attempts {
+    /// A known way in which a drive may be wrong.
+    type Deviation;
+
+    /// Every known way.
+    fn deviations(&self) -> Vec<Self::Deviation>;
+
+    /// Its name, section and effect, with the drive.
+    fn words(&self, deviation: &Self::Deviation) -> String;
+
+    /// The attempts that were begun, in order.
+    fn attempts(&self) -> Vec<Attempted>;
+
+    /// Whether correct drives, with any value of what the manual leaves open, would have shown the same in an attempt.
+    fn is_right(&self, attempt: usize) -> bool;
+
+    /// Whether drives with this deviation would have shown the same in an attempt.
+    fn explains(&self, deviation: &Self::Deviation, attempt: usize) -> bool;
+}
+
+/// One attempt at a scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct Attempted {
+    /// Its verdict; skipped where the drives were only asked for their registers.
+    pub verdict: Verdict,
+    /// Whether the drives did something that no correct drive does, as far as is known.
+    pub accuses: bool,
+    /// Whether time is virtual, so that what came is compared with a model, whatever the verdict.
+    pub exact: bool,
+    /// How many frames or telegrams were received.
+    pub received: usize,
+    /// Whether another part of the qualification has played the same conversation before, with the same verdict: it is judged, and not
+    /// counted again.
+    pub repeats: bool,
+}
+
+/// What the attempts say of the drives.
+#[derive(Debug)]
+enum Named {
+    /// No attempt accuses a drive.
+    None,
+    /// These deviations explain all that was compared, in words.
+    Explained(Vec<String>),
+}
+
+/// Names the deviations that explain every attempt that accuses a drive, and every one that passed. Where time is virtual, an attempt that
+/// passed counts too if correct drives do not explain what came; but it alone accuses no drive.
+fn named<A: Attempts>(all: &A, attempts: &[Attempted]) -> Named {
+    let places = attempts.iter().enumerate();
+    let right = [Verdict::Passed, Verdict::Skipped];
+    let compared = places.filter(|(_, own)| own.accuses || right.contains(&own.verdict));
+    let (unlike, alike): (Vec<_>, Vec<_>) =
+        compared.partition(|(place, own)| (own.accuses || own.exact) && !all.is_right(*place));
+    if unlike.is_empty() {
+        return Named::None;
+    }
+    let explaining = all.deviations().into_iter().filter(|deviation| {
+        let mut compared = unlike.iter().chain(&alike);
+        compared.all(|(place, _)| all.explains(deviation, *place))
+    });
+    let explaining: Vec<_> = explaining.map(|own| all.words(&own)).collect();
+    let accused = unlike.iter().any(|(_, own)| own.accuses);
+    match explaining.len() {
+        1 => Named::Explained(explaining),
+        _ if accused => Named::Explained(explaining),
+        _ => Named::None,
+    }
+}
+
+/// What a drive has shown of a point that the manual leaves open.
+pub struct Point<'p> {
+    /// The drive, as the header of a scenario names it.
+    pub drive: String,
+    /// The property.
+    pub name: &'p str,
+    /// The section, with the document.
+    pub section: String,
+    /// Its value, or why none was settled.
+    pub value: Result<String, String>,
+}
+
+/// The points as all parts of a qualification have shown them, and the contradictions between parts in sentences. Every part has the same points
+/// in the same order. A value counts where other parts have shown none.
+fn agreed<'p>(parts: Vec<Vec<Point<'p>>>) -> (Vec<Point<'p>>, Vec<String>) {
+    let values = |place: usize| -> BTreeSet<String> {
+        let shown = parts.iter().filter_map(|part| part.get(place));
+        shown.filter_map(|own| own.value.clone().ok()).collect()
+    };
+    let all: Vec<_> = (0..parts.first().map_or(0, Vec::len)).map(values).collect();
+    let mut points = parts.into_iter().next().unwrap_or_default();
+    let mut contradictions = Vec::new();
+    for (own, mut values) in points.iter_mut().zip(all) {
+        if values.len() > 1 {
+            let values: Vec<_> = values.into_iter().collect();
+            let differ = format!("its values differ from part to part: {}", values.join(", "));
+            contradictions.push(format!("{}, {}: {differ}", own.drive, own.name));
+            own.value = Err(differ);
+        } else if let Some(value) = values.pop_first() {
+            own.value = Ok(value);
+        }
+    }
+    (points, contradictions)
+}
+
+/// Which attempts of the parts of a qualification, one behind the other, repeat what a part before has played: they have the same name and
+/// the same verdict.
+pub fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<bool> {
+    let mut before = BTreeSet::new();
+    let mut all = Vec::new();
+    for part in parts {
+        let own: Vec<_> = part.iter().map(&of).collect();
+        all.extend(own.iter().map(|own| before.contains(own)));
+        before.extend(own);
+    }
+    all
+}
+
+/// The profile of drives: every point that the manual leaves open, of each drive.
+pub struct Profiled {
+    /// It; `None` where the drives were not asked.
+    profile: Option<Profile<ProfileLines>>,
+    /// The contradictions between the parts of a qualification, in sentences.
+    contradictions: Vec<String>,
+}
+
+/// The profile of the drives of a rig, by the points that each part of a qualification has shown; none where it has not asked the drives.
+pub fn profile((rig, began): (&Rig, &str), mut parts: Vec<Vec<Point<'_>>>) -> Profiled {
+    parts.retain(|points| !points.is_empty());
+    let asked = !parts.is_empty();
+    let (points, contradictions) = agreed(parts);
+    Profiled {
+        profile: asked.then(|| of_points((rig, began), points)),
+        contradictions,
+    }
+}
+
+fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<ProfileLines> {
+    let drives = rig.port().map_or(0, |port| port.drives.len());
+    let mut profile = Profile {
+        schema: 1,
+        rig: rig.id().to_owned(),
+        date: began.to_owned(),
+        rings: vec![u8::try_from(drives).unwrap_or(u8::MAX)],
+        property: BTreeMap::new(),
+        open: BTreeMap::new(),
+    };
+    for own in points {
+        let drive = &own.drive;
+        match own.value {
+            Ok(value) => {
+                let line = format!("{drive} property {} = {value}", own.name);
+                let value = format!("{drive}: {value}");
+                profile.settle(own.name, &own.section, &value, &vec![line]);
+            }
+            Err(why) => profile.leave_open(own.name, &format!("{drive}: {why}")),
+        }
+    }
+    profile
+}
+
+/// What a qualification comes to. `frames` is the word for what is received, in the singular; `known` are the deviations that the rig's file
+/// names. `whole` if everything was played.
+pub fn qualified<A: Attempts>(
+    all: &A,
+    profiled: Profiled,
+    frames: &str,
+    known: &[String],
+    whole: bool,
+) -> Qualified {
+    let Profiled {
+        profile,
+        contradictions,
+    } = profiled;
+    let attempts = all.attempts();
+    let named = named(all, &attempts);
+    let settled = profile.as_ref().map_or(0, |own| own.property.len());
+    let open = profile.as_ref().map_or(0, |own| own.open.len());
+    let counted_once = || attempts.iter().enumerate().filter(|own| !own.1.repeats);
+    let verdicts = |verdict| counted_once().filter(move |own| own.1.verdict == verdict);
+    let failed = verdicts(Verdict::Failed).count();
+    let passed = verdicts(Verdict::Passed).count();
+    let unclear = |(place, own): &(usize, &Attempted)| {
+        let settled = [Verdict::Passed, Verdict::Failed, Verdict::Skipped];
+        !(settled.contains(&own.verdict) || own.exact && all.is_right(*place))
+    };
+    let inconclusive = counted_once().filter(unclear).count();
+    let tried = counted_once().count() - verdicts(Verdict::Skipped).count();
+    let received: usize = counted_once().map(|own| own.1.received).sum();
+    let mut text = match &named {
+        Named::Explained(all) if all.is_empty() => {
+            "deviations: the drives differ from the model, and no single known deviation explains it\n".to_owned()
+        }
+        Named::Explained(all) => all
+            .iter()
+            .take(MOST_TOLD)
+            .map(|own| format!("deviation: {own}\n"))
+            .collect(),
+        Named::None if !contradictions.is_empty() => {
+            "deviations: not known; the parts of the qualification show drives that differ\n"
+                .to_owned()
+        }
+        Named::None if inconclusive > 0 || tried == 0 || !whole => {
+            "deviations: not known; no drive is known to be at fault, but not everything was compared and equal\n".to_owned()
+        }
+        Named::None if failed > 0 => {
+            "deviations: not known; attempts failed, and correct drives with other values of what the manual leaves open explain each of them\n".to_owned()
+        }
+        Named::None if known.is_empty() => {
+            "deviations: none; everything received is as the model of the manual says\n".to_owned()
+        }
+        Named::None => format!(
+            "deviations: none beside the known ones ({})\n",
+            known.join(", ")
+        ),
+    };
+    let several = match &named {
+        Named::Explained(all) => all.len(),
+        Named::None => 0,
+    };
+    if several > MOST_TOLD {
+        let more = several - MOST_TOLD;
+        text.push_str(&format!("and {more} more\n"));
+    }
+    if several > 1 {
+        text.push_str(
+            "each of these explains everything received: this does not tell which one it is\n",
+        );
+    }
+    for own in &contradictions {
+        text.push_str(&format!("  {own}\n"));
+    }
+    text.push_str(&format!(
+        "compared: {passed} of {} passed, {failed} failed, {inconclusive} inconclusive; {} received; {settled} of {} settled\n",
+        counted(tried, "attempt"),
+        counted(received, frames),
+        counted(settled + open, "open point"),
+    ));
+    if !whole {
+        text.push_str("the run ended before everything was played\n");
+    }
+    Qualified {
+        profile: profile.map(|own| toml::to_string(&own).unwrap_or_default()),
+        deviations: text,
+        verdict: match named {
+            _ if failed > 0 => Verdict::Failed,
+            Named::Explained(all) if all.len() == 1 => Verdict::Failed,
+            Named::Explained(_) => Verdict::Inconclusive,
+            Named::None if inconclusive > 0 || !whole || !contradictions.is_empty() => {
+                Verdict::Inconclusive
+            }
+            Named::None => Verdict::Passed,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Attempts, each with the deviations that explain it.
+    struct Table(Vec<(Attempted, bool, &'static [&'static str])>);
+
+    impl Attempts for Table {
+        type Deviation = &'static str;
+
+        fn deviations(&self) -> Vec<&'static str> {
+            vec!["one", "two"]
+        }
+
+        fn words(&self, deviation: &&'static str) -> String {
+            (*deviation).to_owned()
+        }
+
+        fn attempts(&self) -> Vec<Attempted> {
+            self.0.iter().map(|own| own.0).collect()
+        }
+
+        fn is_right(&self, attempt: usize) -> bool {
+            self.0[attempt].1
+        }
+
+        fn explains(&self, deviation: &&'static str, attempt: usize) -> bool {
+            self.0[attempt].2.contains(deviation)
+        }
+    }
+
+    fn attempted(verdict: Verdict) -> Attempted {
+        Attempted {
+            verdict,
+            accuses: verdict == Verdict::Failed,
+            exact: false,
+            received: 3,
+            repeats: false,
+        }
+    }
+
+    fn deviations(table: &Table) -> (String, Verdict) {
+        let profiled = Profiled {
+            profile: None,
+            contradictions: Vec::new(),
+        };
+        let own = qualified(table, profiled, "frame", &[], true);
+        (own.deviations, own.verdict)
+    }
+
+    /// One is named where it alone explains what failed and what passed.
+    #[test]
+    fn one_deviation_is_named_where_it_alone_explains_everything() {
+        let failed = attempted(Verdict::Failed);
+        let passed = attempted(Verdict::Passed);
+        let both: &[&str] = &["one", "two"];
+        let named = deviations(&Table(vec![
+            (failed, false, both),
+            (passed, true, &["two"]),
+        ]));
+        assert!(
+            named
+                .0
+                .starts_with("deviation: two\ncompared: 1 of 2 attempts passed"),
+            "{}",
+            named.0
+        );
+        assert_eq!(named.1, Verdict::Failed);
+        let several = deviations(&Table(vec![(failed, false, both), (passed, true, both)]));
+        assert!(
+            several.0.contains("does not tell which one"),
+            "{}",
+            several.0
+        );
+        let none = deviations(&Table(vec![
+            (failed, false, &["one"]),
+            (passed, true, &["two"]),
+        ]));
+        assert!(none.0.contains("no single known deviation"), "{}", none.0);
+    }
+
+    /// Nothing is named for drives that nothing accuses.
+    #[test]
+    fn correct_drives_are_not_named() {
+        let passed = attempted(Verdict::Passed);
+        let own = deviations(&Table(vec![(passed, true, &["one"])]));
+        assert!(own.0.starts_with("deviations: none;"), "{}", own.0);
+        assert_eq!(own.1, Verdict::Passed);
+        let unclear = attempted(Verdict::Inconclusive);
+        let own = deviations(&Table(vec![
+            (unclear, false, &["one"]),
+            (passed, true, &[]),
+        ]));
+        assert!(own.0.starts_with("deviations: not known"), "{}", own.0);
+        assert_eq!(own.1, Verdict::Inconclusive);
+    }
+
+    fn point(value: Result<&str, &str>) -> Point<'static> {
+        Point {
+            drive: "drive 1".to_owned(),
+            name: "event-edges",
+            section: "5.2".to_owned(),
+            value: value.map(str::to_owned).map_err(str::to_owned),
+        }
+    }
+
+    /// A part that has shown nothing contradicts no other; a contradiction is not settled by a third part.
+    #[test]
+    fn a_value_that_differs_from_part_to_part_is_open() {
+        let agreed = |values: &[Result<&str, &str>]| {
+            let parts = values.iter().map(|own| vec![point(*own)]);
+            let (points, contradictions) = agreed(parts.collect());
+            (points[0].value.clone(), contradictions.len())
+        };
+        let (both, open) = (Ok("both"), Err("not asked"));
+        assert_eq!(agreed(&[open, both]), (Ok("both".to_owned()), 0));
+        assert_eq!(agreed(&[both, open]), (Ok("both".to_owned()), 0));
+        assert_eq!(agreed(&[both, both]), (Ok("both".to_owned()), 0));
+        let (value, contradictions) = agreed(&[both, Ok("rising"), open, both]);
+        let differ = "its values differ from part to part: both, rising";
+        assert_eq!((value, contradictions), (Err(differ.to_owned()), 1));
+    }
+
+    /// Drives that are right by themselves and differ from part to part are not said to be right.
+    #[test]
+    fn parts_that_contradict_each_other_are_never_passed() {
+        let passed = Table(vec![(attempted(Verdict::Passed), true, &["one"])]);
+        let profiled = Profiled {
+            profile: None,
+            contradictions: vec!["drive 1, event-edges: they differ".to_owned()],
+        };
+        let own = qualified(&passed, profiled, "frame", &[], true);
+        let expected = "deviations: not known; the parts of the qualification show drives that differ\n  drive 1, event-edges: they differ\n";
+        assert!(own.deviations.starts_with(expected), "{}", own.deviations);
+        assert_eq!(own.verdict, Verdict::Inconclusive);
+    }
+
+    /// A part of wrong drives and a part of right ones: no deviation explains both.
+    #[test]
+    fn no_deviation_explains_a_right_and_a_wrong_drive() {
+        let (passed, failed) = (attempted(Verdict::Passed), attempted(Verdict::Failed));
+        let own = deviations(&Table(vec![(passed, true, &[]), (failed, false, &["one"])]));
+        let expected =
+            "deviations: the drives differ from the model, and no single known deviation";
+        assert!(own.0.starts_with(expected), "{}", own.0);
+        assert_eq!(own.1, Verdict::Failed);
+    }
+
+    /// What a second part has played again is judged, and counted once; another verdict is counted.
+    #[test]
+    fn what_parts_repeat_is_counted_once() {
+        let of = |own: &(&str, Verdict)| (own.0.to_owned(), own.1);
+        let (passed, failed) = (("state", Verdict::Passed), ("state", Verdict::Failed));
+        let own = repeats(&[vec![passed, passed], vec![passed, failed]], of);
+        assert_eq!(own, [false, false, true, false]);
+        let again = Attempted {
+            repeats: true,
+            ..attempted(Verdict::Passed)
+        };
+        let both = Table(vec![
+            (attempted(Verdict::Passed), true, &[]),
+            (again, true, &[]),
+        ]);
+        let own = deviations(&both);
+        let counts = "compared: 1 of 1 attempt passed, 0 failed, 0 inconclusive; 3 frames received";
+        assert!(own.0.contains(counts), "{}", own.0);
+    }
+}

@@ -1,0 +1,45 @@
+//! Benches: the files `rigs/*.toml`, locks, and what may be done with a bench.
+//!
+//! [`file`](mod@file) has the types of a rig file (the JSON schema is derived from them), `check` finds every mistake of a text
+//! with its place, and [`find`](mod@find) a rig by its name. [`lock`] locks rigs and ports, and [`state`] keeps the locks and
+//! which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
+
+pub mod around;
+pub mod buses;
+pub mod check;
+pub mod check_port;
+pub mod check_sim;
+pub mod condition;
+pub mod ends;
+pub mod file;
+pub mod find;
+pub mod hook;
+pub mod in_use;
+pub mod left;
+pub mod lock;
+pub mod permitted;
+pub mod played;
+pub mod port_file;
+pub mod port_session;
+pub mod profile;
+pub mod rings;
+pub mod scan;
+pub mod segment;
+pub mod session_error;
+pub mod state;
+pub mod taken;
+pub mod watchdog;
+
+pub use check::{FindProfile, Rig, parse, parse_beside};
+pub use ends::Ends;
+pub use file::schema;
+pub use find::{FindError, find};
+pub use in_use::{End, UseOptions};
+pub use permitted::standing;
+pub use played::{Again, attempts_of};
+pub use played::{Attempt, Keeper, PlayedScenario};
+pub use profile::{
+    KnownProfile, Profile, ProfileError, ProfileLines, ProfileSetup, SettledProperty,
+};
+pub use session_error::SessionError;
+pub use watchdog::Alarm;

@@ -1,0 +1,337 @@
+//! A link that notes how late the computer is, and lets a bus note what is sent and received.
+
+use crate::link::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
+use crate::medium::{Heard, Medium, Out};
+use harness_proto::line::Received;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::Trace;
+use std::any::Any;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What a bus notes of its link. LinkNotes follow from what the link shows, so that a record gives the same ones.
+pub trait LinkNotes: Default + Send {
+    /// Something was sent; it has left at `end`.
+    fn sent(&mut self, what: Out<'_>, end: Instant);
+
+    /// Something came over this medium at `at`, and was read at `now`.
+    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard);
+
+    /// A conversation begins.
+    fn begin(&mut self);
+
+    /// Why nothing more is worth noting; `None` while something is.
+    fn ended(&self) -> Option<&Trouble> {
+        None
+    }
+}
+
+/// A link to drives, observed.
+pub struct Observed<'l, N> {
+    link: &'l mut dyn Link,
+    /// By how much a wait has ended late, at most.
+    late: Span,
+    /// How the link is made worse; `None` for the link as it is.
+    slow: Option<Slow>,
+    /// Whether the link makes no queries of its own.
+    unpaused: bool,
+    /// How often something was sent.
+    sent: u32,
+    /// What the bus has noted.
+    pub noted: N,
+}
+
+/// What an adapter and a busy computer may do to frames and telegrams.
+#[derive(Clone, Copy, Debug)]
+pub struct Slow {
+    /// How late one leaves.
+    pub by: Span,
+    /// Which of two is late: 0 and 1 for one of them, 2 for both.
+    pub which: u32,
+    /// How exact times are compared.
+    pub tolerance: Span,
+    /// How many of these octets leave without a pause, where those behind them are late; `None` where what is sent stays together.
+    pub parts: Option<fn(&[u8]) -> usize>,
+}
+
+/// How late frames and telegrams may leave through an adapter and a busy computer, in us, beside what was measured.
+const LATE: [u64; 3] = [1_000, 3_000, 15_000];
+
+/// The way to the drives and back, as it was in an attempt.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkTimes {
+    /// By how much a wait has ended late, at most.
+    pub late: Span,
+    /// The longest time that a reply took.
+    pub longest: Span,
+    /// How exact times are; zero where time is virtual.
+    pub tolerance: Span,
+}
+
+impl LinkTimes {
+    /// Ways that are as bad as this one may have been; none where time is virtual.
+    pub fn slow(self) -> impl Iterator<Item = Slow> {
+        let measured = [self.longest, self.longest * 2];
+        let late = LATE.map(Span::from_micros).into_iter().chain(measured);
+        let late = late.flat_map(|by| [0, 1, 2].map(|which| (by, which)));
+        let tolerance = self.tolerance;
+        late.filter(move |_| tolerance > Span::ZERO)
+            .map(move |(by, which)| Slow {
+                by,
+                which,
+                tolerance,
+                parts: None,
+            })
+    }
+
+    /// A way on which octets are late behind what stays together, where time is not virtual.
+    pub fn in_parts(self, parts: fn(&[u8]) -> usize) -> Option<Slow> {
+        (self.tolerance > Span::ZERO).then_some(Slow {
+            by: Span::from_millis(1),
+            which: 2,
+            tolerance: self.tolerance,
+            parts: Some(parts),
+        })
+    }
+}
+
+/// The count by which a session's watchdog sees that the program works; none on a record and on simulated drives.
+#[derive(Clone, Debug, Default)]
+pub struct Beats(Option<Arc<AtomicU64>>);
+
+impl Beats {
+    /// Those of ports.
+    pub const fn of(count: Arc<AtomicU64>) -> Self {
+        Self(Some(count))
+    }
+
+    /// The program works.
+    pub fn beat(&self) {
+        if let Some(count) = &self.0 {
+            count.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// How much was received, and a checksum of it (FNV-1a).
+#[derive(Clone, Copy, Debug)]
+pub struct ReceivedSum {
+    /// How many frames or octets.
+    pub pieces: usize,
+    /// Their checksum.
+    pub sum: u32,
+}
+
+impl Default for ReceivedSum {
+    fn default() -> Self {
+        Self {
+            pieces: 0,
+            sum: 0x811C_9DC5,
+        }
+    }
+}
+
+impl ReceivedSum {
+    /// Adds a part of a piece to the checksum.
+    pub const fn add(&mut self, bits: u32) {
+        self.sum = (self.sum ^ bits).wrapping_mul(0x0100_0193);
+    }
+}
+
+impl<'l, N: LinkNotes> Observed<'l, N> {
+    /// Observes a link.
+    pub fn new(link: &'l mut dyn Link) -> Self {
+        Self {
+            link,
+            late: Span::ZERO,
+            slow: None,
+            unpaused: false,
+            sent: 0,
+            noted: N::default(),
+        }
+    }
+
+    /// The link made worse, for a rehearsal.
+    pub fn slowed(mut self, slow: Option<Slow>) -> Self {
+        self.slow = slow;
+        self
+    }
+
+    /// Keeps the link from queries of its own: they would change what drives do.
+    pub const fn without_pauses(&mut self) {
+        self.unpaused = true;
+    }
+
+    /// By how much a wait has ended late since the last call, at most.
+    pub fn take_late(&mut self) -> Span {
+        std::mem::take(&mut self.late)
+    }
+
+    /// Sends octets in parts.
+    fn send_parts(
+        &mut self,
+        port: usize,
+        octets: &[u8],
+        parts: fn(&[u8]) -> usize,
+        slow: Slow,
+    ) -> Instant {
+        let (part, mut rest) = octets.split_at(parts(octets).min(octets.len()));
+        let mut end = self.link.send(port, Out::Octets(part));
+        while !rest.is_empty() {
+            let length = parts(rest).clamp(1, rest.len());
+            end = self.send_late(port, Out::Octets(&rest[..length]), slow);
+            rest = &rest[length..];
+        }
+        end
+    }
+
+    /// Sends a frame or a telegram later than it should be.
+    fn send_late(&mut self, port: usize, what: Out<'_>, slow: Slow) -> Instant {
+        self.sent += 1;
+        if slow.which > 1 || self.sent % 2 == slow.which {
+            let until = self.link.now() + slow.by;
+            while self.link.now() < until && self.link.trouble().is_none() {
+                self.link.wait(until);
+            }
+        }
+        self.link.send(port, what)
+    }
+}
+
+impl<N: LinkNotes> Line for Observed<'_, N> {
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
+    }
+
+    fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        let end = match (self.slow, what) {
+            (None, what) => self.link.send(port, what),
+            (Some(slow), Out::Octets(octets)) => match slow.parts {
+                None => self.send_late(port, what, slow),
+                Some(parts) => self.send_parts(port, octets, parts, slow),
+            },
+            (Some(slow), Out::Frames(frames)) => {
+                let now = self.link.now();
+                let one_by_one = frames.chunks(1).map(Out::Frames);
+                one_by_one.fold(now, |_, frame| self.send_late(port, frame, slow))
+            }
+        };
+        self.noted.sent(what, end);
+        end
+    }
+
+    fn permits(&self, port: usize, what: Out<'_>) -> bool {
+        self.link.permits(port, what)
+    }
+
+    fn denied(&self, port: usize, what: Out<'_>) -> Option<String> {
+        self.link.denied(port, what)
+    }
+
+    fn refused(&self) -> usize {
+        self.link.refused()
+    }
+
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+        let (at, heard) = self.link.receive(port)?;
+        let (medium, now) = (self.link.medium(port), self.link.now());
+        self.noted.heard(medium, at, now, heard);
+        Some((at, heard))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        let more = self.link.wait(until);
+        self.late = self.late.max(self.link.now().since(until));
+        more
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.noted.ended().or_else(|| self.link.trouble())
+    }
+
+    fn pause_due(&self) -> Option<Instant> {
+        self.link.pause_due().filter(|_| !self.unpaused)
+    }
+
+    fn pause(&mut self) {
+        if !self.unpaused {
+            self.link.pause();
+        }
+    }
+
+    fn lead(&self) -> Lead {
+        self.link.lead()
+    }
+}
+
+impl<N: LinkNotes> Link for Observed<'_, N> {
+    fn capabilities(&self) -> &[Capability] {
+        self.link.capabilities()
+    }
+
+    fn begin(&mut self) {
+        self.link.begin();
+        self.noted.begin();
+    }
+
+    fn step(&mut self, place: usize) {
+        self.link.step(place);
+    }
+
+    fn busy(&self) -> bool {
+        self.link.busy()
+    }
+
+    fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
+        self.link.inject(port, fault, moment);
+    }
+
+    fn reaches(&self, port: usize, link: usize) -> bool {
+        self.link.reaches(port, link)
+    }
+
+    fn damages_parity(&self, port: usize, link: usize) -> bool {
+        self.link.damages_parity(port, link)
+    }
+
+    fn listens(&self, port: usize, link: usize) -> bool {
+        self.link.listens(port, link)
+    }
+
+    fn tapped(&mut self, port: usize, link: usize) -> Option<Vec<Received>> {
+        self.link.tapped(port, link)
+    }
+
+    fn time_tolerance(&self) -> Span {
+        let slow = self.slow.map(|slow| slow.tolerance);
+        slow.unwrap_or_else(|| self.link.time_tolerance())
+    }
+
+    fn beside(&self) -> Option<&dyn Any> {
+        self.link.beside()
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        self.link.unused_faults()
+    }
+
+    fn record(&mut self, on: bool) {
+        self.link.record(on);
+    }
+
+    fn carried(&self) -> u64 {
+        self.link.carried()
+    }
+
+    fn drives(&self, port: usize) -> u8 {
+        self.link.drives(port)
+    }
+
+    fn trace(&self, port: usize) -> Trace {
+        self.link.trace(port)
+    }
+}

@@ -1,0 +1,457 @@
+//! Scenarios on a rig with a port, and their attempts judged again from a record, whatever the bus.
+
+use super::observed::Beats;
+use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
+use crate::bus::Bus;
+use crate::guard::Safe;
+use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
+use crate::rig::left::NotPutBack;
+use crate::rig::port_session::{PortDrives, PortSession, failed};
+use crate::rig::{
+    Again, Attempt, End, Keeper, PlayedScenario, Rig, SessionError, UseOptions, attempts_of,
+};
+use crate::scenario::parse;
+use crate::scenario::problem::Problems;
+use crate::scenario::run::{Outcome, Skip};
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use std::sync::Arc;
+
+/// What playing scenarios on a rig asks of the bus of its drives: a player of attempts, on a rig or on a record.
+pub trait PortPlayer: Sized {
+    /// The bus of its scenarios.
+    const BUS: Bus;
+
+    /// Whether simulated drives are restarted for each attempt: no scenario sees what another one has left.
+    const ANEW: bool;
+
+    /// The drives of a rig.
+    type Drives: PortDrives;
+
+    /// A scenario, read for a rig.
+    type Own;
+
+    /// For a run in which motors may turn, as far as the rig's file permits it, or for one in which they may not; of a qualification or not.
+    fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self;
+
+    /// Judging may take long: the count that shows that the program works meanwhile.
+    fn shows_life(&mut self, beats: Beats);
+
+    /// Where it says what a scenario changes, before it does: for a program that ends before that is put back.
+    fn tells(&mut self, left: NotPutBack);
+
+    /// What a record says of a rig on which motors may turn or not.
+    fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
+
+    /// Reads a scenario.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    fn read(source: &Source) -> Result<Self::Own, Box<Problems>>;
+
+    /// Why a scenario is not begun, whatever the drives are; `None` if it is.
+    fn not_begun(&self, own: &Self::Own) -> Option<Skip>;
+
+    /// Whether a scenario does something to the drives beside the bus.
+    fn disturbs(_own: &Self::Own) -> bool {
+        false
+    }
+
+    /// Whether drives that are restarted for each attempt are set up to be wrong.
+    fn deviates(_rig: &Rig) -> bool {
+        false
+    }
+
+    /// What was recorded of the rig, as a link.
+    fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay;
+
+    /// Waits until an attempt may begin.
+    fn wait(&mut self, _own: &Self::Own, _link: &mut dyn Link) {}
+
+    /// Something was lost in the last attempt: what probes have settled by a silence in it is not known.
+    fn doubt(&mut self) {}
+
+    /// One attempt over a link, with what was received before the scenario, in words.
+    fn attempt(&mut self, own: &Arc<Self::Own>, link: &mut dyn Link) -> (Outcome, String);
+
+    /// Sets back what the last attempt has changed, on drives in their safe state. Returns what is left to say.
+    fn set_back(&mut self, own: &Self::Own, session: &mut PortSession<Self::Drives>)
+    -> Vec<String>;
+
+    /// The scenarios that a qualification plays behind the selected ones.
+    fn conversations(_rig: &Rig) -> Vec<Source> {
+        Vec::new()
+    }
+
+    /// What the attempts of these players come to, one for each part of a qualification; see [`SegmentRun::qualified`].
+    fn qualified(_parts: &[&Self], _rig: &Rig, _began: &str, _whole: bool) -> Option<Qualified> {
+        None
+    }
+}
+
+/// A rig in use.
+pub struct PortRun<P: PortPlayer> {
+    session: PortSession<P::Drives>,
+    options: UseOptions,
+    player: P,
+    again: Again,
+    notes: Vec<String>,
+    /// Why nothing more is played.
+    over: Option<String>,
+    /// A scenario behind which the drives were not seen in their safe state, as after a signal: what it has changed is set back at the end.
+    unfinished: Option<Arc<P::Own>>,
+    /// How simulated drives that were restarted since were not brought to their safe state.
+    not_safe: Option<Safe>,
+}
+
+impl<P: PortPlayer> PortRun<P> {
+    /// Takes a rig.
+    ///
+    /// # Errors
+    /// [`SessionError`]; nothing is left locked or open.
+    pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
+        if rig.port().is_some_and(|port| port.listen_only) {
+            let why = "scenarios send, and its file says `listen_only = true`; set it to false";
+            return Err(failed(rig, why));
+        }
+        Ok(Self::on(PortSession::open(rig, options)?, options))
+    }
+
+    /// Takes a rig that is open, of whose drives nothing is known.
+    pub fn on(mut session: PortSession<P::Drives>, options: &UseOptions) -> Self {
+        let mut player = P::new(session.rig(), options.allow_motion, options.ill_as_well);
+        player.shows_life(session.beats());
+        player.tells(session.left().clone());
+        Self {
+            again: Again::new(!session.rig().is_simulated()),
+            notes: session.left().take_before().into_iter().collect(),
+            session,
+            player,
+            options: options.clone(),
+            over: None,
+            unfinished: None,
+            not_safe: None,
+        }
+    }
+
+    /// The rig.
+    pub const fn session(&self) -> &PortSession<P::Drives> {
+        &self.session
+    }
+
+    /// The same, to be used between scenarios.
+    pub const fn session_mut(&mut self) -> &mut PortSession<P::Drives> {
+        &mut self.session
+    }
+
+    /// Sets back what a scenario has changed.
+    fn set_back(&mut self, own: &P::Own) {
+        let player = &mut self.player;
+        let set_back = |session: &mut _| player.set_back(own, session);
+        let notes = self.session.without_deadline(set_back);
+        self.session.left().keep(&notes);
+        self.notes.extend(notes);
+    }
+
+    /// Takes the drives to their safe state behind a scenario that was broken off, and sets back what it has changed.
+    ///
+    /// # Errors
+    /// The safe state is not confirmed.
+    pub fn clear_up(&mut self) -> Result<(), Safe> {
+        let Some(own) = self.unfinished.take() else {
+            return Ok(());
+        };
+        let safe = self.session.make_safe();
+        if !safe.confirmed {
+            self.unfinished = Some(own);
+            return Err(safe);
+        }
+        self.set_back(&own);
+        Ok(())
+    }
+
+    /// Forgets what is known of the drives: others have used them.
+    pub fn forget_drives(&mut self) {
+        let (rig, options) = (self.session.rig(), &self.options);
+        self.player = P::new(rig, options.allow_motion, options.ill_as_well);
+        self.player.shows_life(self.session.beats());
+        self.player.tells(self.session.left().clone());
+        self.again = Again::new(!self.session.rig().is_simulated());
+        self.over = None;
+    }
+
+    /// Takes simulated drives that were just switched on.
+    fn restart(&mut self) {
+        match PortSession::open(self.session.rig(), &self.options) {
+            Ok(fresh) => {
+                let _simulated = std::mem::replace(&mut self.session, fresh).release();
+            }
+            Err(error) => self.over = Some(error.to_string()),
+        }
+    }
+
+    fn attempt(&mut self, own: &Arc<P::Own>, sink: &mut dyn Sink) -> Attempt {
+        let anew = P::ANEW && self.session.rig().is_simulated();
+        if anew {
+            self.restart();
+        }
+        self.player.wait(own, self.session.link());
+        self.session.link().reset_after_denial();
+        self.session.look_at_interlocks();
+        // A look takes drives where no scenario expects them that were just switched on.
+        let looked = !self.session.rig().file.interlock.is_empty();
+        if anew && looked && self.session.sound().is_ok() {
+            self.restart();
+        }
+        let _before = self.session.take_doubtful();
+        let mut recording = Recording::new(self.session.link(), sink);
+        let (mut outcome, before) = self.player.attempt(own, &mut recording);
+        let traces = vec![recording.trace(0)];
+        // A link that is lost may be back at the end of the run.
+        let tripped = matches!(
+            self.session.guarded().trouble(),
+            Some(Trouble::Interlock(_) | Trouble::Lost(_))
+        );
+        let played = outcome.verdict != Verdict::Skipped && !anew;
+        if played && tripped {
+            // The drives go to their safe state at the end of the run, and what the scenario has changed is set back then.
+            self.unfinished = Some(Arc::clone(own));
+        } else if played {
+            let safe = self.session.make_safe();
+            match safe.confirmed {
+                true => self.set_back(own),
+                false => {
+                    self.unfinished = Some(Arc::clone(own));
+                    self.over = Some(format!("after the scenario: {safe}"));
+                }
+            }
+        }
+        if outcome.verdict == Verdict::Failed && self.over.is_none() {
+            self.session.hear_of_losses();
+        }
+        // A pass needs every reply; what differs may be a reply that is lost.
+        let unplaced = match outcome.verdict {
+            Verdict::Passed => self.session.take_unplaced(),
+            _ => self.session.take_doubtful(),
+        };
+        outcome.unplaced(unplaced);
+        if unplaced > 0 {
+            self.player.doubt();
+        }
+        // What a fault of the scenario has switched off is no drive that disobeys.
+        let may_disobey = match outcome.verdict {
+            Verdict::Failed => true,
+            Verdict::Skipped => false,
+            _ => P::deviates(self.session.rig()),
+        };
+        if anew && may_disobey && !P::disturbs(own) {
+            let safe = self.session.make_safe();
+            self.not_safe = self.not_safe.take().or((!safe.confirmed).then_some(safe));
+        }
+        Attempt {
+            opening: Some(before),
+            unplaced,
+            ..Attempt::new(outcome, traces)
+        }
+    }
+}
+
+impl<P: PortPlayer> SegmentRun for PortRun<P> {
+    fn segment(&self) -> OnSegment {
+        P::segment(self.session.rig(), self.options.allow_motion)
+    }
+
+    fn play(
+        &mut self,
+        source: &Source,
+        mut keeper: Option<&mut dyn Keeper>,
+    ) -> Result<PlayedScenario, SessionError> {
+        let own = match read::<P>(source) {
+            Ok(own) => Arc::new(own),
+            Err(skip) => return Ok(PlayedScenario::skipped(skip)),
+        };
+        if let Some(skip) = self.player.not_begun(&own) {
+            return Ok(PlayedScenario::skipped(skip.on_port()));
+        }
+        let real = !self.session.rig().is_simulated();
+        let most = attempts_of(self.session.rig(), real, false);
+        let mut attempts = Vec::new();
+        loop {
+            let number = attempts.len() + 1;
+            let mut forgotten: Vec<LinkEvent> = Vec::new();
+            let attempt = match &mut keeper {
+                Some(keeper) => {
+                    keeper.begins(number);
+                    let attempt = self.attempt(&own, &mut **keeper);
+                    keeper.ends(number, &attempt);
+                    attempt
+                }
+                None => self.attempt(&own, &mut forgotten),
+            };
+            attempts.push(attempt);
+            let more = self.again.after(&attempts, most);
+            if !more || self.over.is_some() || self.session.link().trouble().is_some() {
+                return Ok(PlayedScenario::of(attempts));
+            }
+        }
+    }
+
+    fn conversations(&self) -> Vec<Source> {
+        P::conversations(self.session.rig())
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        P::qualified(&[&self.player], self.session.rig(), began, whole)
+    }
+
+    fn notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    fn over(&mut self) -> Option<String> {
+        // The link is in trouble then, which ends the run.
+        self.session.end_if_overdue();
+        self.over.clone()
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.session.guarded().trouble().cloned()
+    }
+
+    fn close(mut self: Box<Self>, error: bool) -> End {
+        let mut not_safe = self.not_safe.take();
+        if self.unfinished.is_some() {
+            self.session.resume();
+            if let Err(safe) = self.clear_up() {
+                not_safe = Some(safe);
+                self.notes.extend(self.session.left().foretold());
+            }
+        }
+        let notes = self.notes();
+        let mut end = self.session.close(error);
+        // Simulated drives are taken to their safe state behind scenarios alone.
+        end.safe = end.safe.or(not_safe);
+        end.remarks.extend(notes);
+        end
+    }
+}
+
+/// Judges a record: of simulated drives by playing it again, of others from what was received.
+pub struct PortJudge<P: PortPlayer> {
+    rig: Rig,
+    allow_motion: bool,
+    qualifies: bool,
+    player: P,
+    /// The simulated rig, from the first attempt on.
+    run: Option<PortRun<P>>,
+    /// What has played the parts before.
+    before: Vec<P>,
+}
+
+impl<P: PortPlayer> PortJudge<P> {
+    /// See [`PortPlayer::new`].
+    pub fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
+        Self {
+            allow_motion,
+            qualifies,
+            run: None,
+            player: P::new(rig, allow_motion, qualifies),
+            rig: rig.clone(),
+            before: Vec::new(),
+        }
+    }
+
+    /// Plays an attempt on the simulated rig again, behind those before it.
+    fn again(&mut self, own: &Arc<P::Own>) -> Result<RepeatedVerdict, String> {
+        let mut run = match self.run.take() {
+            Some(run) => run,
+            None => {
+                let options = UseOptions {
+                    allow_motion: self.allow_motion,
+                    ill_as_well: self.qualifies,
+                    ..UseOptions::default()
+                };
+                // Nothing outside the folder is touched.
+                let mut rig = self.rig.clone();
+                rig.file.hooks = Default::default();
+                rig.file.power.clear();
+                rig.file.quarantine = None;
+                PortRun::open(&rig, &options).map_err(|error| error.to_string())?
+            }
+        };
+        let mut events: Vec<LinkEvent> = Vec::new();
+        let attempt = run.attempt(own, &mut events);
+        let trouble = run.trouble().is_some();
+        self.run = Some(run);
+        Ok(RepeatedVerdict {
+            outcome: attempt.outcome,
+            before: attempt.opening,
+            left: None,
+            played: Some((events, attempt.traces)),
+            trouble,
+        })
+    }
+}
+
+impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
+    fn doubt(&mut self) {
+        self.player.doubt();
+    }
+
+    fn segments(&self) -> [OnSegment; 2] {
+        [true, false].map(|motion| P::segment(&self.rig, motion))
+    }
+
+    fn not_begun(&self, source: &Source) -> Option<Outcome> {
+        let skip = match read::<P>(source) {
+            Err(skip) => Some(skip),
+            Ok(own) => self.player.not_begun(&own),
+        };
+        skip.map(Outcome::skipped)
+    }
+
+    fn conversations(&self) -> Vec<Source> {
+        P::conversations(&self.rig)
+    }
+
+    fn begin_part(&mut self) {
+        let fresh = P::new(&self.rig, self.allow_motion, self.qualifies);
+        let player = std::mem::replace(&mut self.player, fresh);
+        let player = self.run.take().map_or(player, |run| run.player);
+        self.before.push(player);
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        let last = self.run.as_ref().map_or(&self.player, |run| &run.player);
+        let parts: Vec<&P> = self.before.iter().chain([last]).collect();
+        P::qualified(&parts, &self.rig, began, whole)
+    }
+
+    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {
+        let own = P::read(source).map_err(|problems| problems.to_string())?;
+        let own = Arc::new(own);
+        if self.rig.is_simulated() {
+            return self.again(&own);
+        }
+        let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
+        let mut replay = self.player.replay(events, tolerance);
+        let (outcome, before) = self.player.attempt(&own, &mut replay);
+        Ok(RepeatedVerdict {
+            outcome,
+            before: Some(before),
+            left: replay.left(),
+            played: None,
+            trouble: replay.trouble().is_some(),
+        })
+    }
+}
+
+/// A scenario of this bus, or why it is not played here.
+fn read<P: PortPlayer>(source: &Source) -> Result<P::Own, Skip> {
+    match parse::bus(source) {
+        // It was read when it was selected.
+        bus if bus == P::BUS => P::read(source).map_err(|_| Skip::not_on_rig(P::BUS)),
+        other => Err(Skip::not_on_rig(other)),
+    }
+}

@@ -1,0 +1,45 @@
+//! A rig that this program holds: not in quarantine, locked, its hook `before` run and its power on.
+
+use super::Rig;
+use super::around::Around;
+use super::in_use::UseOptions;
+use super::lock::RigLock;
+use super::session_error::SessionError;
+use super::state;
+
+/// A rig in the hands of this program, before its ports are opened. The lock is given back last.
+#[derive(Debug)]
+pub struct Taken {
+    pub around: Around,
+    pub lock: Option<RigLock>,
+}
+
+/// Takes a rig. A simulated one needs no lock.
+pub fn take(rig: &Rig, options: &UseOptions) -> Result<Taken, SessionError> {
+    let forbidden = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
+        rig: rig.id().to_owned(),
+        since: quarantine.since.clone(),
+        reason: quarantine.reason.clone(),
+    };
+    if let Some(quarantine) = &rig.file.quarantine {
+        return Err(forbidden(quarantine));
+    }
+    let lock = if rig.is_simulated() {
+        None
+    } else {
+        let folder = state::folder().map_err(SessionError::State)?;
+        let kept = state::quarantine(&folder, rig.id()).map_err(SessionError::State)?;
+        if let Some(quarantine) = kept {
+            return Err(forbidden(&quarantine));
+        }
+        let lock = RigLock::acquire(rig, &options.purpose, options.wait, &options.interrupt);
+        options.unless_interrupted(rig)?;
+        Some(lock?)
+    };
+    let around = Around::begin(rig).map_err(|error| SessionError::Hook {
+        rig: rig.id().to_owned(),
+        error,
+    })?;
+    options.unless_interrupted(rig)?;
+    Ok(Taken { around, lock })
+}

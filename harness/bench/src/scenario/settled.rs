@@ -1,0 +1,98 @@
+//! A settled scenario of any bus, for rooms that need not know which.
+
+use super::language::Language;
+use super::parse::parse;
+use super::plan::{Plan, plan};
+use super::problem::Problems;
+use super::run::player::play_until;
+use super::run::{AtMismatch, Outcome};
+use super::source::Source;
+use super::syntax::Scenario;
+use crate::link::{Capability, Link};
+use crate::traffic::SegmentReport;
+use std::fmt::Debug;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// A settled scenario, and what every bus can do with it.
+pub trait Settled: Debug + Send + Sync {
+    /// What a rig must have for it.
+    fn needs(&self) -> &[Capability];
+
+    /// How many drives its bench has; `3+1` where it has two buses.
+    fn size(&self) -> String;
+
+    /// How many steps are played.
+    fn steps(&self) -> usize;
+
+    /// How many ports the master has on its bench.
+    fn ports(&self) -> usize;
+
+    /// How what was carried is shown; `None` for a ring.
+    fn report(&self) -> Option<&'static dyn SegmentReport>;
+
+    /// A simulated bench for it.
+    fn simulate(&self) -> Box<dyn Link>;
+
+    /// Plays it on a simulated bench of its own. Where no step judges anything, it has not passed.
+    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+        self.play_until(link, at_mismatch, &AtomicBool::new(false))
+    }
+
+    /// The same, aborted once `interrupt` is set.
+    fn play_until(
+        &self,
+        link: &mut dyn Link,
+        at_mismatch: AtMismatch,
+        interrupt: &AtomicBool,
+    ) -> Outcome;
+}
+
+impl<L: Language> Settled for Plan<L> {
+    fn needs(&self) -> &[Capability] {
+        &self.needs
+    }
+
+    fn size(&self) -> String {
+        L::size(self)
+    }
+
+    fn steps(&self) -> usize {
+        self.steps.len()
+    }
+
+    fn ports(&self) -> usize {
+        L::ports(self)
+    }
+
+    fn report(&self) -> Option<&'static dyn SegmentReport> {
+        L::report()
+    }
+
+    fn simulate(&self) -> Box<dyn Link> {
+        L::simulate(self)
+    }
+
+    fn play_until(
+        &self,
+        link: &mut dyn Link,
+        at_mismatch: AtMismatch,
+        interrupt: &AtomicBool,
+    ) -> Outcome {
+        // A rig's drives are compared with a model beside the scenario; the simulated ones of a scenario's own are not.
+        play_until(self, link, at_mismatch, interrupt).judged_by(self)
+    }
+}
+
+/// Reads and settles a scenario in the words of a bus. What it says in the words of every bus comes back as well, as a scenario of `C`.
+///
+/// # Errors
+/// Its mistakes.
+pub fn settle<L: Language, C: Language>(
+    source: &Source,
+    size: Option<u8>,
+) -> Result<(Scenario<C>, Arc<dyn Settled>), Problems> {
+    let scenario: Scenario<L> = parse(source)?;
+    let plan = plan(&scenario, source, size)?;
+    Ok((scenario.in_common(), Arc::new(plan)))
+}

@@ -1,0 +1,5 @@
+//! A scenario as written, for a bench of any size.
+
+pub mod scenario;
+
+pub use scenario::*;

@@ -1,0 +1,131 @@
+//! The scenario, its header and its steps.
+
+use crate::bus::Bus;
+use crate::link::Capability;
+use crate::scenario::expression::{Counter, Located};
+use crate::scenario::language::Language;
+use crate::scenario::problem::TextSpan;
+use crate::scenario::times::{Duration, Window};
+
+/// A scenario: what it is, the bench that it needs, and its steps.
+#[derive(Clone, Debug)]
+pub struct Scenario<L: Language> {
+    /// What the conversation shows, in a line.
+    pub title: String,
+    /// The tables of which manuals it pins.
+    pub sources: Vec<Citation>,
+    /// Which bus.
+    pub bus: Bus,
+    /// The header lines of the bus.
+    pub header: L::Header,
+    /// What it says that it needs of a rig.
+    pub needs: Vec<Capability>,
+    /// Whether bytes that no line asked for are a failure.
+    pub strict: bool,
+    /// How long a line without a time waits.
+    pub deadline: Option<Duration>,
+    /// The steps, in order.
+    pub steps: Vec<Step<L>>,
+}
+
+impl<L: Language> Scenario<L> {
+    /// A scenario without steps.
+    #[must_use]
+    pub fn new(title: &str, header: L::Header) -> Self {
+        Self {
+            title: title.to_owned(),
+            sources: Vec::new(),
+            bus: L::BUS,
+            header,
+            needs: Vec::new(),
+            strict: false,
+            deadline: None,
+            steps: Vec::new(),
+        }
+    }
+}
+
+impl<L: Language> Scenario<L> {
+    /// What it says in words that every bus has; without the header lines of its bus and without steps.
+    pub fn in_common<C: Language>(self) -> Scenario<C> {
+        Scenario {
+            title: self.title,
+            sources: self.sources,
+            bus: self.bus,
+            header: Default::default(),
+            needs: self.needs,
+            strict: self.strict,
+            deadline: self.deadline,
+            steps: Vec::new(),
+        }
+    }
+}
+
+/// A reference to a manual: `nd21 9.7`, `nd21 8.2 exchange-6`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Citation {
+    /// The whole reference, single spaces between its words.
+    pub text: String,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// A step.
+#[derive(Clone, Debug)]
+pub struct Step<L: Language> {
+    /// The time in front.
+    pub when: When,
+    /// What happens.
+    pub action: Action<L>,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+impl<L: Language> From<Action<L>> for Step<L> {
+    /// A step without a time in front.
+    fn from(action: Action<L>) -> Self {
+        Self {
+            when: When::Now,
+            action,
+            span: TextSpan::default(),
+        }
+    }
+}
+
+/// A time in front of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// None: as soon as the line before is done.
+    Now,
+    /// `+`: after the line before.
+    After(Window),
+    /// `@`: since the start.
+    At(Window),
+}
+
+/// What a step does.
+#[derive(Clone, Debug)]
+pub enum Action<L: Language> {
+    /// `>`: the master sends.
+    Send {
+        /// On which port of the bench, counted from 0.
+        port: usize,
+        /// What.
+        message: L::Message,
+    },
+    /// `<`: the master receives.
+    Receive {
+        /// On which port of the bench, counted from 0.
+        port: usize,
+        /// What.
+        message: L::Message,
+    },
+    /// `wait`: time passes.
+    Wait(Duration),
+    /// `for k in 0..last`: what stands up to its `end` is played for each number, in this order.
+    For(Counter, Located, Located),
+    /// `end`: of the loop that began last.
+    End,
+    /// A step of the bus.
+    Own(L::Step),
+}

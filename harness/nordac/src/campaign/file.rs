@@ -1,0 +1,233 @@
+//! What stands in a campaign file of this bus (`corpora/campaigns/nordac/*.toml`).
+
+use super::CLASSES;
+use harness_bench::bus::Bus;
+use harness_bench::file::values::Time;
+use harness_proto::nordac::PpoType;
+use harness_proto::nordac::parameter::ParameterRef;
+use harness_proto::time::Span;
+use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::octet_segment::{LineFault, TelegramFault};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// The most steps of a conversation.
+const MOST_STEPS: usize = 100;
+
+/// The longest wait and the longest delay.
+const LONGEST: Span = Span::from_millis(10_000);
+
+/// A campaign file.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TelegramCampaignFile {
+    /// The version of this schema: 1.
+    pub schema: u32,
+    /// The bus: `nordac`.
+    pub bus: String,
+    /// What the campaign shows, in a line.
+    pub title: String,
+    /// The PPO type, 1 to 4; 1 where nothing is said.
+    #[serde(default = "one")]
+    pub ppo: u8,
+    /// What the master does, see [`CampaignStep`].
+    pub steps: Vec<String>,
+    /// The kinds of faults.
+    pub faults: Vec<FaultName>,
+    /// By how much `late` delays.
+    #[serde(default)]
+    pub delays: Vec<Time>,
+    /// How often a request without a reply is repeated; once where nothing is said.
+    #[serde(default = "one")]
+    pub repeats: u8,
+    /// How many cases there must be of each class, and of all `cases`; what is not named is not looked at.
+    #[serde(default)]
+    pub expect: BTreeMap<String, u64>,
+}
+
+const fn one() -> u8 {
+    1
+}
+
+/// A kind of fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FaultName {
+    /// Each of the eleven bits of each octet, one at a time.
+    Bits,
+    /// Two neighbouring data bits of each octet, which parity does not show.
+    TwoBits,
+    /// Each octet does not arrive.
+    Dropped,
+    /// Each telegram is not sent.
+    Lost,
+    /// Each telegram is sent twice.
+    Doubled,
+    /// Each telegram begins later.
+    Late,
+    /// In place of each telegram its sender sends its former one.
+    Former,
+}
+
+impl FaultName {
+    /// Whether it happens to octets.
+    pub(super) const fn is_of_octets(self) -> bool {
+        matches!(self, Self::Bits | Self::TwoBits | Self::Dropped)
+    }
+
+    /// The faults of this kind.
+    pub(super) fn faults(self, delays: &[Time]) -> Vec<LineFault> {
+        let flip = |flips| LineFault::Octet(LinkFault::Flip(flips));
+        let data = |bits: u8| {
+            flip(Flips {
+                data: bits,
+                ..Flips::default()
+            })
+        };
+        let one = LineFault::Telegram;
+        match self {
+            Self::Bits => {
+                let usual = Flips::default();
+                let others = [
+                    Flips {
+                        start: true,
+                        ..usual
+                    },
+                    Flips {
+                        parity: true,
+                        ..usual
+                    },
+                    Flips {
+                        stop: true,
+                        ..usual
+                    },
+                ];
+                let bits = (0..8).map(|bit| data(1 << bit));
+                bits.chain(others.map(flip)).collect()
+            }
+            Self::TwoBits => (0..7).map(|bit| data(3 << bit)).collect(),
+            Self::Dropped => vec![LineFault::Octet(LinkFault::Drop)],
+            Self::Lost => vec![one(TelegramFault::Lost)],
+            Self::Doubled => vec![one(TelegramFault::Doubled)],
+            Self::Late => delays
+                .iter()
+                .map(|time| one(TelegramFault::Late(span(*time))))
+                .collect(),
+            Self::Former => vec![one(TelegramFault::Former)],
+        }
+    }
+}
+
+/// A step of the conversation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CampaignStep {
+    /// `start`: Slave_Diag, Set_Prm, Chk_Cfg, Slave_Diag.
+    Start,
+    /// `exchange 047F 2000`: one Data_Exchange with this control word and setpoint.
+    Exchange(u16, u16),
+    /// `read 1202`: a parameter, by exchanges with the words in force.
+    Read(ParameterRef),
+    /// `write 1202 = 100`: the same with its raw value.
+    Write(ParameterRef, u32),
+    /// `wait 20ms`.
+    Wait(Span),
+}
+
+fn span(time: Time) -> Span {
+    Span::from_nanos(u64::try_from(time.0.as_nanos()).unwrap_or(u64::MAX))
+}
+
+/// Whether a text names this bus.
+pub(super) fn is_of_this_bus(text: &str) -> bool {
+    let table: Result<toml::Table, _> = toml::from_str(text);
+    table.is_ok_and(|table| {
+        table.get("bus").and_then(|bus| bus.as_str()) == Some(Bus::Nordac.name())
+    })
+}
+
+/// Reads a campaign file, its PPO type and its steps.
+///
+/// # Errors
+/// What is wrong, where, and what is expected.
+pub(super) fn read(
+    text: &str,
+) -> Result<(TelegramCampaignFile, PpoType, Vec<CampaignStep>), String> {
+    let file: TelegramCampaignFile = toml::from_str(text).map_err(|error| error.to_string())?;
+    if file.schema != 1 {
+        return Err(format!(
+            "schema {} is not known: write schema = 1",
+            file.schema
+        ));
+    }
+    let ppo = PpoType::from_number(file.ppo)
+        .ok_or_else(|| format!("ppo {} is none: 1 to 4 are expected", file.ppo))?;
+    let count = file.steps.len();
+    if !(1..=MOST_STEPS).contains(&count) {
+        return Err(format!(
+            "`steps` has {count} entries: 1 to {MOST_STEPS} are expected"
+        ));
+    }
+    if file.faults.contains(&FaultName::Late) == file.delays.is_empty() {
+        return Err(
+            "`late` in `faults` needs `delays`, such as [\"5ms\"], and `delays` needs `late`"
+                .to_owned(),
+        );
+    }
+    if let Some(long) = file.delays.iter().find(|time| span(**time) > LONGEST) {
+        return Err(format!(
+            "a delay of {long} is too long: at most 10 s are expected"
+        ));
+    }
+    let known = |name: &str| name == "cases" || CLASSES.iter().any(|own| own.name == name);
+    if let Some(name) = file.expect.keys().find(|name| !known(name)) {
+        let names: Vec<_> = CLASSES.iter().map(|own| own.name).collect();
+        return Err(format!(
+            "`{name}` in [expect] is no class: cases, {} are expected",
+            names.join(", ")
+        ));
+    }
+    let read = |(index, text): (usize, &String)| {
+        let step = step(text).and_then(|step| match step {
+            CampaignStep::Read(_) | CampaignStep::Write(..) if !ppo.has_pkw() => Err(format!(
+                "{ppo} has no parameter channel: ppo = 1 or 2 is expected"
+            )),
+            step => Ok(step),
+        });
+        step.map_err(|wrong| format!("step {} (`{text}`): {wrong}", index + 1))
+    };
+    let steps = file
+        .steps
+        .iter()
+        .enumerate()
+        .map(read)
+        .collect::<Result<_, _>>()?;
+    Ok((file, ppo, steps))
+}
+
+/// One step.
+fn step(text: &str) -> Result<CampaignStep, String> {
+    let words: Vec<_> = text.split_whitespace().collect();
+    let parameter = |name: &str| ParameterRef::parse(name).map_err(|error| error.to_string());
+    let word = |text: &str| {
+        let word = u16::from_str_radix(text, 16)
+            .ok()
+            .filter(|_| text.len() == 4);
+        word.ok_or_else(|| format!("`{text}` is no word: four hexadecimal digits are expected"))
+    };
+    Ok(match words[..] {
+        ["start"] => CampaignStep::Start,
+        ["exchange", control, setpoint] => CampaignStep::Exchange(word(control)?, word(setpoint)?),
+        ["read", name] => CampaignStep::Read(parameter(name)?),
+        ["write", name, "=", value] => {
+            let own = parameter(name)?;
+            let raw = value.parse().ok().and_then(|number| own.parameter.raw_of(number));
+            CampaignStep::Write(own, raw.ok_or_else(|| format!("`{value}` is no value of {name}: a raw decimal number that fits it is expected"))?)
+        }
+        ["wait", time] => {
+            let time: Option<u64> = time.strip_suffix("ms").and_then(|digits| digits.parse().ok());
+            let time = time.filter(|time| (1..=10_000).contains(time));
+            CampaignStep::Wait(Span::from_millis(time.ok_or("1ms to 10000ms are expected behind `wait`")?))
+        }
+        _ => return Err("this is no step: `start`, `exchange STW HSW`, `read PNU`, `write PNU = NUMBER` or `wait TIME` is expected".to_owned()),
+    })
+}

@@ -1,0 +1,64 @@
+//! `drivebench cells --bus nordac`: the parameters of the inverter (NORDAC 4.1.3, 5).
+
+use crate::value::ReplyWord;
+use harness_bench::command::exit::Exit;
+use harness_bench::command::output::Output;
+use harness_proto::nordac::parameter::{Flag, Limit};
+use harness_proto::nordac::{PARAMETERS, Parameter};
+
+/// Shows the parameters that have `filter` in their number, name, unit or section.
+pub fn cells(filter: &str, output: &mut Output) -> std::io::Result<Exit> {
+    let filter = filter.to_lowercase();
+    let lines = PARAMETERS.iter().map(line);
+    let wanted: String = lines
+        .filter(|line| line.to_lowercase().contains(&filter))
+        .collect();
+    if wanted.is_empty() {
+        output.complain(
+            "no parameter has this text in it; `drivebench cells --bus nordac` shows all of them",
+        );
+        return Ok(Exit::NothingSelected);
+    }
+    output.result(&output.fitted(&wanted))?;
+    Ok(Exit::Passed)
+}
+
+/// The numbers of all parameters, and the words of a reply: names with spaces need quotes, which a shell does not add.
+pub fn names() -> impl Iterator<Item = String> {
+    let words = ReplyWord::ALL.map(|(name, _)| name.to_owned());
+    let numbers = PARAMETERS.iter().map(|own| own.number.to_string());
+    words.into_iter().chain(numbers)
+}
+
+/// Number, flags, name, section, limits and factory setting, and what behind its number selects a set or an element.
+fn line(own: &Parameter) -> String {
+    let limit = |limit: Limit| match limit {
+        Limit::Raw(raw) => own.show(0, raw.into()).to_string(),
+        other => other.to_string(),
+    };
+    let mut line = format!(
+        "{} {:03X} {:4} {:34} {:5} {} to {}, factory setting {}",
+        own.number,
+        own.number,
+        own.flags,
+        own.name,
+        own.section,
+        limit(own.least),
+        limit(own.most),
+        own.show(0, own.default.into())
+    );
+    let last = own.count.saturating_sub(1);
+    match (own.is_array(), own.has(Flag::Set)) {
+        (true, true) => line.push_str(&format!(
+            "; {}.ELEMENT.SET, elements 0 to {last}, sets 1 to 4",
+            own.number
+        )),
+        (true, false) if last > 0 => line.push_str(&format!(
+            "; sub-indices {}.0 to {}.{last}",
+            own.number, own.number
+        )),
+        (false, true) => line.push_str(&format!("; sets {}.1 to {}.4", own.number, own.number)),
+        _ => {}
+    }
+    line + "\n"
+}

@@ -1,0 +1,253 @@
+//! `drivebench info` and `top` on NORDAC inverters: identity, state, fault, frequency, and what guards the motor.
+
+use super::bench::driver;
+use super::control::send_off;
+use super::read::{Found, find};
+use crate::driver::{Driver, Error};
+use crate::live;
+use crate::report::Reader;
+use crate::rig::Inverters;
+use crate::value::{Cell, ReplyWord, parameter};
+use harness_bench::capture::Piece;
+use harness_bench::capture::runs::TelegramRun;
+use harness_bench::command::axes::Axes;
+use harness_bench::command::drive::{InfoArguments, OutputForm, TopArguments};
+use harness_bench::command::exit::Exit;
+use harness_bench::command::failure::Failure;
+use harness_bench::command::line_top::LineTop;
+use harness_bench::command::output::Output;
+use harness_bench::command::output::columns;
+use harness_bench::command::port_bench::{PortBench, on, select};
+use harness_bench::command::rig_name::Use;
+use harness_bench::command::top::check as check_top;
+use harness_bench::top::{TopColumn, TopForm, TopRow};
+use harness_proto::nordac::PpoType;
+use harness_proto::nordac::words::State;
+use serde_json::{Map, Value, json};
+
+/// What is shown of a slave that has a parameter channel: the heading, and the parameter.
+const SHOWN: [(&str, &str); 10] = [
+    ("fault", "1800"),
+    ("past fault", "1801"),
+    ("frequency", "1813"),
+    ("maximum", "1205"),
+    ("heat sink", "1825"),
+    ("link voltage", "1825.2"),
+    ("interface", "1621"),
+    ("bus time-out", "1625"),
+    ("software", "1812"),
+    ("hours", "1808"),
+];
+
+/// A slave as it was found.
+struct Seen {
+    slave: u8,
+    ppo: PpoType,
+    /// The process words, and the parameters.
+    words: Vec<Found>,
+    parameters: Vec<(&'static str, Found)>,
+}
+
+impl Seen {
+    /// What is shown, each with its heading and where it stands.
+    fn rows(&self) -> Vec<(String, String, String)> {
+        let mut rows = vec![(
+            "PPO type".to_owned(),
+            self.ppo.to_string(),
+            "1622".to_owned(),
+        )];
+        let names = ["status", "actual value"];
+        for (name, found) in names.into_iter().zip(&self.words) {
+            rows.push((name.to_owned(), found.words(), found.cell.name()));
+        }
+        for (name, found) in &self.parameters {
+            rows.push(((*name).to_owned(), value(found), found.cell.name()));
+        }
+        rows
+    }
+
+    fn of(&self, heading: &str) -> String {
+        let own = self.parameters.iter().find(|(name, _)| *name == heading);
+        own.map_or_else(|| "-".to_owned(), |(_, found)| value(found))
+    }
+}
+
+/// A value in words; 0 is no fault, and no time-out.
+fn value(found: &Found) -> String {
+    match (found.cell, found.number) {
+        (Cell::Parameter(own), 0) if matches!(own.parameter.number, 1800..=1805) => {
+            "none".to_owned()
+        }
+        (Cell::Parameter(own), 0) if own.parameter.number == 1625 => {
+            "none: nothing stops the motor if the master fails".to_owned()
+        }
+        (Cell::Parameter(own), 0) if own.parameter.number == 1621 => {
+            "0: local, the bus does not control it".to_owned()
+        }
+        _ => found.words(),
+    }
+}
+
+/// Reads the process words of a slave, and some of what is shown of its parameters.
+fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Result<Seen, Error> {
+    let ppo = driver.join(slave)?;
+    let words = [ReplyWord::Status, ReplyWord::Actual].map(Cell::Word);
+    let words = find(driver, slave, &words)?;
+    let mut parameters = Vec::new();
+    if ppo.has_pkw() {
+        for (name, text) in SHOWN.into_iter().filter(|(name, _)| wanted(name)) {
+            let Ok(own) = parameter(text) else {
+                continue;
+            };
+            let found = find(driver, slave, &[Cell::Parameter(own)])?;
+            parameters.extend(found.into_iter().map(|found| (name, found)));
+        }
+    }
+    Ok(Seen {
+        slave,
+        ppo,
+        words,
+        parameters,
+    })
+}
+
+/// Lists slaves. One that does not answer is reported, and the others are listed.
+pub(super) fn info(
+    bench: PortBench<'_, Inverters>,
+    arguments: &InfoArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let as_what = Use::look("info");
+    on(bench, &arguments.rig, as_what, output, |session, output| {
+        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
+        let mut driver = driver(session);
+        let mut all = Vec::new();
+        let mut exit = Exit::Passed;
+        for slave in slaves {
+            match look(&mut driver, slave, |_| true) {
+                Ok(seen) => all.push(seen),
+                Err(error @ Error::Link(_)) => return Err(error.into()),
+                Err(error) => exit = exit.max(Failure::from(error).tell(output)),
+            }
+        }
+        match arguments.format {
+            OutputForm::Text => output.result(&output.fitted(&text(&all)))?,
+            OutputForm::Json => {
+                let slaves: Vec<_> = all.iter().map(object).collect();
+                output.result(&format!("{}\n", json!({"schema": 1, "drives": slaves})))?;
+            }
+        }
+        Ok(exit)
+    })
+}
+
+/// Shows all slaves, a row each.
+pub(super) fn top(
+    bench: PortBench<'_, Inverters>,
+    arguments: &TopArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    check_top(arguments, output)?;
+    let as_what = Use::look("top");
+    on(bench, &arguments.rig, as_what, output, |session, output| {
+        let slaves = select(&[Axes::All], session)?;
+        let mut reader = Reader::default();
+        let view = LineTop {
+            what: "inverters on PROFIBUS",
+            form: &FORM,
+            traffic: &["from", "telegrams", "telegrams/s", "damaged"],
+            picture: live::picture_of_port(&slaves),
+            read: &mut |session, slave| {
+                let shown = |name: &str| FORM.columns.iter().any(|own| own.head == name);
+                Ok(row(&look(&mut driver(session), slave, shown)?))
+            },
+            stop: &mut send_off,
+            rows: &mut |heard| {
+                let run = |piece| match piece {
+                    Piece::Telegram(from, octets) => Some(TelegramRun { from, octets }),
+                    _ => None,
+                };
+                let runs: Vec<_> = heard.into_iter().filter_map(run).collect();
+                let row = |run| (live::at_port(run, &slaves, &mut reader), run);
+                live::without_tokens(runs.iter().map(row))
+            },
+        };
+        view.show(session, arguments, output)
+    })
+}
+
+/// The table of `top`. The states are those of NORDAC 3.3.
+static FORM: TopForm = TopForm {
+    drive: "slave",
+    columns: &[
+        TopColumn::words("slave", 5),
+        TopColumn::words("PPO", 4),
+        TopColumn::words("fault", 5),
+        TopColumn::words("frequency", 9),
+        TopColumn::words("HIW", 7),
+        TopColumn::words("heat sink", 9),
+        TopColumn::words("status", 0),
+    ],
+    give_way: &[1, 5, 4, 3],
+    states: &[
+        "not read",
+        "no state of the manual",
+        "fault",
+        "fault reaction active",
+        "quick stop active",
+        "not ready to start",
+        "start-disable",
+        "ready to start",
+        "ready for operation",
+        "operation enabled",
+    ],
+};
+
+fn row(seen: &Seen) -> TopRow {
+    let mut words = seen.words.iter().map(Found::words);
+    let (status, actual) = (words.next(), words.next());
+    let mut numbers = seen.words.iter().map(|own| own.number as u16);
+    let (zsw, hiw) = (numbers.next().unwrap_or(0), numbers.next());
+    let state = State::of_zsw(zsw);
+    let fault = seen.parameters.iter().find(|(name, _)| *name == "fault");
+    let in_error = matches!(state, Some(State::Fault | State::FaultReaction));
+    TopRow {
+        state: FORM.state(state.map_or("no state of the manual", State::name)),
+        in_error,
+        speed: hiw.map(|own| f64::from(own.cast_signed())),
+        error: fault
+            .and_then(|(_, own)| u32::try_from(own.number).ok())
+            .filter(|_| in_error),
+        cells: vec![
+            seen.slave.to_string(),
+            seen.ppo.to_string(),
+            seen.of("fault"),
+            seen.of("frequency"),
+            actual.unwrap_or_default(),
+            seen.of("heat sink"),
+            status.unwrap_or_default(),
+        ],
+    }
+}
+
+fn text(all: &[Seen]) -> String {
+    let rows: Vec<_> = all
+        .iter()
+        .flat_map(|seen| {
+            let slave = seen.slave.to_string();
+            let rows = seen.rows().into_iter();
+            rows.map(move |(what, value, place)| [slave.clone(), what, value, place])
+        })
+        .collect();
+    columns(&["slave", "what", "value", "parameter"], &rows)
+}
+
+fn object(seen: &Seen) -> Value {
+    let mut object = Map::new();
+    object.insert("slave".to_owned(), json!(seen.slave));
+    for (name, value, _) in seen.rows() {
+        let name = name.to_lowercase().replace([' ', '-'], "_");
+        object.insert(name, json!(value));
+    }
+    Value::Object(object)
+}

@@ -1,0 +1,257 @@
+//! Conversations with NORDAC slaves behind an adapter.
+//!
+//! The telegrams of a conversation are what was sent, and what came between one request and the next. A reply that the computer or the adapter
+//! brings only behind the next request would be taken for the reply to that one. So a request without a reply is waited for twice as long as
+//! the rig's file grants, and a conversation in which something comes unasked behind such a request is not judged.
+
+use super::act::{Counts, TelegramActKind};
+use super::generate::TelegramSpice;
+use super::oracle::TelegramDifference;
+use super::{TelegramTalk, TelegramsSeen};
+use crate::gate::GuardsSlaves as _;
+use crate::judge::{Breach, judge_runs};
+use crate::language::Nordac;
+use crate::rig::OfNordac as _;
+use crate::rig::{Inverters, Session, limits, slaves};
+use harness_bench::capture::runs::TelegramRun;
+use harness_bench::explore::ExploreError;
+use harness_bench::explore::line::LineRig;
+use harness_bench::guard::Guarded;
+use harness_bench::link::{Line as _, Octets as _};
+use harness_bench::rig::{Ends, Rig};
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::PpoType;
+use harness_proto::profibus::fdl::BROADCAST;
+use harness_proto::profibus::{Buffer, Telegram};
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::LineByte;
+
+/// How long the line is left alone behind a telegram that is not answered.
+const UNANSWERED: Span = Span::from_millis(2);
+
+/// The same at the end of a conversation.
+const REST: Span = Span::from_millis(20);
+
+impl LineRig for Nordac {
+    type Drives = Inverters;
+    /// The telegrams of the last conversation.
+    type Kept = Vec<TelegramRun>;
+
+    fn stations(rig: &Rig, session: Option<&Session>) -> Vec<(u8, PpoType)> {
+        let listed = || rig.port().map(slaves).unwrap_or_default();
+        let own = session.map_or_else(listed, |own| own.slaves().to_vec());
+        own.iter()
+            .map(|own| (own.address, own.ppo.unwrap_or_default()))
+            .collect()
+    }
+
+    /// Parameters are not written: every write is permanent (NORDAC 5).
+    fn possible(rig: &Rig, allow_motion: bool, spice: TelegramSpice) -> bool {
+        use TelegramSpice as Own;
+        let limits = limits(rig, allow_motion);
+        match spice {
+            Own::Tasks | Own::Services | Own::Setup | Own::Control => true,
+            Own::Functions | Own::Lengths => true,
+            Own::Motion | Own::Words => limits.motion,
+            Own::Masters => limits.other_stations,
+            Own::Damage => {
+                limits.motion && limits.eeprom && limits.motor_data && limits.bus_settings
+            }
+            Own::Changes | Own::Bus | Own::World | Own::Power => false,
+        }
+    }
+
+    fn keep(_: &mut Session) -> Result<Vec<TelegramRun>, ExploreError> {
+        Ok(Vec::new())
+    }
+
+    fn tidy(_: &mut Session, _: &mut Vec<TelegramRun>) {}
+
+    fn restore(_: &mut Session, _: &mut Vec<TelegramRun>) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn denied(session: &Session, talk: &TelegramTalk, seen: &TelegramsSeen) -> Option<String> {
+        let only_simulated = |what: &TelegramActKind| {
+            !matches!(
+                what,
+                TelegramActKind::Ask(_) | TelegramActKind::Octets { .. }
+            )
+        };
+        if talk.acts.iter().any(|act| only_simulated(&act.what)) {
+            return Some("only a simulated slave can be switched".to_owned());
+        }
+        let mut gate = session.guarded().slaves()?.clone();
+        let began = session.guarded().now();
+        let mut replies = seen.said.iter().peekable();
+        for done in &seen.done {
+            while let Some(reply) = replies.next_if(|own| own.at <= done.at) {
+                reply.octets.iter().for_each(|own| gate.hear(Some(*own)));
+            }
+            let Some(sent) = &done.sent else { continue };
+            if sent.bad.is_some() {
+                return Some("only a simulated line can be disturbed".to_owned());
+            }
+            let now = began + done.at.since_start();
+            let mut octets = sent.octets.iter();
+            if let Some(why) = octets.find_map(|own| gate.admit(now, *own).err()) {
+                return Some(format!("a telegram is not sent: {why}"));
+            }
+        }
+        None
+    }
+
+    fn converse(
+        session: &mut Session,
+        heard: &mut Vec<TelegramRun>,
+        talk: &TelegramTalk,
+    ) -> Option<String> {
+        heard.clear();
+        let patience = session.patience();
+        let mut line = Conversation {
+            link: session.link(),
+            patience,
+            heard,
+            asked: None,
+            silent: false,
+            late: false,
+        };
+        let mut counts = Counts::default();
+        for act in &talk.acts {
+            for _ in 0..act.times {
+                if let Some(sent) = counts.outgoing(&act.what) {
+                    line.ask(&sent.octets);
+                }
+                line.pass(act.wait());
+                if line.link.trouble().is_some() {
+                    return None;
+                }
+            }
+        }
+        let rest = if line.silent { patience } else { REST };
+        line.pass(rest);
+        line.late.then(|| {
+            "a reply came later than `patience` grants: the computer or the line was late"
+                .to_owned()
+        })
+    }
+
+    fn judged(_: &Session, heard: &Vec<TelegramRun>) -> (Option<TelegramDifference>, bool) {
+        let first = judge_runs(heard.iter().cloned())
+            .breaches
+            .into_iter()
+            .next();
+        (first.map(TelegramDifference::from), false)
+    }
+}
+
+impl From<Breach> for TelegramDifference {
+    fn from(own: Breach) -> Self {
+        Self {
+            what: own.what,
+            part: own.part,
+            section: own.section.to_owned(),
+            slave: Some(own.slave),
+            telegram: own.telegram,
+            under: Vec::new(),
+            about: own.about,
+        }
+    }
+}
+
+/// A conversation while it is played.
+struct Conversation<'s> {
+    link: &'s mut Guarded<Ends>,
+    /// How long a reply may take.
+    patience: Span,
+    heard: &'s mut Vec<TelegramRun>,
+    /// The station that was asked last.
+    asked: Option<u8>,
+    /// Whether a request was not answered.
+    silent: bool,
+    /// Whether something came that may be the reply to an earlier request.
+    late: bool,
+}
+
+impl Conversation<'_> {
+    /// Sends a telegram, and waits for the reply.
+    fn ask(&mut self, octets: &[u8]) {
+        self.pass(Span::ZERO);
+        let end = self.link.send_octets(0, octets);
+        if self.link.trouble().is_some() {
+            return;
+        }
+        let sent = octets
+            .iter()
+            .map(|own| LineByte::seen(end, Some(*own), Some(*own), None));
+        self.heard.push(TelegramRun {
+            from: None,
+            octets: sent.collect(),
+        });
+        let owed = match Telegram::decode(octets) {
+            Decoded::Value { value, used } if used == octets.len() => {
+                let pdu = value.pdu();
+                self.asked = pdu.map(|own| own.da());
+                pdu.is_some_and(|own| {
+                    let sends_only = own.fc().function().is_some_and(|own| own.is_sdn());
+                    own.da() != BROADCAST && !sends_only
+                })
+            }
+            // Somebody may read a request out of it.
+            _ => true,
+        };
+        if !owed {
+            self.reply(end + UNANSWERED);
+        } else if !self.reply(end + self.patience) {
+            self.silent = true;
+            self.late |= self.reply(self.link.now() + self.patience);
+        }
+    }
+
+    /// Takes what comes, until it is a whole telegram or the time is over. Whether anything came.
+    fn reply(&mut self, until: Instant) -> bool {
+        let (mut until, last) = (until, until + self.patience);
+        let mut octets = Vec::new();
+        let mut telegram = Buffer::new();
+        'heard: loop {
+            while let Some((at, own)) = self.link.receive_octet(0) {
+                octets.push(LineByte::seen(
+                    at,
+                    Some(own.byte),
+                    Some(own.byte),
+                    own.error,
+                ));
+                let fits = telegram.push(own.byte) && own.error.is_none();
+                if fits && matches!(Telegram::decode(&telegram), Decoded::Value { .. }) {
+                    break 'heard;
+                }
+                until = until.max(at + self.patience).min(last);
+            }
+            if self.link.trouble().is_some() || self.link.now() >= until {
+                break;
+            }
+            self.link.wait(until);
+        }
+        let came = !octets.is_empty();
+        if came {
+            let from = self.asked;
+            self.heard.push(TelegramRun {
+                from: from.or(Some(0)),
+                octets,
+            });
+        }
+        came
+    }
+
+    /// Lets time pass. What comes is not asked for.
+    fn pass(&mut self, time: Span) {
+        let until = self.link.now() + time;
+        let last = until + self.patience;
+        while self.reply(until) {
+            self.late |= self.silent;
+            if self.link.now() > last {
+                break;
+            }
+        }
+    }
+}

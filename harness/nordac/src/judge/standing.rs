@@ -1,0 +1,131 @@
+//! Whose telegrams are judged: other devices stand on the same line.
+
+use harness_bench::capture::runs::TelegramRun;
+use harness_proto::nordac::IDENT;
+use harness_proto::profibus::Telegram;
+use harness_proto::profibus::dp::{Service, SetPrm};
+use harness_proto::profibus::fdl::Pdu;
+use std::collections::BTreeMap;
+
+/// Whether a slave is judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// It is a NORDAC: by its diagnosis, or by what a master set it up as.
+    #[default]
+    Known,
+    /// The user says that it is one.
+    Named,
+    /// The user names others.
+    NotNamed,
+    /// Nothing shows what it is.
+    Unknown,
+    /// Its diagnosis has another ident number, but a master set it up as a NORDAC.
+    Mistaken,
+    /// Its diagnosis has this ident number.
+    Foreign(u16),
+}
+
+impl Standing {
+    pub(super) const fn is_judged(self) -> bool {
+        !matches!(self, Self::NotNamed | Self::Foreign(_))
+    }
+
+    /// Why it is not judged.
+    pub(super) fn why_not(self) -> Option<String> {
+        match self {
+            Self::NotNamed => Some("`--judge` does not name it".to_owned()),
+            Self::Foreign(ident) => Some(format!(
+                "its diagnosis has the ident number {ident:04X}, and a NORDAC has {IDENT:04X}; `--judge` with its address judges it"
+            )),
+            _ => None,
+        }
+    }
+
+    /// Why what differs does not accuse it; `None` where it does.
+    pub(super) const fn doubt(self) -> Option<&'static str> {
+        match self {
+            Self::Unknown => Some(
+                "no diagnosis and no Set_Prm shows that this slave is a NORDAC; `--judge` with its address judges it",
+            ),
+            Self::Mistaken => Some(
+                "its diagnosis never has the ident number 7531, so it may be another device at the address of a NORDAC; `--judge` with its \
+                 address judges it",
+            ),
+            _ => None,
+        }
+    }
+}
+
+/// What a line shows of a slave.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown {
+    /// An ident number of its diagnosis that is another one than that of a NORDAC.
+    other: Option<u16>,
+    /// Its diagnosis has had the ident number of a NORDAC.
+    own: bool,
+    /// A master has set it up as a NORDAC.
+    set_up: bool,
+}
+
+/// The standing of all slaves of a line; `named` are those that the user names.
+pub(super) fn standings(runs: &[TelegramRun], named: &[u8]) -> BTreeMap<u8, Standing> {
+    let mut all: BTreeMap<u8, Shown> = BTreeMap::new();
+    let mut asked: Option<Pdu> = None;
+    for run in runs {
+        let telegram = run.said().and_then(|own| own.telegram());
+        let pdu = telegram.as_ref().and_then(Telegram::pdu).copied();
+        let Some(slave) = run.from else {
+            asked = pdu;
+            if let Some(own) = pdu.filter(|own| Service::of(own.dsap()) == Some(Service::SetPrm)) {
+                let prm = SetPrm::decode(own.data());
+                let shown = all.entry(own.da()).or_default();
+                shown.set_up |= prm.is_some_and(|own| own.ident == IDENT);
+            }
+            continue;
+        };
+        let shown = all.entry(slave).or_default();
+        let diagnosis =
+            |own: &Pdu| own.da() == slave && Service::of(own.dsap()) == Some(Service::SlaveDiag);
+        if asked.take().is_some_and(|own| diagnosis(&own))
+            && let Some(own) = pdu.and_then(|own| ident(own.data()))
+        {
+            match own == IDENT {
+                true => shown.own = true,
+                false => shown.other = Some(own),
+            }
+        }
+    }
+    let standing = |slave: u8, shown: &Shown| match (named.is_empty(), shown) {
+        (false, _) if named.contains(&slave) => Standing::Named,
+        (false, _) => Standing::NotNamed,
+        (true, Shown { own: true, .. }) => Standing::Known,
+        (
+            true,
+            Shown {
+                other: Some(_),
+                set_up: true,
+                ..
+            },
+        ) => Standing::Mistaken,
+        (
+            true,
+            Shown {
+                other: Some(ident), ..
+            },
+        ) => Standing::Foreign(*ident),
+        (true, Shown { set_up: true, .. }) => Standing::Known,
+        (true, Shown { .. }) => Standing::Unknown,
+    };
+    named
+        .iter()
+        .for_each(|own| _ = all.entry(*own).or_default());
+    let all = all.iter();
+    all.map(|(slave, shown)| (*slave, standing(*slave, shown)))
+        .collect()
+}
+
+/// The ident number of a diagnosis of any device (EN 2): of another length than a NORDAC's too.
+fn ident(data: &[u8]) -> Option<u16> {
+    let ident = data.get(4..6)?;
+    ident.try_into().ok().map(u16::from_be_bytes)
+}

@@ -1,0 +1,163 @@
+//! Lines that begin with `slave`.
+
+use super::super::syntax::{Outside, SetupKind, TelegramStep};
+use super::value;
+use harness_bench::scenario::expression::{self, Located};
+use harness_bench::scenario::parse::words::{deviation, named, required};
+use harness_bench::scenario::problem::Problem;
+use harness_bench::scenario::scanner::Scanner;
+use harness_proto::nordac::PpoType;
+use harness_proto::nordac::Properties;
+use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
+use harness_sim::nordac::deviation::{Deviation, deviations};
+
+/// What a line about a slave is.
+pub(super) enum SlaveLine {
+    /// A header line.
+    Setup(SetupKind),
+    /// A step.
+    Outside(Outside),
+}
+
+#[derive(Clone, Copy)]
+enum Word {
+    Ppo,
+    Posicon,
+    Property,
+    Parameter,
+    Deviates,
+    Link,
+    Fault,
+    Restart,
+}
+
+const WORDS: [(&str, Word); 8] = [
+    ("ppo", Word::Ppo),
+    ("posicon", Word::Posicon),
+    ("parameter", Word::Parameter),
+    ("property", Word::Property),
+    ("deviates", Word::Deviates),
+    ("link", Word::Link),
+    ("fault", Word::Fault),
+    ("restart", Word::Restart),
+];
+
+/// Reads what stands behind `slave`.
+pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, SlaveLine), Problem> {
+    let slave = expression::sum(scanner)?;
+    let before = scanner.clone();
+    if scanner.at_end() {
+        return Ok((slave, SlaveLine::Setup(there(scanner)?)));
+    }
+    let line = match named(scanner, &WORDS, "what the line says of the slave")? {
+        Word::Ppo | Word::Posicon => {
+            *scanner = before;
+            SlaveLine::Setup(there(scanner)?)
+        }
+        Word::Property => SlaveLine::Setup(property(scanner)?),
+        Word::Parameter => {
+            let (name, value) = value::assigned(scanner)?;
+            SlaveLine::Setup(SetupKind::Parameter(name, value))
+        }
+        Word::Deviates => {
+            let names: Vec<(&str, &'static Deviation)> =
+                deviations().map(|own| (own.name, own)).collect();
+            let line = "`slave 8 deviates NAME`";
+            SlaveLine::Setup(SetupKind::Deviates(deviation(
+                scanner, &names, "a slave", line,
+            )?))
+        }
+        Word::Link => {
+            let ends = [("lost", false), ("found", true)];
+            let found = named(scanner, &ends, "what becomes of the link")?;
+            SlaveLine::Outside(Outside::Link(found))
+        }
+        Word::Fault => {
+            let digit = scanner
+                .peek()
+                .is_some_and(|c| c.is_ascii_digit() || c == '(');
+            let number = digit.then(|| expression::sum(scanner)).transpose()?;
+            let levels = [("on", true), ("off", false)];
+            let on = named(scanner, &levels, "whether the cause is there")?;
+            SlaveLine::Outside(Outside::Fault { number, on })
+        }
+        Word::Restart => SlaveLine::Outside(Outside::Restart),
+    };
+    Ok((slave, line))
+}
+
+/// A line that begins with `slave`, as a step.
+pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<TelegramStep, Problem> {
+    let before = scanner.clone();
+    let (slave, line) = line(scanner)?;
+    match line {
+        SlaveLine::Outside(outside) => Ok(TelegramStep::Outside(slave, outside)),
+        // A time stands in front of it.
+        SlaveLine::Setup(_) => {
+            *scanner = before;
+            Err(scanner.unexpected("a slave and what happens to it (link, fault, restart)"))
+        }
+    }
+}
+
+/// `ppo 2`, `posicon`, in either order; both may be left out.
+fn there(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
+    let (mut ppo, mut posicon) = (None, false);
+    while !scanner.at_end() {
+        let before = scanner.clone();
+        required(scanner, &["ppo", "posicon"])?;
+        let mut again = before.clone();
+        let twice = match again.eat_word("ppo") {
+            true => ppo.replace(ppo_type(scanner)?).is_some(),
+            false => std::mem::replace(&mut posicon, true),
+        };
+        if twice {
+            *scanner = before;
+            return Err(scanner.unexpected("the end of the line (it is given twice)"));
+        }
+    }
+    Ok(SetupKind::There { ppo, posicon })
+}
+
+/// `1` to `4`.
+pub(super) fn ppo_type(scanner: &mut Scanner<'_>) -> Result<PpoType, Problem> {
+    let before = scanner.clone();
+    let digits = scanner.take_while(|c| c.is_ascii_alphanumeric());
+    let number = digits.and_then(|own| own.value.parse().ok());
+    let found = number.and_then(PpoType::from_number);
+    found.ok_or_else(|| {
+        *scanner = before;
+        scanner.unexpected("a PPO type, 1 to 4")
+    })
+}
+
+/// `pzd-invalid = hold`; without `=` as well.
+fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
+    let before = scanner.clone();
+    // Some names begin with the number of a parameter.
+    let name = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
+    let name = name.map_or("", |own| own.value);
+    let Some(property) = Description::of(name) else {
+        *scanner = before;
+        let known: Vec<_> = PROPERTIES.iter().map(|own| own.name).collect();
+        let problem = scanner.unexpected("a property, such as pzd-invalid");
+        return Err(problem.did_you_mean(name, &known));
+    };
+    scanner.eat("=");
+    let before = scanner.clone();
+    let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || "-.".contains(c));
+    let word = word.map_or("", |own| own.value);
+    if property.set(&mut Properties::default(), word) {
+        return Ok(SetupKind::Property(property, word.to_owned()));
+    }
+    *scanner = before;
+    Err(match property.accepts {
+        Accepts::Words(words) => {
+            let problem = scanner.unexpected(&words.join(" or "));
+            problem.did_you_mean(word, words)
+        }
+        Accepts::Count { least, most, .. } => {
+            scanner.unexpected(&format!("a number from {least} to {most}"))
+        }
+    })
+}

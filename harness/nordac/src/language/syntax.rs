@@ -1,0 +1,273 @@
+//! Scenarios of this bus as written: header lines, telegrams and steps.
+
+use harness_bench::scenario::expression::Located;
+use harness_bench::scenario::pattern::Pattern;
+use harness_bench::scenario::problem::{Spanned, TextSpan};
+use harness_bench::scenario::times::Duration;
+use harness_proto::nordac::properties::Description;
+use harness_proto::nordac::{Parameter, PpoType};
+use harness_proto::profibus::BusRate;
+use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::nordac::deviation::{Deviation, MasterDeviation};
+use harness_sim::octet_segment::TelegramFault;
+
+/// The header lines of this bus.
+#[derive(Clone, Debug, Default)]
+pub struct Header {
+    /// `rate 500`, in kbit/s.
+    pub rate: Option<BusRate>,
+    /// `master deviates NAME`.
+    pub master: Option<Spanned<&'static MasterDeviation>>,
+    /// Lines about slaves, in order.
+    pub slaves: Vec<SlaveLine>,
+}
+
+/// A header line about a slave.
+#[derive(Clone, Debug)]
+pub struct SlaveLine {
+    /// The slave's address.
+    pub slave: Located,
+    /// What the line says.
+    pub what: SetupKind,
+    /// The whole line.
+    pub span: TextSpan,
+}
+
+/// What a header line says about a slave.
+#[derive(Clone, Debug)]
+pub enum SetupKind {
+    /// `slave 8`, `slave 8 ppo 2`, `slave 8 posicon`: it is there.
+    There {
+        /// The PPO type that it is set to.
+        ppo: Option<PpoType>,
+        /// Whether it has the PosiCon option.
+        posicon: bool,
+    },
+    /// `property pzd-invalid = hold`.
+    Property(&'static Description, String),
+    /// `parameter 1205 = 70.0Hz`.
+    Parameter(ParameterName, WrittenValue),
+    /// `deviates NAME`.
+    Deviates(&'static Deviation),
+}
+
+/// A parameter and its index.
+#[derive(Clone, Debug)]
+pub struct ParameterName {
+    /// Which parameter.
+    pub which: Which,
+    /// What stands behind it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
+    pub index: Vec<Located>,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// How a parameter is given.
+#[derive(Clone, Debug)]
+pub enum Which {
+    /// `1205`.
+    Numbered(u16),
+    /// `"Maximum frequ."`: one of the table.
+    Named(&'static Parameter),
+    /// `(k)`: by a number that a loop counts.
+    Counted(Located),
+}
+
+/// A value as written.
+#[derive(Clone, Debug)]
+pub struct WrittenValue {
+    /// What is written.
+    pub kind: ValueKind,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// A raw number, or a number with a unit.
+#[derive(Clone, Debug)]
+pub enum ValueKind {
+    /// `700`: a raw decimal number.
+    Raw(i64),
+    /// `70.0Hz`: a number with its unit, as written.
+    Given(String),
+    /// `(k*10)`.
+    Counted(Located),
+}
+
+/// A telegram behind `>` or `<`.
+#[derive(Clone, Debug)]
+pub struct Message {
+    /// Its octets.
+    pub octets: Pattern,
+    /// What is wrong with some of them.
+    pub bad: Vec<Bad>,
+}
+
+/// `bad 3`: an octet of a telegram that goes out damaged.
+#[derive(Clone, Debug)]
+pub struct Bad {
+    /// Which octet, counted from 1.
+    pub octet: Located,
+    /// What is wrong with it.
+    pub how: Damage,
+}
+
+/// What is wrong with an octet of a telegram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Damage {
+    /// `bad 3`: its parity bit is wrong.
+    Parity,
+    /// `bad 3 stop`: its stop bit is 0.
+    Stop,
+    /// `bad 3 flip 0 4`: these bits of it are inverted.
+    Flip(Flips),
+    /// `bad 3 gap 2bytes`: the line is idle for this time in front of it.
+    Gap(Duration),
+}
+
+/// A step of this bus.
+#[derive(Clone, Debug)]
+pub enum TelegramStep {
+    /// `! slave 8 byte 3: flip 0`.
+    Octet(Sender, Located, OctetHarm),
+    /// `! slave 8 telegram 3: lost`.
+    Telegram(Sender, Located, TelegramHarm),
+    /// `! slave 8: off`.
+    Power(Located, bool),
+    /// `slave 8 link lost`.
+    Outside(Located, Outside),
+    /// `? quiet`.
+    Quiet,
+    /// `? slave 8 parameter 1202 = 100`.
+    Parameter(Located, ParameterName, WrittenValue),
+    /// `read 8 1202 = 5s`.
+    Job(JobStep),
+}
+
+/// Whose octets or telegrams are counted.
+#[derive(Clone, Debug)]
+pub enum Sender {
+    /// Those of all stations.
+    Any,
+    /// `master`.
+    Master,
+    /// `slave 8`.
+    Slave(Located),
+}
+
+/// What happens to an octet on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OctetHarm {
+    /// One that says all that there is to say.
+    Plain(LinkFault),
+    /// `delay 3ms`: it leaves later, and those behind it too.
+    Delay(Duration),
+}
+
+/// What happens to a telegram on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TelegramHarm {
+    /// `lost`, `doubled` or `former`.
+    Plain(TelegramFault),
+    /// `delay 3ms`: it begins later.
+    Delay(Duration),
+}
+
+/// What happens to a slave from outside its bus.
+#[derive(Clone, Debug)]
+pub enum Outside {
+    /// `link lost`, `link found`: whether inverter and module have each other.
+    Link(bool),
+    /// `fault on`, `fault 3 on`, `fault off`: a cause of a fault comes or goes.
+    Fault {
+        /// The number of the fault; 3 (overcurrent) where none is given.
+        number: Option<Located>,
+        /// Whether the cause is there.
+        on: bool,
+    },
+    /// `restart`: power off and on.
+    Restart,
+}
+
+/// A job of the master.
+#[derive(Clone, Debug)]
+pub struct JobStep {
+    /// The slave.
+    pub slave: Located,
+    /// What is to be done.
+    pub what: JobKind,
+}
+
+/// What a job does.
+#[derive(Clone, Debug)]
+pub enum JobKind {
+    /// `start 8 ppo 1 watchdog 300ms`.
+    Start {
+        /// The PPO type that the master configures; that of the slave where it is left out.
+        ppo: Option<PpoType>,
+        /// The DP watchdog; off where it is left out.
+        watchdog: Option<Duration>,
+    },
+    /// `exchange 8 STW=047F HSW=50% -> ZSW=0F37 HIW=50%`.
+    Exchange {
+        /// What is sent; words that are left out stay as they are.
+        send: Vec<(WordName, WordValue)>,
+        /// What the reply must hold.
+        expect: Vec<(WordName, WordValue)>,
+    },
+    /// `read 8 1202 = 5s`.
+    Read(ParameterName, Option<Wanted>),
+    /// `write 8 1205.3 = 50.0Hz`, with `error 2` behind it where it must be refused.
+    Write(ParameterName, WrittenValue, Option<Located>),
+    /// `on 8`.
+    On,
+    /// `off 8`.
+    Off,
+    /// `quick-stop 8`.
+    QuickStop,
+    /// `acknowledge 8`.
+    Acknowledge,
+}
+
+/// What a `read` must give.
+#[derive(Clone, Debug)]
+pub enum Wanted {
+    /// `= 5s`.
+    Value(WrittenValue),
+    /// `error 3`: the number of the error.
+    Error(Located),
+}
+
+/// A word of the process data, or the parameter channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WordName {
+    /// STW or ZSW.
+    Control,
+    /// HSW or HIW.
+    Main,
+    /// PZD3.
+    Third,
+    /// PZD4.
+    Fourth,
+    /// The eight bytes of the parameter channel.
+    Pkw,
+}
+
+/// The contents of a word as written.
+#[derive(Clone, Debug)]
+pub struct WordValue {
+    /// What is written.
+    pub kind: WordKind,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// How a word is written.
+#[derive(Clone, Debug)]
+pub enum WordKind {
+    /// `047F`, `0Fxx`: hexadecimal digits, `xx` for any byte.
+    Bytes(Vec<Option<u8>>),
+    /// `50%` of 4000h, as its digits and how many of them stand behind the point.
+    Percent(i64, u32),
+    /// `(k*256)`.
+    Counted(Located),
+}

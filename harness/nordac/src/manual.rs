@@ -1,0 +1,32 @@
+//! The manual of PROFIBUS DP for NORDAC *vector*.
+
+use harness_bench::bus::Bus;
+use harness_bench::manual::{Manual, Open};
+use harness_proto::nordac::properties::{Accepts, PROPERTIES};
+
+/// The manual of PROFIBUS DP for NORDAC *vector*.
+pub const MANUAL: Manual = Manual {
+    bus: Bus::Nordac,
+    title: "NORDAC vector PROFIBUS DP manual",
+    document: "nordac",
+    tables: include_str!("../../../corpora/manual/nordac-tables.toml"),
+    errata: include_str!("../../../corpora/manual/nordac-errata.toml"),
+    open,
+};
+
+fn open() -> Vec<Open> {
+    let own = PROPERTIES.iter().map(|property| Open {
+        section: property.section,
+        name: property.name,
+        values: match property.accepts {
+            Accepts::Words(words) => words.join(" or "),
+            Accepts::Count {
+                least,
+                default,
+                most,
+            } => format!("{default}, or another number from {least} to {most}"),
+        },
+        about: property.about,
+    });
+    own.collect()
+}

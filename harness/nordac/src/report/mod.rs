@@ -1,0 +1,57 @@
+//! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a capture, a picture.
+
+pub mod csv;
+pub(crate) mod curves;
+pub mod diff;
+pub mod json;
+pub mod live;
+pub mod pcapng;
+pub(crate) mod sequence;
+pub mod table;
+mod words;
+
+pub(super) use words::{CONTROL, PRM};
+pub use words::{ProcessImage, Reader};
+
+use harness_bench::bus::Bus;
+use harness_bench::capture::runs::said;
+use harness_bench::html::Html;
+use harness_bench::traffic::{SegmentReport, SharedForm, drawn, no_form};
+use harness_sim::record::Trace;
+use std::io::{Error, Write};
+use std::ops::Range;
+
+/// How telegrams are shown.
+#[derive(Clone, Copy, Debug)]
+pub struct TelegramReport;
+
+impl SegmentReport for TelegramReport {
+    fn carries(&self) -> &'static str {
+        "telegrams of PROFIBUS"
+    }
+
+    fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
+        table::table(trace, wanted, at_most)
+    }
+
+    fn pictures(&self, trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+        drawn(
+            |html| sequence::sequence(html, id, title, trace),
+            |html| curves::curves(html, id, trace),
+        )
+    }
+
+    fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
+        match form {
+            SharedForm::Json => json::write(Bus::Nordac, traces, out),
+            SharedForm::Csv => csv::write(traces, out),
+            SharedForm::Pcapng => pcapng::write(traces, out),
+            SharedForm::Candump => Err(no_form(self.carries(), form)),
+        }
+    }
+}
+
+/// How many telegrams these traces have.
+pub fn count(traces: &[Trace]) -> usize {
+    traces.iter().map(|trace| said(trace).len()).sum()
+}

@@ -1,0 +1,317 @@
+//! What is noted of a link to NORDAC inverters: which parameters are written, and how late replies come.
+
+use super::known::{ADDRESS, WIPES};
+use harness_bench::counted::counted;
+use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::rig::segment::observed::{LinkNotes, ReceivedSum};
+use harness_bench::trouble::Trouble;
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, PpoType, Task};
+use harness_proto::profibus::dp::Service;
+use harness_proto::profibus::{Buffer, Telegram};
+use harness_proto::time::{Instant, Span};
+use std::collections::BTreeSet;
+
+/// The most octets of an attempt that are kept.
+const MOST_KEPT: usize = 1_000_000;
+
+/// A link to inverters, observed.
+pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'l, TelegramNotes>;
+
+/// A parameter that may have been written: station, number and IND.
+pub(super) type Written = (u8, u16, u16);
+
+/// What was noted.
+#[derive(Default)]
+pub(super) struct TelegramNotes {
+    /// The parameters that telegrams may have written.
+    pub(super) written: BTreeSet<Written>,
+    /// The addresses that telegrams may have given to stations: the station, and its new one.
+    pub(super) moved: BTreeSet<(u8, u8)>,
+    /// When the last telegram had left.
+    asked: Option<Instant>,
+    /// The octets that have come since.
+    reply: Buffer,
+    /// The longest time from the end of a request until the bench had read its whole reply, beside the reply's own time on the line.
+    pub(super) longest: Span,
+    /// How many octets were received, and their checksum.
+    heard: ReceivedSum,
+    /// The octets that were received.
+    kept: Vec<CameOctet>,
+    /// How often something was sent since the last [`begin_fresh`](Self::begin_fresh).
+    sent: u32,
+    /// When the last octet came or the last telegram had left, in this conversation.
+    last: Option<Instant>,
+    /// How many octets had come at the last [`begin_fresh`](Self::begin_fresh).
+    pub(super) fresh: usize,
+    /// What others sent in the place of what counts here.
+    expected: Option<Expected>,
+    /// That something else came.
+    differs: Option<Trouble>,
+}
+
+/// Octets with which those of a model are compared as they come.
+struct Expected {
+    came: Came,
+    /// How many octets came before them.
+    behind: usize,
+    /// Whether their times count.
+    timed: bool,
+}
+
+/// An octet from a slave, and its place in the conversation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CameOctet {
+    /// How often something was sent before it: an answer to one request is none to another.
+    sent: u32,
+    /// How long after the octet before, or after what was sent last.
+    gap: Span,
+    /// The octet, and in bit 8 whether it has a line error.
+    bits: u16,
+}
+
+impl CameOctet {
+    /// The same octet, whenever it came.
+    const fn at_any_time(self) -> Self {
+        Self {
+            sent: 0,
+            gap: Span::ZERO,
+            ..self
+        }
+    }
+}
+
+/// Octets from the slaves, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Came(Vec<CameOctet>);
+
+/// How far two sequences of octets agree; the more the greater. [`WHOLE`] where they are the same.
+pub(super) type Agreement = usize;
+
+/// All octets agree.
+pub(super) const WHOLE: Agreement = Agreement::MAX;
+
+impl Came {
+    /// The same octets, whenever they came.
+    pub(super) fn at_any_time(mut self) -> Self {
+        self.0.iter_mut().for_each(|own| *own = own.at_any_time());
+        self
+    }
+
+    /// How many octets from the first on agree with those of another sequence, and how many bits of the next one.
+    pub(super) fn agrees(&self, other: &Self) -> Agreement {
+        if self == other {
+            return WHOLE;
+        }
+        let pairs = || self.0.iter().zip(&other.0);
+        let same = pairs().take_while(|(own, other)| own == other).count();
+        let next = pairs().nth(same);
+        let bits = next.map_or(0, |(own, other)| {
+            (own.bits ^ other.bits).count_zeros() as usize
+        });
+        same * 32 + bits
+    }
+
+    /// The telegrams among the octets.
+    pub(super) fn telegrams(&self) -> Vec<Telegram> {
+        let octets: Vec<u8> = self.0.iter().map(|own| own.bits as u8).collect();
+        let mut rest = octets.as_slice();
+        let mut all = Vec::new();
+        while !rest.is_empty() {
+            match Telegram::decode(rest) {
+                Decoded::Value { value, used } => {
+                    all.push(value);
+                    rest = &rest[used..];
+                }
+                _ => rest = &rest[1..],
+            }
+        }
+        all
+    }
+}
+
+impl TelegramNotes {
+    /// What comes from now on does not depend on what the slaves have done before.
+    pub(super) const fn begin_fresh(&mut self) {
+        self.fresh = self.kept.len();
+        self.sent = 0;
+        self.last = None;
+    }
+
+    /// The link ends with the first octet behind the first `behind` ones that is not that of `came`: how far they agree is known then.
+    pub(super) fn expect(&mut self, came: &Came, behind: usize, timed: bool) {
+        self.expected = Some(Expected {
+            came: came.clone(),
+            behind,
+            timed,
+        });
+    }
+
+    /// Compares the octet that came last with what is expected.
+    fn compare(&mut self) {
+        let Some(expected) = &self.expected else {
+            return;
+        };
+        let place = (self.kept.len() - 1).checked_sub(expected.behind);
+        let Some((place, own)) = place.zip(self.kept.last()) else {
+            return;
+        };
+        let own = match expected.timed {
+            true => *own,
+            false => own.at_any_time(),
+        };
+        if expected.came.0.get(place) != Some(&own) {
+            self.differs = Some(Trouble::Interrupted);
+        }
+    }
+
+    /// How many octets are kept.
+    pub(super) const fn len(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// The octets that came since the last [`begin_fresh`](Self::begin_fresh).
+    pub(super) fn came(&self) -> Came {
+        Came(self.kept[self.fresh..].to_vec())
+    }
+
+    /// All octets that came.
+    pub(super) fn all(&self) -> Came {
+        Came(self.kept.clone())
+    }
+
+    /// What was received so far, in words.
+    pub(super) fn received(&self) -> String {
+        let ReceivedSum { pieces, sum } = self.heard;
+        format!(
+            "{} from the slaves, checksum {sum:08X}",
+            counted(pieces, "octet")
+        )
+    }
+}
+
+impl LinkNotes for TelegramNotes {
+    /// A telegram was sent. In every layout that its length fits, its parameter channel may write.
+    fn sent(&mut self, what: Out<'_>, end: Instant) {
+        self.sent += 1;
+        self.last = Some(end);
+        self.asked = Some(end);
+        self.reply.clear();
+        let telegram = Telegram::decode(what.octets()).value();
+        let Some(pdu) = telegram.as_ref().and_then(Telegram::pdu) else {
+            return;
+        };
+        if Service::of(pdu.dsap()) != Some(Service::DataExchange) {
+            return;
+        }
+        let images = PpoType::ALL.into_iter().filter(|own| own.has_pkw());
+        for image in images.filter_map(|ppo| Image::decode(ppo, pdu.data())) {
+            let Pkw { ind, .. } = image.pkw;
+            let changes = image.pkw.task().is_change();
+            if changes && image.pkw.task() != Task::ChangeDescription {
+                let number = image.pkw.number();
+                self.written.insert((pdu.da(), number, ind));
+                let moved = match number {
+                    ADDRESS => u8::try_from(image.pkw.low_word()).ok(),
+                    number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
+                    _ => None,
+                };
+                let moved = moved.filter(|own| (1..=DEFAULT_ADDRESS).contains(own));
+                self.moved.extend(moved.map(|own| (pdu.da(), own)));
+            }
+        }
+    }
+
+    fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard) {
+        let Heard::Octet(octet) = heard else { return };
+        if self.kept.len() < MOST_KEPT {
+            let error = u16::from(octet.error.is_some()) << 8;
+            let gap = self
+                .last
+                .replace(at)
+                .map_or(Span::ZERO, |last| at.since(last));
+            self.kept.push(CameOctet {
+                sent: self.sent,
+                gap,
+                bits: u16::from(octet.byte) | error,
+            });
+            self.compare();
+        }
+        self.heard.pieces += 1;
+        let bits = u32::from(octet.byte) | u32::from(octet.error.is_some()) << 8;
+        self.heard.add(bits);
+        let Some(asked) = self.asked else { return };
+        let _too_long = self.reply.push(octet.byte);
+        if let Decoded::Value { used, .. } = Telegram::decode(&self.reply) {
+            let own = medium.octet_time() * used as u64;
+            let took = now.since(asked).saturating_sub(own);
+            self.longest = self.longest.max(took);
+            self.asked = None;
+        }
+    }
+
+    fn ended(&self) -> Option<&Trouble> {
+        self.differs.as_ref()
+    }
+
+    fn begin(&mut self) {
+        self.last = None;
+        self.asked = None;
+        self.reply.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Came, TelegramNotes, WHOLE};
+    use harness_bench::medium::{Heard, Medium};
+    use harness_bench::rig::segment::observed::LinkNotes;
+    use harness_proto::line::Received;
+    use harness_proto::profibus::BusRate;
+    use harness_proto::time::{Instant, Span};
+    use proptest::prelude::*;
+
+    /// Notes octets at their times in ms, until the link ends.
+    fn noted(octets: &[(u64, u8)], expected: Option<(&Came, bool)>) -> TelegramNotes {
+        let mut notes = TelegramNotes::default();
+        if let Some((came, timed)) = expected {
+            notes.expect(came, 0, timed);
+        }
+        let medium = Medium::Octets(BusRate::K500.format());
+        let mut at = Instant::default();
+        for (gap, octet) in octets {
+            if notes.ended().is_some() {
+                break;
+            }
+            at += Span::from_millis(*gap);
+            notes.heard(medium, at, at, Heard::Octet(Received::good(*octet)));
+        }
+        notes
+    }
+
+    fn octets() -> impl Strategy<Value = Vec<(u64, u8)>> {
+        prop::collection::vec((0..2_u64, 0..3_u8), 0..8)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// A link that ends with the first octet that was not expected shows how far all octets agree.
+        #[test]
+        fn an_end_at_the_first_difference_changes_no_agreement(
+            seen in octets(),
+            sent in octets(),
+            timed: bool,
+        ) {
+            let came = |notes: &TelegramNotes| match timed {
+                true => notes.came(),
+                false => notes.came().at_any_time(),
+            };
+            let expected = came(&noted(&seen, None));
+            let whole = came(&noted(&sent, None)).agrees(&expected);
+            let cut = noted(&sent, Some((&expected, timed)));
+            prop_assert_eq!(came(&cut).agrees(&expected), whole);
+            prop_assert!(cut.ended().is_none() || whole != WHOLE);
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! The attempts of a qualification, and whether a model with something changed explains them.
+//!
+//! Where time is virtual, an attempt is explained by a model that ends it in the same way, at the same line, and sends the same octets at the
+//! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
+
+use super::{AttemptCourse, Own, Player};
+use crate::rig::known::{INTERFACE, Known, Values, stated};
+use crate::rig::observed::{Agreement, Came, Observed, WHOLE};
+use crate::rig::settle::{Assumed, search};
+use crate::rig::talk::{Talk, TalkError};
+use crate::simulate::SlaveSetup;
+use harness_bench::link::{Link as _, LinkEvent, Recording};
+use harness_bench::scenario::run::{Outcome, Why};
+use harness_bench::scenario::verdict::Verdict;
+use harness_proto::nordac::pkw::Index;
+use harness_proto::nordac::properties::{Description, PROPERTIES};
+use harness_proto::nordac::words::zsw;
+use harness_proto::nordac::{Image, Parameter, PpoType};
+use harness_proto::profibus::Telegram;
+use harness_proto::profibus::dp::Service;
+use harness_proto::time::Span;
+use harness_sim::nordac::deviation::Deviation;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What the names of conversations of a qualification begin with.
+pub(crate) const CONVERSATION: &str = "qualify-";
+
+/// How a slave differs from what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Other {
+    /// Nothing differs but what is not settled of it: it is right.
+    Right,
+    /// The slave at this place has a deviation.
+    WrongSlave(usize, &'static Deviation),
+}
+
+/// One attempt.
+#[derive(Clone, Debug)]
+pub(crate) struct AttemptNote {
+    own: Arc<Own>,
+    /// What was known when it began.
+    begun: Player,
+    /// What was known of the slaves in it.
+    slaves: Vec<Known>,
+    /// Whether the settings of the bus were switched to those of the scenario.
+    switches: bool,
+    shown: AttemptShown,
+    /// The verdict.
+    pub(crate) verdict: Verdict,
+    /// Whether the slaves did something that no right slave does, as far as is known.
+    pub(crate) accuses: bool,
+    /// Whether time is virtual: what comes can be compared with a model, whatever the verdict.
+    pub(crate) exact: bool,
+    /// How many telegrams were received.
+    pub(crate) telegrams: usize,
+}
+
+/// What an attempt has shown.
+#[derive(Clone, Debug, PartialEq)]
+struct AttemptShown {
+    /// Why the slaves were not ready.
+    unanswered: Option<TalkError>,
+    /// How it ended, and at which place of the text.
+    ended: Option<(Verdict, Option<usize>)>,
+    /// The octets that came; none where time is real.
+    came: Came,
+    /// Where time is real, the telegrams: by addresses and service the contents, one behind the other where they change.
+    telegrams: BTreeMap<String, Vec<String>>,
+}
+
+impl AttemptShown {
+    fn of(gone: &AttemptCourse, link: &Observed<'_>, exact: bool) -> Self {
+        let (unanswered, ended) = match gone {
+            AttemptCourse::Unanswered(error) => (Some(error.clone()), None),
+            AttemptCourse::Skipped(_) => (None, None),
+            AttemptCourse::Played(outcome) => {
+                let place = outcome.finding.as_ref().map(|own| own.span.start);
+                (None, Some((outcome.verdict, place)))
+            }
+        };
+        let came = link.noted.all();
+        let mut telegrams: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for (head, contents) in came.telegrams().iter().filter(|_| !exact).map(meaning) {
+            let own = telegrams.entry(head).or_default();
+            if own.last() != Some(&contents) {
+                own.push(contents);
+            }
+        }
+        Self {
+            unanswered,
+            ended,
+            came: if exact { came } else { Came::default() },
+            telegrams,
+        }
+    }
+
+    fn agrees(&self, other: &Self) -> Agreement {
+        match self == other {
+            true => WHOLE,
+            // The ends differ, and perhaps nothing else.
+            false => self.came.agrees(&other.came).min(WHOLE - 1),
+        }
+    }
+}
+
+/// The addresses and the service of a telegram, and its contents without what follows a motor.
+fn meaning(telegram: &Telegram) -> (String, String) {
+    let Some(pdu) = telegram.pdu() else {
+        return (format!("{telegram:?}"), String::new());
+    };
+    let (sa, fc, sap) = (pdu.sa(), pdu.fc().0, pdu.ssap());
+    let head = format!("{sa} {fc:02X} {sap:?} {}", pdu.data().len());
+    let exchanged = Service::of(sap) == Some(Service::DataExchange);
+    let ppo = PpoType::ALL
+        .into_iter()
+        .find(|own| own.octets() == pdu.data().len());
+    let image = ppo
+        .filter(|_| exchanged)
+        .and_then(|ppo| Image::decode(ppo, pdu.data()));
+    let contents = match image {
+        None => format!("{:02X?}", pdu.data()),
+        Some(image) => {
+            let follows = zsw::AT_SETPOINT | zsw::REFERENCE;
+            format!("{} {:04X}", image.pkw, image.first() & !follows)
+        }
+    };
+    (head, contents)
+}
+
+impl AttemptNote {
+    /// Notes the verdict.
+    pub(super) fn judge(&mut self, outcome: &Outcome) {
+        self.verdict = outcome.verdict;
+        let unready = self.shown.unanswered.is_some() && self.telegrams > 0;
+        self.accuses = outcome.verdict == Verdict::Failed || unready && !self.exact;
+    }
+
+    /// Whether the scenario was played, or the slaves did not become ready for it.
+    fn was_tried(&self) -> bool {
+        self.shown.unanswered.is_some() || self.shown.ended.is_some()
+    }
+
+    /// Whether it has shown something: the scenario was tried, or the slaves were asked for everything.
+    pub(crate) fn shows_something(&self) -> bool {
+        self.was_tried() || self.begun.known.is_none() && self.begun.unable.is_none()
+    }
+
+    /// The name of the scenario.
+    pub(crate) fn name(&self) -> &String {
+        &self.own.name
+    }
+
+    /// The addresses of the slaves, in their order.
+    pub(crate) fn addresses(&self) -> impl Iterator<Item = u8> {
+        self.begun.slaves.iter().map(|own| own.address)
+    }
+
+    /// The values of a property of the slave at a place with which slaves that are `known` would have shown the same.
+    pub(crate) fn explaining(
+        &self,
+        known: &[Known],
+        place: usize,
+        property: &Description,
+    ) -> Vec<String> {
+        let base: Assumed = known.iter().map(|own| own.properties).collect();
+        let none = Values::new();
+        let explains = |word: &String| {
+            let mut all = base.clone();
+            property.set(&mut all[place], word)
+                && self.shown_by(Other::Right, &all, &none) == self.shown
+        };
+        let values = crate::rig::values(property).into_iter();
+        values.filter(explains).collect()
+    }
+
+    /// What parameters of the slave at a place hold if it has a deviation that changes what they read; nothing where they hold what was read.
+    ///
+    /// A guess is kept where it reads as the slave did: that the deviation exchanges octets, adds something, or exchanges PWE1 and PWE2.
+    pub(crate) fn behind(&self, place: usize, deviation: &'static Deviation) -> Values {
+        let known = &self.slaves[place];
+        let reads = |held: &Values| {
+            let mut slave = known.model(known.properties);
+            slave.parameters.extend(stated(held));
+            slave.deviation = Some(deviation);
+            let mut link = self.begun.model(vec![slave], &self.begun.limits);
+            let mut again = Known::new(known.slave);
+            let mut talk = Talk::new(Box::new(&mut link), self.begun.patience);
+            // What was read before an error counts.
+            let _partly = again.read_all(&mut talk);
+            again.shown
+        };
+        let differing = |read: &Values, wanted: Values| -> Values {
+            let differs = |(place, wanted): &(_, u32)| {
+                let read = read.get(place);
+                read.is_some_and(|read| read != wanted)
+            };
+            wanted.into_iter().filter(differs).collect()
+        };
+        let first = reads(&Values::new());
+        let mut open = differing(&first, known.shown.clone());
+        let mut held = Values::new();
+        for guess in [
+            |_: u32, read: u32| read,
+            |wanted: u32, read: u32| wanted.wrapping_add(wanted).wrapping_sub(read),
+            |wanted: u32, _: u32| wanted.rotate_right(16),
+        ] {
+            if open.is_empty() {
+                break;
+            }
+            for (place, wanted) in &open {
+                held.insert(*place, guess(*wanted, first[place]));
+            }
+            open = differing(&reads(&held), open);
+        }
+        // What no guess explains is as it was read.
+        held.retain(|place, _| !open.contains_key(place));
+        held
+    }
+
+    /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read.
+    pub(crate) fn is_explained_by(&self, other: Other, held: &Values) -> bool {
+        let base: Assumed = self.slaves.iter().map(|own| own.properties).collect();
+        if let Other::WrongSlave(..) = other {
+            return self.shown_by(other, &base, held) == self.shown;
+        }
+        // A verdict in virtual time has looked for right slaves that do the same.
+        if self.exact && self.verdict == Verdict::Failed {
+            return false;
+        }
+        let open: Vec<Vec<&str>> = self
+            .slaves
+            .iter()
+            .map(|known| {
+                let open = PROPERTIES.iter().filter(|own| !known.is_settled(own));
+                open.map(|own| own.name).collect()
+            })
+            .collect();
+        let may = |place: usize, property: &Description| open[place].contains(&property.name);
+        let found = search(&base, may, |all| {
+            self.shown_by(other, all, held).agrees(&self.shown)
+        });
+        !found.is_empty()
+    }
+
+    /// What the attempt shows on models.
+    fn shown_by(&self, other: Other, properties: &Assumed, held: &Values) -> AttemptShown {
+        let mut last = self.played_by((other, held), properties, None);
+        // Where the slaves were not read: as delivered, or with the bus in control as a simulated rig has them.
+        if last != self.shown && self.slaves.iter().any(|own| own.values.is_empty()) {
+            last = self.played_by((other, held), properties, Some(2));
+        }
+        last
+    }
+
+    fn played_by(
+        &self,
+        (other, held): (Other, &Values),
+        properties: &Assumed,
+        interface: Option<i64>,
+    ) -> AttemptShown {
+        let mut player = self.begun.clone();
+        let slaves = self.slaves.iter().zip(properties).enumerate();
+        let slaves = slaves.map(|(place, (known, properties))| {
+            let mut slave: SlaveSetup = known.model(*properties);
+            let control = Parameter::of(INTERFACE).zip(interface);
+            let control = control.map(|(own, value)| (own, Index::default(), value));
+            slave.parameters.extend(control);
+            if let Other::WrongSlave(own, deviation) = other {
+                slave.deviation = (own == place).then_some(deviation);
+                slave
+                    .parameters
+                    .extend(stated(held).filter(|_| own == place));
+            }
+            slave
+        });
+        let limits = player.limits;
+        let mut link = player.model(slaves.collect(), &limits);
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        recording.begin();
+        let mut link = Observed::new(&mut recording);
+        if self.exact {
+            link.noted.expect(&self.shown.came, 0, true);
+        }
+        let gone = match self.was_tried() {
+            true => player.go(&self.own, &mut link, Some(self.switches)).0,
+            false => match player
+                .learn(&mut link, false)
+                .and_then(|()| player.look(&self.own, &mut link))
+            {
+                Ok(()) => AttemptCourse::Skipped(Why::RunEnded.into()),
+                Err(error) => AttemptCourse::Unanswered(error),
+            },
+        };
+        AttemptShown::of(&gone, &link, self.exact)
+    }
+}
+
+impl Player {
+    /// A copy that keeps no attempts.
+    pub(super) fn without_notes(&mut self) -> Self {
+        let notes = std::mem::take(&mut self.notes);
+        let copy = self.clone();
+        self.notes = notes;
+        copy
+    }
+
+    /// Notes an attempt, over a link and with or without settings of the bus that were switched.
+    pub(super) fn note(
+        &mut self,
+        begun: Self,
+        own: &Arc<Own>,
+        (link, switches): (&Observed<'_>, bool),
+        gone: &AttemptCourse,
+    ) {
+        let exact = link.time_tolerance() == Span::ZERO;
+        self.notes.push(AttemptNote {
+            own: Arc::clone(own),
+            begun,
+            slaves: self.known.as_ref().unwrap_or(&self.partly).clone(),
+            switches,
+            shown: AttemptShown::of(gone, link, exact),
+            exact,
+            verdict: Verdict::Skipped,
+            accuses: false,
+            telegrams: link.noted.all().telegrams().len(),
+        });
+    }
+}

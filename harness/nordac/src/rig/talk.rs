@@ -1,0 +1,354 @@
+//! Single requests to slaves, one after another: what looks at slaves, and takes them to their safe state.
+
+use super::MASTER;
+use harness_bench::counted::counted;
+use harness_bench::link::{Line, Octets, Trouble};
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::master::{ExchangeError, StartError, Startup};
+use harness_proto::nordac::{Image, PpoType};
+use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service};
+use harness_proto::profibus::master::{Requests, SlaveReply};
+use harness_proto::profibus::{Buffer, Pdu, Telegram};
+use harness_proto::time::{Instant, Span};
+use std::collections::BTreeMap;
+
+/// How often a request is sent that gets no reply. With the same frame count bit it is executed once.
+const TRIES: u8 = 3;
+
+/// Why a slave did not do as it was asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TalkError {
+    /// The line carries nothing more.
+    #[error("{0}")]
+    Line(Trouble),
+    /// The adapter hears what the bench sends.
+    #[error("the adapter gives back what the bench sends: set `echo = true` in [port.1]")]
+    Echo,
+    /// It behaves in another way than the profile of the rig's file says.
+    #[error(
+        "slave {slave} does not have {property} = {says}, as the profile of the rig's file says: the profile is of another slave; qualify this one, or take `profile` out of the file"
+    )]
+    OtherThanProfile {
+        /// Its address.
+        slave: u8,
+        /// The property.
+        property: &'static str,
+        /// What the profile says.
+        says: String,
+    },
+    /// It does not reply.
+    #[error("slave {slave} does not reply to {service}")]
+    NoReply {
+        /// Its address.
+        slave: u8,
+        /// The service.
+        service: &'static str,
+    },
+    /// Its reply is none to this service.
+    #[error("slave {slave} replies to {service} with {found}")]
+    Unexpected {
+        /// Its address.
+        slave: u8,
+        /// The service.
+        service: &'static str,
+        /// What it replies, in words.
+        found: String,
+    },
+    /// It does not get into the exchange.
+    #[error("slave {slave}: {why}")]
+    Start {
+        /// Its address.
+        slave: u8,
+        /// Why not.
+        why: StartError,
+    },
+    /// An exchange failed.
+    #[error("slave {slave}: {why}")]
+    Exchange {
+        /// Its address.
+        slave: u8,
+        /// Why.
+        why: ExchangeError,
+    },
+    /// It has a fault.
+    #[error(
+        "slave {slave} has a fault (ZSW {zsw:04X}): remove its cause and `drivebench acknowledge {slave}`; with `allow_motion` in [limits] and --allow-motion the bench acknowledges it before each scenario"
+    )]
+    Fault {
+        /// Its address.
+        slave: u8,
+        /// What it shows.
+        zsw: u16,
+    },
+}
+
+/// The bench's own master, which asks one slave at a time.
+pub struct Talk<'l> {
+    line: Box<dyn Line + 'l>,
+    /// How long a reply may take, beside its own time on the line.
+    patience: Span,
+    requests: BTreeMap<u8, Requests>,
+}
+
+impl<'l> Talk<'l> {
+    /// A master on a line.
+    #[must_use]
+    pub fn new(line: Box<dyn Line + 'l>, patience: Span) -> Self {
+        Self {
+            line,
+            patience,
+            requests: BTreeMap::new(),
+        }
+    }
+
+    /// The time.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    /// Lets time pass. What comes meanwhile is dropped.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn pass(&mut self, span: Span) -> Result<(), TalkError> {
+        let end = self.now() + span;
+        while self.now() < end {
+            self.sound()?;
+            let _more = self.line.wait(end);
+            while self.line.receive(0).is_some() {}
+        }
+        self.sound()
+    }
+
+    fn sound(&self) -> Result<(), TalkError> {
+        let trouble = self.line.trouble();
+        trouble.map_or(Ok(()), |trouble| Err(TalkError::Line(trouble.clone())))
+    }
+
+    /// Sends octets, and waits until they have left.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`]: the gate denies them, among others.
+    pub fn send(&mut self, octets: &[u8]) -> Result<Instant, TalkError> {
+        while self.line.receive(0).is_some() {}
+        let end = self.line.send_octets(0, octets);
+        self.sound()?;
+        Ok(end)
+    }
+
+    /// The telegram that comes within the time for a reply; `None` for none, and for a damaged one, after which the line is silent again.
+    fn reply(&mut self, end: Instant) -> Result<Option<Telegram>, TalkError> {
+        let mut octets = Buffer::new();
+        let mut until = end + self.patience;
+        let octet = self.line.byte_time();
+        let mut spoiled = false;
+        loop {
+            while let Some((at, heard)) = self.line.receive_octet(0) {
+                until = until.max(at + octet * 2 + self.patience);
+                spoiled |= heard.error.is_some() || !octets.push(heard.byte);
+                if spoiled {
+                    continue;
+                }
+                match Telegram::decode(&octets) {
+                    Decoded::Value { value, .. } => return Ok(Some(value)),
+                    Decoded::NeedMore => {}
+                    Decoded::Bad { .. } => spoiled = true,
+                }
+            }
+            self.sound()?;
+            if self.now() >= until {
+                return Ok(None);
+            }
+            let _more = self.line.wait(until);
+        }
+    }
+
+    /// Sends a request, again where no reply comes.
+    fn ask(
+        &mut self,
+        slave: u8,
+        service: Service,
+        data: &[u8],
+    ) -> Result<Option<SlaveReply>, TalkError> {
+        let Ok(pdu) = self.requests(slave).request(service, data) else {
+            return Ok(None);
+        };
+        self.ask_with(slave, pdu)
+    }
+
+    fn ask_with(&mut self, slave: u8, pdu: Pdu) -> Result<Option<SlaveReply>, TalkError> {
+        let octets = Telegram::Pdu(pdu).encode();
+        let mut other = None;
+        for _ in 0..TRIES {
+            let end = self.send(&octets)?;
+            let telegram = self.reply(end)?;
+            if telegram == Some(Telegram::Pdu(pdu)) {
+                return Err(TalkError::Echo);
+            }
+            match telegram.and_then(|telegram| self.requests(slave).take(&telegram)) {
+                Some(SlaveReply::Other(control)) => other = Some(SlaveReply::Other(control)),
+                None => {}
+                fits => return Ok(fits),
+            }
+            // A busy computer hands over a reply late, and then to a request that came behind: what is under way passes first.
+            self.pass(self.patience)?;
+        }
+        Ok(other)
+    }
+
+    fn requests(&mut self, slave: u8) -> &mut Requests {
+        let fresh = || {
+            // Addresses of a rig file that was checked.
+            Requests::new(MASTER, slave).or_else(|_| Requests::new(MASTER, 0))
+        };
+        match self.requests.entry(slave) {
+            std::collections::btree_map::Entry::Occupied(own) => own.into_mut(),
+            std::collections::btree_map::Entry::Vacant(place) => {
+                let Ok(fresh) = fresh() else {
+                    unreachable!("both addresses are in range")
+                };
+                place.insert(fresh)
+            }
+        }
+    }
+
+    fn data(&mut self, slave: u8, service: Service) -> Result<Buffer, TalkError> {
+        let name = service.name();
+        match self.ask(slave, service, &[])? {
+            Some(SlaveReply::Data { data, .. }) => Ok(data),
+            Some(other) => Err(unexpected(slave, name, &other)),
+            None => Err(TalkError::NoReply {
+                slave,
+                service: name,
+            }),
+        }
+    }
+
+    /// A request, and what the slave replies as text: `None` for nothing.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn raw(&mut self, slave: u8, service: Service, data: &[u8]) -> Result<String, TalkError> {
+        let reply = self.ask(slave, service, data)?;
+        Ok(format!("{reply:?}"))
+    }
+
+    /// Begins a new sequence of requests, as after the bench was opened.
+    pub fn restart(&mut self, slave: u8) {
+        self.requests(slave).restart();
+    }
+
+    /// Asks for the FDL status, and says whether the station replies.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn status(&mut self, slave: u8) -> Result<bool, TalkError> {
+        let Ok(pdu) = self.requests(slave).status() else {
+            return Ok(false);
+        };
+        let end = self.send(&Telegram::Pdu(pdu).encode())?;
+        Ok(self.reply(end)?.is_some())
+    }
+
+    /// The diagnosis.
+    ///
+    /// # Errors
+    /// [`TalkError`].
+    pub fn diagnose(&mut self, slave: u8) -> Result<Diagnosis, TalkError> {
+        let data = self.data(slave, Service::SlaveDiag)?;
+        Diagnosis::decode(&data).ok_or_else(|| TalkError::Unexpected {
+            slave,
+            service: Service::SlaveDiag.name(),
+            found: counted(data.len(), "octet"),
+        })
+    }
+
+    /// The PPO type that its configuration is of; `None` for a configuration of none.
+    ///
+    /// # Errors
+    /// [`TalkError`].
+    pub fn configuration(&mut self, slave: u8) -> Result<Option<PpoType>, TalkError> {
+        let data = self.data(slave, Service::GetCfg)?;
+        Ok(PpoType::from_cfg(&data))
+    }
+
+    /// Takes a slave into the exchange; the watchdog is 10 ms x first x second factor.
+    ///
+    /// # Errors
+    /// [`TalkError`].
+    pub fn start(
+        &mut self,
+        slave: u8,
+        ppo: PpoType,
+        watchdog: Option<[u8; 2]>,
+    ) -> Result<(), TalkError> {
+        let mut startup = Startup::new(ppo, watchdog);
+        loop {
+            let requests = self.requests(slave);
+            let Ok(Some(pdu)) = startup.next(requests) else {
+                return Ok(());
+            };
+            let reply = self.ask_with(slave, pdu)?;
+            startup
+                .take(reply)
+                .map_err(|why| TalkError::Start { slave, why })?;
+        }
+    }
+
+    /// One Data_Exchange.
+    ///
+    /// # Errors
+    /// [`TalkError`]; [`ExchangeError::Left`] where the slave is not in the exchange.
+    pub fn exchange(
+        &mut self,
+        slave: u8,
+        ppo: PpoType,
+        outputs: &Image,
+    ) -> Result<Image, TalkError> {
+        let failed = |why| TalkError::Exchange { slave, why };
+        let octets = outputs.encode(ppo);
+        match self.ask(slave, Service::DataExchange, &octets)? {
+            Some(SlaveReply::Data { data, .. }) => {
+                let length = ExchangeError::Length {
+                    octets: data.len(),
+                    expected: ppo.octets(),
+                };
+                Image::decode(ppo, &data).ok_or_else(|| failed(length))
+            }
+            Some(SlaveReply::NotActivated) => Err(failed(ExchangeError::Left)),
+            Some(_) => Err(failed(ExchangeError::Unexpected)),
+            None => Err(failed(ExchangeError::NoReply)),
+        }
+    }
+
+    /// A command to one slave, which does not reply.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn command(&mut self, slave: u8, command: u8) -> Result<(), TalkError> {
+        let command = GlobalControl { command, group: 0 };
+        let data = command.encode();
+        if let Ok(pdu) = self.requests(slave).request(Service::GlobalControl, &data) {
+            let end = self.send(&Telegram::Pdu(pdu).encode())?;
+            let rest = end.since(self.now());
+            self.pass(rest)?;
+        }
+        Ok(())
+    }
+}
+
+fn unexpected(slave: u8, service: &'static str, reply: &SlaveReply) -> TalkError {
+    let found = match reply {
+        SlaveReply::Confirmed => "E5".to_owned(),
+        SlaveReply::Present => "OK and no data".to_owned(),
+        SlaveReply::NotActivated => "RS, no service activated".to_owned(),
+        SlaveReply::Data { data, .. } => counted(data.len(), "octet"),
+        SlaveReply::Other(control) => format!("FC {:02X}", control.0),
+    };
+    TalkError::Unexpected {
+        slave,
+        service,
+        found,
+    }
+}

@@ -1,4 +1,0 @@
-//! Files in TOML: a text against its schema, and values with units.
-
-pub(crate) mod schema;
-pub mod values;

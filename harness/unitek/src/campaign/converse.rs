@@ -1,0 +1,285 @@
+//! A conversation of the master with a drive on a segment.
+
+use super::file::{CampaignStep, FrameCampaignFile};
+use harness_bench::counted::counted;
+use harness_proto::can::{BitRate, CanEvent, Frame};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Outcome};
+use harness_proto::unitek::properties::Properties;
+use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
+use harness_sim::segment::{Host, Placed, Segment};
+use harness_sim::unitek::{Control, Drive, Inputs, Member};
+
+/// The stations.
+const MASTER: usize = 0;
+const DRIVE: usize = 1;
+
+/// How long a job may take; every job of the master ends in a shorter time.
+const PATIENCE: Span = Span::from_millis(5_000);
+
+/// Behind the last step: what is late arrives, and what was not stopped shows.
+const REST: Span = Span::from_millis(300);
+
+/// How a step ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JobEnd {
+    /// A job, by its outcome; the stuff byte of a reply is left out.
+    Job(Outcome),
+    /// A wait has passed.
+    Waited,
+    /// The job has not ended.
+    Open,
+}
+
+impl JobEnd {
+    /// Whether the master reports it as done.
+    #[must_use]
+    pub const fn is_well(&self) -> bool {
+        match self {
+            Self::Waited => true,
+            Self::Open => false,
+            Self::Job(outcome) => !matches!(
+                outcome,
+                Outcome::NoReply { .. } | Outcome::NotReady(_) | Outcome::Differs { .. }
+            ),
+        }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self {
+            Self::Waited => "waited".to_owned(),
+            Self::Open => "not ended".to_owned(),
+            Self::Job(outcome) => match outcome {
+                Outcome::Read(reply) => format!("read {:X}", reply.data.bits()),
+                Outcome::Written(reply) => format!("written {:X}", reply.data.bits()),
+                Outcome::Differs { wrote, reads } => {
+                    format!("wrote {:X}, reads {:X}", wrote.bits(), reads.data.bits())
+                }
+                Outcome::Sent => "sent".to_owned(),
+                Outcome::Started(_) => "started".to_owned(),
+                Outcome::Released => "released".to_owned(),
+                Outcome::NotReady(_) => "not ready".to_owned(),
+                Outcome::NoReply { tries } => format!("no reply to {}", counted(*tries, "request")),
+            },
+        }
+    }
+}
+
+/// What the drive holds at the end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DriveState {
+    cells: [u32; 256],
+    control: Control,
+    enabled: bool,
+    cycles: Vec<(u8, u8)>,
+}
+
+impl DriveState {
+    /// The registers in which it differs from another state, and what they hold.
+    pub(super) fn differing(&self, other: &Self) -> impl Iterator<Item = (u8, u32)> {
+        let cells = self.cells.into_iter().zip(other.cells).zip(0..=u8::MAX);
+        cells.filter_map(|((own, other), number)| (own != other).then_some((number, own)))
+    }
+}
+
+/// What a conversation gave.
+#[derive(Clone, Debug)]
+pub struct Conversation {
+    /// How each step ended.
+    pub ends: Vec<JobEnd>,
+    /// What the master reported besides, in its words.
+    pub disturbances: Vec<String>,
+    /// Frames that the master sent.
+    pub sent: u64,
+    /// The frames on the bus, in order; a repetition by a controller is left out.
+    pub frames: Vec<Frame>,
+    /// What the drive holds at the end.
+    pub state: Option<DriveState>,
+    /// What the master sent and received, in order.
+    pub(super) log: Vec<MasterFrame>,
+    /// How long it took.
+    pub(super) end: Instant,
+}
+
+/// A frame at the master.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum MasterFrame {
+    /// It was given to the controller at this time.
+    Sent(Instant, Frame),
+    /// It was received.
+    Received(Frame),
+}
+
+/// Plays the steps, with a fault or without.
+pub(super) fn converse(
+    file: &FrameCampaignFile,
+    steps: &[CampaignStep],
+    fault: Option<Placed>,
+) -> Conversation {
+    let mut desk = Desk::new(file);
+    if let Some(fault) = fault {
+        desk.segment.inject(fault);
+    }
+    let ends: Vec<_> = steps.iter().map(|step| desk.step(*step)).collect();
+    desk.run(desk.now + REST);
+    let frames = desk.segment.record().iter().map(|line| line.frame);
+    let frames = frames.collect();
+    let drive = desk.segment.station(DRIVE).drive();
+    let state = drive.map(|drive| DriveState {
+        cells: *drive.held(),
+        control: drive.control(),
+        enabled: drive.is_enabled(),
+        cycles: drive.running_cycles().collect(),
+    });
+    Conversation {
+        ends,
+        disturbances: desk.disturbances,
+        sent: desk.sent,
+        frames,
+        state,
+        log: desk.log,
+        end: desk.now,
+    }
+}
+
+struct Desk {
+    segment: Segment<Member<Box<Drive>>>,
+    master: Master,
+    now: Instant,
+    sent: u64,
+    disturbances: Vec<String>,
+    ended: Option<Outcome>,
+    log: Vec<MasterFrame>,
+}
+
+impl Desk {
+    fn new(file: &FrameCampaignFile) -> Self {
+        let drive = Drive::new(Properties::default(), Inputs::default(), Instant::START);
+        let stations = vec![
+            Member::Host(Host::default()),
+            Member::Drive(Box::new(drive)),
+        ];
+        Self {
+            segment: Segment::new(BitRate::K500, stations),
+            master: Master::new(DEFAULT_RX, DEFAULT_TX, file.options()),
+            now: Instant::START,
+            sent: 0,
+            disturbances: Vec::new(),
+            ended: None,
+            log: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, step: CampaignStep) -> JobEnd {
+        match step {
+            CampaignStep::Wait(time) => {
+                self.run(self.now + time);
+                JobEnd::Waited
+            }
+            CampaignStep::Job(job) => self.job(job),
+        }
+    }
+
+    fn job(&mut self, job: Job) -> JobEnd {
+        self.ended = None;
+        if self.master.submit(job).is_err() {
+            return JobEnd::Open;
+        }
+        let end = self.now + PATIENCE;
+        while self.ended.is_none() && self.now < end {
+            self.advance(end);
+        }
+        match self.ended.take() {
+            Some(outcome) => JobEnd::Job(plain(outcome)),
+            None => JobEnd::Open,
+        }
+    }
+
+    fn run(&mut self, end: Instant) {
+        while self.now < end {
+            self.advance(end);
+        }
+    }
+
+    /// To the next thing that happens, and at most to `end`.
+    fn advance(&mut self, end: Instant) {
+        self.transmit();
+        let due = [
+            self.segment.next_due(),
+            self.master.poll_timeout(),
+            self.host().and_then(|host| host.heard_at()),
+        ];
+        let next = due.into_iter().flatten().min().unwrap_or(end);
+        self.now = self.now.max(next.min(end));
+        self.segment.run_to(self.now);
+        while let Some(at) = self.host().and_then(|host| host.heard_at()) {
+            if at > self.now {
+                break;
+            }
+            let heard = self.host().and_then(Host::receive);
+            if let Some((at, CanEvent::Frame(frame))) = heard {
+                self.log.push(MasterFrame::Received(frame));
+                self.master.handle_frame(at, &frame);
+            }
+        }
+        if self
+            .master
+            .poll_timeout()
+            .is_some_and(|due| due <= self.now)
+        {
+            self.master.handle_timeout(self.now);
+        }
+        self.transmit();
+        while let Some(event) = self.master.poll_event() {
+            match event {
+                Event::Ended { outcome, .. } => self.ended = Some(outcome),
+                Event::Disturbance(disturbance) => self.disturbances.push(words(disturbance)),
+                Event::Cyclic { .. } | Event::Status { .. } => {}
+            }
+        }
+    }
+
+    fn transmit(&mut self) {
+        while let Some(frame) = self.master.poll_transmit(self.now) {
+            let now = self.now;
+            if let Some(host) = self.host() {
+                host.send(now, frame);
+            }
+            self.log.push(MasterFrame::Sent(now, frame));
+            self.sent += 1;
+        }
+    }
+
+    fn host(&mut self) -> Option<&mut Host> {
+        self.segment.station_mut(MASTER).host_mut()
+    }
+}
+
+/// An outcome without the byte that means nothing.
+fn plain(outcome: Outcome) -> Outcome {
+    match outcome {
+        Outcome::Read(mut reply) => {
+            reply.stuff = 0;
+            Outcome::Read(reply)
+        }
+        Outcome::Written(mut reply) => {
+            reply.stuff = 0;
+            Outcome::Written(reply)
+        }
+        other => other,
+    }
+}
+
+/// What the master reports, in words.
+fn words(disturbance: Disturbance) -> String {
+    match disturbance {
+        Disturbance::Odd(why) => format!("a frame that is no reply: {why}"),
+        Disturbance::Unasked { reply } => format!("{:02X} comes unasked", reply.register),
+        Disturbance::Missing { register } => format!("a cyclic frame of {register:02X} is missing"),
+        Disturbance::Early { register, after } => {
+            format!("{register:02X} comes {after} behind the last one")
+        }
+    }
+}

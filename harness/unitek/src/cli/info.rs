@@ -1,0 +1,196 @@
+//! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
+
+use super::control::how;
+use super::read::{Found, find};
+use crate::live;
+use crate::rig::OfUnitek as _;
+use crate::rig::UnitekDrives;
+use crate::value::hex;
+use harness_bench::capture::Piece;
+use harness_bench::command::drive::{InfoArguments, OutputForm, TopArguments};
+use harness_bench::command::exit::Exit;
+use harness_bench::command::failure::Failure;
+use harness_bench::command::line_top::LineTop;
+use harness_bench::command::output::Output;
+use harness_bench::command::output::columns;
+use harness_bench::command::port_bench::{PortBench, on, select};
+use harness_bench::command::rig_name::Use;
+use harness_bench::command::top::check as check_top;
+use harness_bench::top::{TopColumn, TopForm, TopRow};
+use harness_proto::unitek::Register;
+use harness_proto::unitek::words::{ERRORS_NOT_READY, MODE_LOCK};
+use serde_json::{Map, Value, json};
+
+/// What is shown of a drive: the heading, and the register.
+const SHOWN: [(&str, u8); 11] = [
+    ("firmware", 0x1B),
+    ("serial", 0x62),
+    ("ready", 0xE2),
+    ("enable", 0xE8),
+    ("mode", 0x51),
+    ("status", 0x40),
+    ("errors", 0x8F),
+    ("speed", 0x30),
+    ("position", 0x6D),
+    ("current", 0x20),
+    ("bus voltage", 0xEB),
+];
+
+/// The registers of `top`, in the order of its columns behind the drive's number.
+const OF_TOP: [u8; 7] = [0xE2, 0xE8, 0x51, 0x30, 0x6D, 0x40, 0x8F];
+
+/// The table of `top`.
+static FORM: TopForm = TopForm {
+    drive: "drive",
+    columns: &[
+        TopColumn::words("drive", 5),
+        TopColumn::words("ready", 5),
+        TopColumn::words("enable", 6),
+        TopColumn::words("mode", 8),
+        TopColumn::words("speed", 15),
+        TopColumn::words("position", 11),
+        TopColumn::words("status", 7),
+        TopColumn::words("errors", 0),
+    ],
+    give_way: &[5, 2, 1, 3],
+    states: &[
+        "not read",
+        "error",
+        "not ready",
+        "locked",
+        "not enabled",
+        "released",
+    ],
+};
+
+/// Lists drives.
+pub(super) fn info(
+    bench: PortBench<'_, UnitekDrives>,
+    arguments: &InfoArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    on(
+        bench,
+        &arguments.rig,
+        Use::look("info"),
+        output,
+        |session, output| {
+            let drives = select(std::slice::from_ref(&arguments.drives), session)?;
+            let registers = SHOWN.map(|(_, register)| Register::of(register));
+            let found = find(session, &drives, &registers)?;
+            let drives: Vec<_> = found.chunks_exact(SHOWN.len()).collect();
+            match arguments.format {
+                OutputForm::Text => output.result(&output.fitted(&text(&drives)))?,
+                OutputForm::Json => {
+                    let drives: Vec<_> = drives.into_iter().map(object).collect();
+                    let whole = json!({"schema": 1, "drives": drives});
+                    output.result(&format!("{whole}\n"))?;
+                }
+            }
+            Ok(Exit::Passed)
+        },
+    )
+}
+
+/// Shows all drives, a row each.
+pub(super) fn top(
+    bench: PortBench<'_, UnitekDrives>,
+    arguments: &TopArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    check_top(arguments, output)?;
+    let look = Use::look("top");
+    on(bench, &arguments.rig, look, output, |session, output| {
+        let registers = OF_TOP.map(Register::of);
+        let drives = session.axes().to_vec();
+        let names = drives.iter().map(|own| format!("drive {}", own.node));
+        let view = LineTop {
+            what: "drives on CAN",
+            form: &FORM,
+            traffic: &["from", "frames", "frames/s", "damaged"],
+            picture: live::picture("bench", names),
+            read: &mut |session, drive| Ok(row(&find(session, &[drive], &registers)?)),
+            stop: &mut |session, drive| Ok(how(session.driver().stop(drive)?).to_owned()),
+            rows: &mut |heard| {
+                let row = |piece: &Piece| match piece {
+                    Piece::Frame(own) => Some(live::at_port(own, &drives)),
+                    _ => None,
+                };
+                heard.iter().filter_map(row).collect()
+            },
+        };
+        view.show(session, arguments, output)
+    })
+}
+
+/// The row of a drive of which the registers of `top` were read.
+fn row(found: &[Found]) -> TopRow {
+    let raw = |register: u8| {
+        let own = found.iter().find(|own| own.reply.register == register);
+        own.map_or(0, |own| own.reply.data.bits())
+    };
+    let errors = raw(0x8F) & ERRORS_NOT_READY;
+    let state = if errors != 0 {
+        "error"
+    } else if raw(0xE2) & 1 == 0 {
+        "not ready"
+    } else if raw(0x51) & u32::from(MODE_LOCK) != 0 {
+        "locked"
+    } else if raw(0xE8) & 1 == 0 {
+        "not enabled"
+    } else {
+        "released"
+    };
+    let node = found.first().map_or(0, |found| found.axis.node);
+    let speed = found.iter().find(|own| own.reply.register == 0x30);
+    TopRow {
+        state: FORM.state(state),
+        in_error: errors != 0,
+        speed: speed.map(|own| own.reply.number() as f64),
+        error: Some(errors).filter(|errors| *errors != 0),
+        cells: std::iter::once(node.to_string())
+            .chain(found.iter().map(words))
+            .collect(),
+    }
+}
+
+/// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.
+fn words(found: &Found) -> String {
+    let raw = found.reply.data.bits();
+    match found.reply.register {
+        0x1B | 0x62 | 0xEB => found.reply.number().to_string(),
+        0xE2 | 0xE8 => if raw & 1 == 1 { "yes" } else { "no" }.to_owned(),
+        0x51 if raw & 4 == 0 => "released".to_owned(),
+        0x8F if raw == 0 => "none".to_owned(),
+        _ => match found.words() {
+            words if words.is_empty() => hex(found.reply.data),
+            words => words,
+        },
+    }
+}
+
+fn text(drives: &[&[Found]]) -> String {
+    let rows: Vec<_> = drives
+        .iter()
+        .flat_map(|drive| {
+            drive.iter().zip(SHOWN).map(|(found, (name, register))| {
+                [
+                    found.axis.node.to_string(),
+                    name.to_owned(),
+                    words(found),
+                    format!("{register:02X} {}", found.register().name),
+                ]
+            })
+        })
+        .collect();
+    columns(&["drive", "what", "value", "register"], &rows)
+}
+
+fn object(drive: &[Found]) -> Value {
+    let mut object = Map::new();
+    for (found, (name, _)) in drive.iter().zip(SHOWN) {
+        object.insert("drive".to_owned(), json!(found.axis.node));
+        object.insert(name.replace(' ', "_"), json!(words(found)));
+    }
+    Value::Object(object)
+}

@@ -1,0 +1,218 @@
+//! Scenarios of this bus as written: header lines, messages and steps.
+
+use harness_bench::scenario::expression::Located;
+use harness_bench::scenario::pattern::Pattern;
+use harness_bench::scenario::problem::{Spanned, TextSpan};
+use harness_bench::scenario::times::Duration;
+use harness_proto::can::{BitRate, Id};
+use harness_proto::unitek::Register;
+use harness_proto::unitek::properties::Description;
+use harness_proto::unitek::units::{Decimal, Given};
+use harness_sim::unitek::Control;
+use harness_sim::unitek::deviation::{Deviation, MasterDeviation};
+
+/// The header lines of this bus.
+#[derive(Clone, Debug, Default)]
+pub struct Header {
+    /// `rate 500`, in kbit/s.
+    pub rate: Option<BitRate>,
+    /// Lines about drives, in order.
+    pub drives: Vec<DriveLine>,
+    /// `master deviates NAME`.
+    pub master: Option<Spanned<&'static MasterDeviation>>,
+}
+
+/// A header line about a drive.
+#[derive(Clone, Debug)]
+pub struct DriveLine {
+    /// The drive's number.
+    pub drive: Located,
+    /// What the line says.
+    pub what: SetupKind,
+    /// The whole line.
+    pub span: TextSpan,
+}
+
+/// What a header line says about a drive.
+#[derive(Clone, Debug)]
+pub enum SetupKind {
+    /// `drive 3`, `drive 3 rx 210 tx 190`: it is there.
+    There {
+        /// The identifier on which it receives.
+        rx: Option<u16>,
+        /// The identifier on which it sends.
+        tx: Option<u16>,
+    },
+    /// `profile fw472`.
+    Profile(&'static str),
+    /// `property map-reply = native`.
+    Property(&'static Description, PropertyValue),
+    /// `mode position`.
+    Mode(Control),
+    /// `deviates NAME`.
+    Deviates(&'static Deviation),
+    /// What can also be a step.
+    Outside(Outside),
+}
+
+/// What a property is set to.
+#[derive(Clone, Debug)]
+pub enum PropertyValue {
+    /// A word, or the two digits of a byte.
+    Word(String),
+    /// A time.
+    Time(Duration),
+}
+
+/// What happens to a drive from outside its bus.
+#[derive(Clone, Debug)]
+pub enum Outside {
+    /// `register 52 = 3000`.
+    Register(RegisterName, WrittenValue),
+    /// `input run low`.
+    Input(&'static str, bool),
+    /// `force tol = 1`, or `force tol off`.
+    Force(&'static str, Option<WrittenValue>),
+    /// `restart`: off and on. A step only.
+    Restart,
+}
+
+/// A register.
+#[derive(Clone, Debug)]
+pub enum RegisterName {
+    /// By its number or name.
+    Known {
+        /// The register.
+        register: &'static Register,
+        /// Whether it was given by a name.
+        by_name: bool,
+    },
+    /// `(k)`: by a number that a loop counts.
+    Counted(Located),
+}
+
+/// Contents of a register as written.
+#[derive(Clone, Debug)]
+pub struct WrittenValue {
+    /// What is written.
+    pub kind: ValueKind,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// A raw number, or a number with a unit.
+#[derive(Clone, Debug)]
+pub enum ValueKind {
+    /// `0CCD`: hexadecimal digits, and how many.
+    Raw(u32, usize),
+    /// `10%`.
+    Given(Decimal, Given),
+    /// `(k*256)`.
+    Counted(Located),
+}
+
+/// What a register must read.
+#[derive(Clone, Debug)]
+pub struct Expect {
+    /// The value.
+    pub value: WrittenValue,
+    /// `+-1%`: how far it may be off.
+    pub tolerance: Option<WrittenValue>,
+}
+
+/// A frame behind `>` or `<`.
+#[derive(Clone, Debug)]
+pub struct Message {
+    /// The identifier.
+    pub id: Id,
+    /// The data, or the length of a remote frame.
+    pub content: Content,
+    /// Where it stands.
+    pub span: TextSpan,
+}
+
+/// What a frame carries.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// No data bytes.
+    Empty,
+    /// Data bytes.
+    Data(Pattern),
+    /// `rtr 3`.
+    Remote(u8),
+}
+
+/// A step of this bus.
+#[derive(Clone, Debug)]
+pub enum FrameStep {
+    /// `! frame 3: lost`.
+    Frame(Located, FrameHarm),
+    /// `! drive 1: off`.
+    Drive(Located, DriveHarm),
+    /// `drive 1 input run low`.
+    Outside(Located, Outside),
+    /// `? quiet`.
+    Quiet,
+    /// `? drive 1 register 6E = 11E1CA10`.
+    Register(Located, RegisterName, Expect),
+    /// `read 1 SPEED_ACTUAL = 50%`.
+    Job(JobStep),
+    /// `master start-up 1`: a job of the driver.
+    Master(JobStep),
+}
+
+/// What happens to a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameHarm {
+    /// `lost`.
+    Lost,
+    /// `doubled`.
+    Doubled,
+    /// `delay 3ms`.
+    Delay(Duration),
+    /// `corrupt`.
+    Corrupt,
+    /// `no-acknowledge`.
+    NoAcknowledge,
+    /// `bus-off`.
+    BusOff,
+}
+
+/// What happens to a drive as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveHarm {
+    /// `off`.
+    Off,
+    /// `on`.
+    On,
+    /// `bus-off`.
+    BusOff,
+}
+
+/// A job of the master.
+#[derive(Clone, Debug)]
+pub struct JobStep {
+    /// The drive.
+    pub drive: Located,
+    /// What is to be done.
+    pub what: JobKind,
+}
+
+/// What a job does.
+#[derive(Clone, Debug)]
+pub enum JobKind {
+    /// `read 1 STATUS = 0181`.
+    Read(RegisterName, Option<Expect>),
+    /// `write 1 SPEED_CMD = 10%`.
+    Write(RegisterName, WrittenValue),
+    /// `every 1 SPEED_ACTUAL 100ms`.
+    Every(RegisterName, Duration),
+    /// `stop-every 1 SPEED_ACTUAL`.
+    StopEvery(RegisterName),
+    /// `lock 1`.
+    Lock,
+    /// `release 1`.
+    Release,
+    /// `start-up 1`: a job of the driver only. With `= not-ready`, which is true here, it must end without a release.
+    StartUp(bool),
+}

@@ -1,0 +1,98 @@
+//! A trace for tools: `drivebench trace --format json` and `--format candump`.
+//!
+//! The form of the JSON object is fixed by `"schema": 2`: keys may be added, none is taken away or changed.
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `bus` | `"unitek"` |
+//! | `frames` | every frame on the segment, in order of time; a repetition stands by itself |
+//! | `t_ns` | when the last bit of the frame, or of the error frame that ended it, had passed, in nanoseconds since the start |
+//! | `id` | the identifier |
+//! | `extended` | `true` where the identifier has 29 bits; left out for one of 11 bits |
+//! | `remote` | the length that a remote frame asks for; left out for a data frame |
+//! | `data` | the data bytes |
+//! | `from` | `"master"` or the drive's number |
+//! | `fault` | `null`, `"lost"`, or the error that ended the frame: `"error-frame"`, `"no-acknowledge"`, `"bus-off"` |
+
+use harness_bench::bus::Bus;
+use harness_sim::record::{FrameEnd, LineFrame, Trace};
+use serde::{Serialize, Serializer};
+use std::io::Write;
+
+/// The version of the form.
+pub const SCHEMA: u32 = 2;
+
+#[derive(Serialize)]
+struct Object {
+    schema: u32,
+    bus: &'static str,
+    frames: Vec<FrameObject>,
+}
+
+#[derive(Serialize)]
+struct FrameObject {
+    t_ns: u64,
+    id: u32,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    extended: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    remote: Option<usize>,
+    data: Vec<u8>,
+    #[serde(serialize_with = "sender")]
+    from: Option<u8>,
+    fault: Option<&'static str>,
+}
+
+fn sender<S: Serializer>(from: &Option<u8>, serializer: S) -> Result<S::Ok, S::Error> {
+    match from {
+        None => serializer.serialize_str("master"),
+        Some(drive) => serializer.serialize_u8(*drive),
+    }
+}
+
+fn frames(traces: &[Trace]) -> impl Iterator<Item = &LineFrame> {
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
+    channels.flat_map(|channel| channel.frames())
+}
+
+/// Writes the object.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write(bus: Bus, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+    let frames = frames(traces).map(|own| FrameObject {
+        t_ns: own.at.since_start().as_nanos(),
+        id: own.frame.id().number(),
+        extended: own.frame.id().is_extended(),
+        remote: own.frame.is_remote().then(|| own.frame.dlc()),
+        data: own.frame.data().to_vec(),
+        from: own.from,
+        fault: match own.ended {
+            FrameEnd::Good => None,
+            FrameEnd::Lost => Some("lost"),
+            FrameEnd::Error(error) => Some(error.name()),
+        },
+    });
+    let object = Object {
+        schema: SCHEMA,
+        bus: bus.name(),
+        frames: frames.collect(),
+    };
+    serde_json::to_writer(&mut out, &object)?;
+    writeln!(out)?;
+    out.flush()
+}
+
+/// Writes the log that candump writes with `-L`, and that canplayer reads: every frame that stations have received, with the time of its
+/// last bit in seconds.
+///
+/// # Errors
+/// Those of `out`.
+pub fn candump(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+    for own in frames(traces).filter(|own| own.ended == FrameEnd::Good) {
+        let micros = own.at.since_start().as_nanos() / 1000;
+        let (seconds, rest) = (micros / 1_000_000, micros % 1_000_000);
+        writeln!(out, "({seconds}.{rest:06}) can0 {}", own.frame)?;
+    }
+    out.flush()
+}

@@ -1,0 +1,138 @@
+//! What is noted of a link to UNITEK drives: what is written, and how fast replies come.
+
+use harness_bench::counted::counted;
+use harness_bench::medium::{Heard, Medium, Out};
+use harness_bench::rig::segment::observed::{LinkNotes, ReceivedSum};
+use harness_proto::can::{self, Frame};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::Request;
+use harness_proto::unitek::properties::Dlc4;
+use std::collections::BTreeSet;
+
+/// The most frames of an attempt that are kept.
+const MOST_KEPT: usize = 100_000;
+
+/// A link to drives, observed.
+pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'l, FrameNotes>;
+
+/// A drive, by the identifier that it had before the first frame.
+type Addressed = u16;
+
+/// Registers that may have been written, with the drives.
+pub(super) type Written = BTreeSet<(Addressed, u8)>;
+
+/// An identifier that was written to this register of a drive.
+pub(super) type Given = (u8, u16, Addressed);
+
+/// What was noted.
+#[derive(Default)]
+pub(super) struct FrameNotes {
+    /// The registers that frames may have written.
+    pub(super) written: Written,
+    /// The levels of the EEPROM that frames may have stored (84), with the drives.
+    stored: BTreeSet<(Addressed, u16)>,
+    /// The identifiers that were written to 68, 69 and 88.
+    pub(super) given: Vec<Given>,
+    /// The last request, by register, and when it had left.
+    asked: Option<(u8, Instant)>,
+    /// The shortest time from the end of a request to the end of its reply.
+    pub(super) shortest: Option<Span>,
+    /// The longest time from the end of a request until the bench had read its reply: what the way to the drive and back takes.
+    pub(super) longest: Span,
+    /// How many frames were received, and their checksum.
+    heard: ReceivedSum,
+    /// The frames that were received, and how many of them before the last conversation began, all of them if none has; `None` where they are
+    /// not kept.
+    kept: Option<(Vec<Frame>, usize)>,
+}
+
+impl FrameNotes {
+    /// Keeps the frames that are received from now on.
+    pub(super) fn keep(&mut self) {
+        self.kept = Some((Vec::new(), usize::MAX));
+    }
+
+    /// The frames that were kept: those before the last conversation, and those in it.
+    pub(super) fn kept(&self) -> [&[Frame]; 2] {
+        let kept = self.kept.as_ref();
+        kept.map_or([&[]; 2], |(frames, begun)| {
+            <[_; 2]>::from(frames.split_at(frames.len().min(*begun)))
+        })
+    }
+
+    /// The drive to which a frame with this identifier goes.
+    fn addressed(&self, id: u16) -> Addressed {
+        let mut given = self.given.iter().rev();
+        let own = given.find(|own| own.0 != 0x69 && own.1 == id);
+        own.map_or(id, |own| own.2)
+    }
+
+    /// The levels of the EEPROM that may have been stored, with the drives.
+    pub(super) fn stored(&self) -> impl Iterator<Item = (u16, u16)> {
+        self.stored.iter().copied()
+    }
+
+    /// What was received so far, in words.
+    pub(super) fn received(&self) -> String {
+        let ReceivedSum { pieces, sum } = self.heard;
+        format!(
+            "{} from the drives, checksum {sum:08X}",
+            counted(pieces, "frame")
+        )
+    }
+}
+
+impl LinkNotes for FrameNotes {
+    fn sent(&mut self, what: Out<'_>, end: Instant) {
+        for frame in what.frames() {
+            let Ok(rx) = u16::try_from(frame.id().number()) else {
+                continue;
+            };
+            match Request::decode(frame, rx, Dlc4::As3) {
+                Ok(Request::Write { register, data }) => {
+                    let (drive, value) = (self.addressed(rx), (data.bits() & 0xFFFF) as u16);
+                    self.written.insert((drive, register));
+                    match register {
+                        0x68 | 0x69 | 0x88 if value != drive => {
+                            self.given.push((register, value, drive));
+                        }
+                        0x84 => {
+                            self.stored.insert((drive, value));
+                        }
+                        _ => {}
+                    }
+                }
+                Ok(Request::Read { register }) => self.asked = Some((register, end)),
+                Ok(Request::Cycle { .. } | Request::Stop { .. }) | Err(_) => {}
+            }
+        }
+    }
+
+    fn heard(&mut self, _: Medium, at: Instant, now: Instant, heard: Heard) {
+        let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
+            return;
+        };
+        self.heard.pieces += 1;
+        if let Some((frames, _)) = self.kept.as_mut().filter(|own| own.0.len() < MOST_KEPT) {
+            frames.push(frame);
+        }
+        for byte in frame.to_string().bytes() {
+            self.heard.add(u32::from(byte));
+        }
+        if let Some((register, end)) = self.asked
+            && frame.data().first() == Some(&register)
+        {
+            let took = at.since(end);
+            self.longest = self.longest.max(now.since(end));
+            self.shortest = Some(self.shortest.map_or(took, |own| own.min(took)));
+            self.asked = None;
+        }
+    }
+
+    fn begin(&mut self) {
+        if let Some((frames, begun)) = &mut self.kept {
+            *begun = frames.len();
+        }
+        self.asked = None;
+    }
+}

@@ -1,0 +1,603 @@
+//! Attempts at scenarios on the drives of a rig, whose registers and properties are found out first.
+//!
+//! A scenario describes the drive of the manual; a rig has a drive of its own. So every scenario is played on a model of that drive first,
+//! behind the same limits. It is skipped if a right drive with these registers would not meet its lines, or if the limits deny a frame of
+//! it. A line that the rig does not meet then accuses the drive, unless a right drive with another value of a property that is not settled
+//! would not meet it either, the drive and its model read differently at rest, or the computer was late.
+
+mod note;
+mod own;
+mod ready;
+
+pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
+pub(super) use own::{Own, stores};
+
+use super::Axis;
+use super::known::Known;
+use super::observed::{FrameNotes, Observed, Written};
+use super::profile::Profiled;
+use super::set_back::foretell;
+use crate::driver::Error;
+use crate::gate::GuardsSegment as _;
+use crate::gate::guarded;
+use crate::language::Unitek;
+use crate::language::plan::{node, octet_time};
+use crate::language::syntax::{PropertyValue, SetupKind};
+use crate::simulate::{self, Bench};
+use harness_bench::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
+use harness_bench::medium::Medium;
+use harness_bench::rig::left::NotPutBack;
+use harness_bench::rig::segment::observed::{Beats, LinkTimes, Slow};
+use harness_bench::scenario::expression::Scope;
+use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
+use harness_bench::scenario::syntax::Scenario;
+use harness_bench::scenario::verdict::Verdict;
+use harness_proto::can::{BitRate, Frame};
+use harness_proto::novobus::guard::LimitSetting;
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::guard::Limits;
+use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
+use harness_proto::unitek::{Register, guard};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Identifiers and bit rate: a drive that stores new ones may be lost.
+const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
+
+/// Registers that show what a drive makes of its inputs: a model that explains the drive reads the same at rest.
+const AT_REST: [u8; 9] = [0x40, 0x8F, 0xCE, 0xD8, 0xE2, 0xE3, 0xEF, 0xF2, 0xF5];
+
+/// What drives read at rest, by number and register.
+type AtRest = Vec<(u8, u8, u32)>;
+
+/// Where the clock of a drive can stand when a scenario begins, in parts of 32 of a millisecond: cycles, ramps and events go by it.
+const PHASES: std::ops::Range<u64> = 1..32;
+
+/// What a model is beside what is known of the drives.
+#[derive(Clone, Copy, Default)]
+struct Other<'o> {
+    /// How far the clocks of the drives are ahead.
+    phase: Span,
+    /// The properties of all drives, in place of those that are known.
+    properties: Option<&'o [Properties]>,
+    /// What adapter and computer do to frames.
+    slow: Option<Slow>,
+}
+
+/// A scenario played on the model.
+struct Rehearsal {
+    outcome: Outcome,
+    at_rest: AtRest,
+    denied: Option<(String, Vec<LimitSetting>)>,
+    noted: FrameNotes,
+}
+
+/// How an attempt went, before it is judged.
+enum Gone {
+    /// A drive did not become ready.
+    Unanswered(Error),
+    /// The rig does not play the scenario.
+    Skipped(Skip),
+    /// It was played. With what the drives and their models read at rest.
+    Played(Box<Outcome>, [AtRest; 2]),
+}
+
+/// Plays attempts, on a rig or on a record, and judges them.
+#[derive(Clone, Debug)]
+pub struct Player {
+    axes: Vec<Axis>,
+    rate: BitRate,
+    patience: Span,
+    limits: Limits,
+    /// What a record of the rig shows that it can do.
+    capabilities: Vec<Capability>,
+    /// Whether its adapter carries remote frames.
+    remote: bool,
+    /// What the rig's file says of the drives, unless they are qualified.
+    profile: Profiled,
+    /// Known from the first attempt on.
+    known: Option<Vec<Known>>,
+    /// What was found out where finding out has failed.
+    partly: Vec<Known>,
+    /// What has been written since the registers were read.
+    written: Written,
+    /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
+    moved: BTreeSet<u16>,
+    /// The levels of the EEPROM that the last attempt may have stored, with the drives.
+    levels: BTreeSet<(u16, u16)>,
+    /// Whether something that was played may have stored parameters.
+    stored: bool,
+    /// What was received before the scenario of the last attempt; `None` where it was not begun.
+    before: Option<String>,
+    /// Whether the drives are qualified.
+    qualifies: bool,
+    /// What shows that the program works while it plays on models.
+    pub(super) beats: Beats,
+    /// Where it says what a scenario or a probe changes, before it does.
+    pub(super) left: NotPutBack,
+    /// The attempts of a qualification.
+    notes: Vec<Note>,
+}
+
+impl Player {
+    pub(super) fn of(
+        axes: Vec<Axis>,
+        rate: BitRate,
+        patience: Span,
+        limits: Limits,
+        (capabilities, remote): (Vec<Capability>, bool),
+    ) -> Self {
+        Self {
+            axes,
+            rate,
+            patience,
+            limits,
+            capabilities,
+            remote,
+            profile: Profiled::default(),
+            known: None,
+            partly: Vec::new(),
+            written: BTreeSet::new(),
+            moved: BTreeSet::new(),
+            levels: BTreeSet::new(),
+            stored: false,
+            before: None,
+            qualifies: false,
+            beats: Beats::default(),
+            left: NotPutBack::default(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Takes the properties of drives over from a profile.
+    pub(super) fn with_profile(mut self, profile: Profiled) -> Self {
+        self.profile = profile;
+        self
+    }
+
+    /// Keeps every attempt from now on, and settles by probes what the limits permit to find out.
+    pub(super) const fn qualify(&mut self) {
+        self.qualifies = true;
+    }
+
+    /// Reads and probes the drives again before the next scenario. What they hold stays known until then, to be set back.
+    pub(super) fn forget(&mut self) {
+        let drives = self.known.iter_mut().flatten();
+        drives.for_each(|known| known.doubtful = true);
+    }
+
+    /// What may be done.
+    pub(super) const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The attempts of a qualification.
+    pub(super) fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// What is known of the drives; nothing before the first attempt.
+    pub(super) fn known(&self) -> &[Known] {
+        self.known.as_deref().unwrap_or_default()
+    }
+
+    /// What was read of the drives, also where not everything could be.
+    pub(super) fn read_so_far(&self) -> &[Known] {
+        self.known.as_deref().unwrap_or(&self.partly)
+    }
+
+    /// The levels of the EEPROM that the last attempt may have stored, with the drives.
+    pub(super) const fn stored_levels(&self) -> &BTreeSet<(u16, u16)> {
+        &self.levels
+    }
+
+    /// Remembers what was written.
+    fn take_notes(&mut self, noted: &FrameNotes) {
+        self.written.extend(&noted.written);
+        self.levels.extend(noted.stored());
+    }
+
+    /// The registers that may differ from what was read at first.
+    pub(super) const fn written(&self) -> &Written {
+        &self.written
+    }
+
+    /// Whether something that was played may have stored parameters.
+    pub(super) const fn has_stored(&self) -> bool {
+        self.stored
+    }
+
+    /// Notes that parameters may have been stored.
+    pub(super) const fn note_stored(&mut self) {
+        self.stored = true;
+    }
+
+    /// Why a scenario is not begun, whatever the drives are; `None` if it is.
+    pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
+        let bench = &own.plan.setup;
+        let axis = |node: u8| self.axes.iter().find(|axis| axis.node == node);
+        for drive in &bench.drives {
+            let wanted = drive.identifiers;
+            let why = match axis(drive.node) {
+                None => format!("the rig has no drive {}", drive.node),
+                Some(axis) if (axis.rx, axis.tx) != wanted => format!(
+                    "drive {} of the rig has the identifiers {:03X} and {:03X}, that of the scenario {:03X} and {:03X}",
+                    drive.node, axis.rx, axis.tx, wanted.0, wanted.1
+                ),
+                Some(_) => continue,
+            };
+            return Some(Why::OtherDrives(why).into());
+        }
+        let stated = own.scenario.header.rate.is_some();
+        if stated && bench.rate != self.rate {
+            let why = format!(
+                "the rig's bus has {} kbit/s, that of the scenario {}",
+                self.rate.bits_per_second() / 1000,
+                bench.rate.bits_per_second() / 1000
+            );
+            return Some(Why::OtherDrives(why).into());
+        }
+        if !self.remote && own.frames().any(Frame::is_remote) {
+            let why = "the adapter's language has no remote frames; use SLCAN".to_owned();
+            return Some(Why::OtherDrives(why).into());
+        }
+        lacks(&own.plan, &self.replay(&[], Span::ZERO))
+    }
+
+    /// What was recorded of the rig, as a link.
+    pub(super) fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
+        let drives = u8::try_from(self.axes.len()).unwrap_or(u8::MAX);
+        let medium = Medium::Frames(self.rate);
+        let capabilities = self.capabilities.clone();
+        Replay::new(
+            events.to_vec(),
+            medium,
+            tolerance,
+            vec![drives],
+            capabilities,
+        )
+    }
+
+    /// One attempt over a link: finds out about the drives, rehearses, makes them ready, plays and judges. With what was received
+    /// before the scenario, in words.
+    pub(super) fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+        link.begin();
+        let begun = self.qualifies.then(|| self.without_notes());
+        let mut link = Observed::new(link);
+        if begun.is_some() {
+            link.noted.keep();
+        }
+        let gone = self.go(own, &mut link, true);
+        if let Some(begun) = begun {
+            self.note(begun, own, &link, &gone);
+        }
+        let way = LinkTimes {
+            late: link.take_late(),
+            longest: link.noted.longest,
+            tolerance: link.time_tolerance(),
+        };
+        let outcome = match gone {
+            Gone::Unanswered(error) => self.unanswered(&error),
+            Gone::Skipped(skip) => Outcome::skipped(skip),
+            Gone::Played(outcome, [drives, models]) => {
+                self.judged(own, *outcome, way, &unlike(&drives, &models))
+            }
+        };
+        if let Some(note) = self.notes.last_mut() {
+            note.judge(&outcome);
+        }
+        let before = match &self.before {
+            Some(before) => before.clone(),
+            None => link.noted.received(),
+        };
+        (outcome, before)
+    }
+
+    /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
+    fn go(&mut self, own: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
+        self.before = None;
+        self.levels.clear();
+        if let Err(error) = self.learn(link) {
+            self.take_notes(&link.noted);
+            return Gone::Unanswered(error);
+        }
+        let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
+            Ok(rehearsal) => rehearsal.map_or_else(Vec::new, |own| {
+                foretell(
+                    &self.left,
+                    self.known(),
+                    &own.noted.written,
+                    &own.noted.given,
+                );
+                own.at_rest
+            }),
+            Err(skip) => return Gone::Skipped(skip),
+        };
+        let at_rest = self.prepare(own, self.limits.motion, link);
+        self.before = Some(link.noted.received());
+        self.take_notes(&link.noted);
+        let at_rest = match at_rest {
+            Ok(at_rest) => at_rest,
+            Err(error) => return Gone::Unanswered(error),
+        };
+        if own.may_time_out(self.known()) {
+            link.without_pauses();
+        }
+        link.begin();
+        link.take_late();
+        let outcome = play(&own.plan, link, AtMismatch::Stop);
+        self.take_notes(&link.noted);
+        let settings = link
+            .noted
+            .written
+            .iter()
+            .filter(|own| BUS_SETTINGS.contains(&own.1));
+        self.moved.extend(settings.map(|own| own.0));
+        Gone::Played(Box::new(outcome), [at_rest, model])
+    }
+
+    /// Plays a scenario on the model.
+    ///
+    /// # Errors
+    /// Why the rig does not play it.
+    fn rehearsed(&self, own: &Own) -> Result<Rehearsal, Skip> {
+        if let Some(why) = self.other_properties(&own.scenario) {
+            return Err(Why::OtherDrives(why).into());
+        }
+        let first = self.rehearse(own, &self.limits, Other::default());
+        if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
+            return Ok(first);
+        }
+        let mut limits = self.limits.clone();
+        let mut unlocks = BTreeSet::new();
+        let mut last = self.rehearse(own, &limits, Other::default());
+        for _ in 0..4 {
+            let wanted = match &last.denied {
+                Some((_, settings)) => settings.clone(),
+                // The drives stay locked without it.
+                None if !limits.motion => vec![LimitSetting::Motion],
+                None => break,
+            };
+            let before = limits.clone();
+            for setting in wanted {
+                permit(&mut limits, setting);
+                unlocks.insert(Unlock::Limit(setting));
+            }
+            if limits == before {
+                break;
+            }
+            last = self.rehearse(own, &limits, Other::default());
+        }
+        let found = |outcome: &Outcome| {
+            let finding = outcome.finding.as_ref().map(|own| own.message.clone());
+            let remark = outcome.remarks.first().cloned();
+            finding.or(remark).unwrap_or_default()
+        };
+        let denied = first.denied.as_ref();
+        let plays = last.denied.is_none() && last.outcome.verdict == Verdict::Passed;
+        Err(match (denied, plays) {
+            (None, true) => {
+                let why = "the drives stay locked without `allow_motion` and --allow-motion";
+                Skip::from(Why::Denied(why.to_owned())).and(unlocks)
+            }
+            (Some((why, _)), true) => Skip::from(Why::Denied(why.clone())).and(unlocks),
+            // Nothing that can be permitted is enough.
+            (Some((why, settings)), false) if settings.is_empty() => {
+                Why::Denied(why.clone()).into()
+            }
+            (_, false) => Why::OtherDrives(format!(
+                "a correct drive with the same registers does not meet it: {}",
+                found(&last.outcome)
+            ))
+            .into(),
+        })
+    }
+
+    /// The first property of the header that the rig's drives have another value of, or that is not settled.
+    fn other_properties(&self, scenario: &Scenario<Unitek>) -> Option<String> {
+        scenario.header.drives.iter().find_map(|line| {
+            let node = node(&line.drive, Scope::default()).ok()?;
+            let known = self.known().iter().find(|own| own.axis.node == node)?;
+            let mut wanted = known.properties;
+            let named: Vec<_> = match &line.what {
+                SetupKind::Property(property, value) => {
+                    let setting = match value {
+                        PropertyValue::Word(word) => Setting::Word(word),
+                        PropertyValue::Time(time) => Setting::Time(time.on(octet_time(self.rate))),
+                    };
+                    let _fits = property.set(&mut wanted, setting);
+                    vec![*property]
+                }
+                SetupKind::Profile(name) => {
+                    wanted = Properties::profile(name)?;
+                    let differs = |own: &&_| differs_between_profiles(own);
+                    PROPERTIES.iter().filter(differs).collect()
+                }
+                _ => return None,
+            };
+            named.into_iter().find_map(|property| {
+                let (value, own) = (
+                    property.of_drive(&wanted),
+                    property.of_drive(&known.properties),
+                );
+                let name = property.name;
+                match known.settled.contains(name) {
+                    false => Some(format!(
+                        "it is for a drive with {name} = {value}; that of drive {node} is not settled"
+                    )),
+                    true => (value != own).then(|| {
+                        format!("it is for a drive with {name} = {value}; drive {node} has {own}")
+                    }),
+                }
+            })
+        })
+    }
+
+    /// Plays a scenario on the model within limits.
+    fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+        self.beats.beat();
+        let known = self.known().iter().enumerate();
+        let drives = known.map(|(place, known)| {
+            let other = other.properties.and_then(|all| all.get(place)).copied();
+            known.model(other.unwrap_or(known.properties))
+        });
+        let setup = simulate::Setup::new(self.rate, drives.collect());
+        let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
+        let mut bench = Bench::new(&setup);
+        bench.wait(Instant::START + other.phase);
+        let mut link = guarded(bench, limits.clone(), &identifiers, false);
+        if let Some(gate) = link.segment_mut() {
+            self.tell(self.known(), gate);
+        }
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        let mut observed = Observed::new(&mut recording);
+        let at_rest = self.prepare(own, limits.motion, &mut observed);
+        observed.begin();
+        observed = observed.slowed(other.slow);
+        let (outcome, at_rest) = match at_rest {
+            Ok(at_rest) => (play(&own.plan, &mut observed, AtMismatch::Stop), at_rest),
+            Err(error) => (self.unanswered(&error), Vec::new()),
+        };
+        let noted = std::mem::take(&mut observed.noted);
+        let denied = match link.trouble() {
+            Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
+            _ => None,
+        };
+        Rehearsal {
+            outcome,
+            at_rest,
+            denied,
+            noted,
+        }
+    }
+
+    /// Tells a model's gate what the gate in front of the drives knows of them.
+    fn tell(&self, drives: &[Known], gate: &mut guard::Gate) {
+        for known in drives {
+            let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
+            gate.learn(known.axis.rx, full, limit);
+        }
+        self.moved.iter().for_each(|rx| gate.note_moved(*rx));
+    }
+
+    /// Whether a line that was not met accuses the drive.
+    fn judged(&self, own: &Own, outcome: Outcome, way: LinkTimes, unlike: &[(u8, u8)]) -> Outcome {
+        if outcome.verdict != Verdict::Failed {
+            return outcome.judged_by(&own.plan);
+        }
+        let asks_for = own.asks_for();
+        let unlike = unlike
+            .iter()
+            .find(|(_, register)| asks_for.contains(register));
+        let real = way.tolerance > Span::ZERO;
+        let why = if real && way.late > way.tolerance {
+            Some(format!(
+                "the computer was late by {}: this may not be the drive's fault",
+                way.late
+            ))
+        } else if real && way.longest > way.tolerance {
+            Some(format!(
+                "a request and its reply took {} over the adapter: this may not be the drive's fault",
+                way.longest
+            ))
+        } else if let Some((node, register)) = unlike {
+            Some(format!(
+                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
+                 another firmware",
+                Register::of(*register).name
+            ))
+        } else {
+            self.left_open(own, way).map(|property| {
+                format!(
+                    "a correct drive with {property} does not meet it either, and this is not known"
+                )
+            })
+        };
+        match why {
+            None => outcome,
+            Some(why) => Outcome {
+                verdict: Verdict::Inconclusive,
+                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
+                ..outcome
+            },
+        }
+    }
+
+    /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
+    /// settled, the place of its clock, or times in which frames leave.
+    fn left_open(&self, own: &Own, way: LinkTimes) -> Option<String> {
+        let fails = |other: Other<'_>| {
+            let played = self.rehearse(own, &self.limits, other);
+            played.denied.is_some() || played.outcome.verdict != Verdict::Passed
+        };
+        for phase in PHASES.map(|own| Span::from_micros(own * 1_000 / 32)) {
+            let other = Other {
+                phase,
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(format!("its clock of 1 ms ahead by {phase}"));
+            }
+        }
+        for slow in way.slow() {
+            let other = Other {
+                slow: Some(slow),
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(format!(
+                    "an adapter through which frames leave {} late",
+                    slow.by
+                ));
+            }
+        }
+        for (place, known) in self.known().iter().enumerate() {
+            for (words, other) in known.candidates() {
+                let drives = self.known().iter().enumerate();
+                let all: Vec<_> = drives
+                    .map(|(at, own)| if at == place { other } else { own.properties })
+                    .collect();
+                let other = Other {
+                    properties: Some(&all),
+                    ..Other::default()
+                };
+                if fails(other) {
+                    return Some(words);
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The registers in which drives and their models read differently at rest, by number and register.
+fn unlike(drives: &AtRest, models: &AtRest) -> Vec<(u8, u8)> {
+    let mask = |(node, register, bits): &(u8, u8, u32)| {
+        (*node, *register, bits & Register::of(*register).mask())
+    };
+    let models: BTreeSet<_> = models.iter().map(mask).collect();
+    let drives: BTreeSet<_> = drives.iter().map(mask).collect();
+    let differing = drives.symmetric_difference(&models);
+    let places: BTreeSet<_> = differing
+        .map(|(node, register, _)| (*node, *register))
+        .collect();
+    places.into_iter().collect()
+}
+
+/// Whether the profiles have different values of a property.
+fn differs_between_profiles(property: &harness_proto::unitek::properties::Description) -> bool {
+    let profiles = PROFILES.iter().filter_map(|name| Properties::profile(name));
+    let values: Vec<_> = profiles.map(|own| property.of_drive(&own)).collect();
+    values.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Permits what a setting denies.
+const fn permit(limits: &mut Limits, setting: LimitSetting) {
+    match setting {
+        LimitSetting::Motion => limits.motion = true,
+        LimitSetting::Eeprom => limits.eeprom = true,
+        LimitSetting::MaxSpeed => limits.max_speed = None,
+        _ => {}
+    }
+}

@@ -1,0 +1,332 @@
+//! The attempts of a qualification, and whether a model with something changed explains them.
+//!
+//! An attempt is explained by a model that ends it in the same way, at the same line, and sends the same frames. How often a frame is sent and
+//! when is not compared, since the clock of a drive stands anywhere when an attempt begins; lines of scenarios compare that.
+
+use super::super::known::Known;
+use super::super::observed::Observed;
+use super::{Gone, Own, PHASES, Player};
+use crate::driver::{Driver, Error};
+use crate::gate::GuardsSegment as _;
+use crate::gate::guarded;
+use crate::simulate::{self, Bench, DriveSetup};
+use harness_bench::link::{Line as _, Link as _, LinkEvent, Recording};
+use harness_bench::medium::Out;
+use harness_bench::scenario::run::{Outcome, Why};
+use harness_bench::scenario::verdict::Verdict;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::properties::Properties;
+use harness_proto::unitek::{Access, REGISTERS, Register, Request};
+use harness_sim::unitek::deviation::Deviation;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// How many frames a drive may have heard before an attempt, counted in the cycle of a deviation that shows in each fifth one.
+const HEARD_BEFORE: std::ops::Range<u8> = 1..5;
+
+/// What the names of conversations of a qualification begin with.
+pub(crate) const CONVERSATION: &str = "qualify-";
+
+/// Every how many phases of a drive's clock one is tried for a drive that is wrong.
+const EACH_PHASE: usize = 8;
+
+/// How a drive differs from what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Other {
+    /// Nothing differs but what is not settled of it: it is right.
+    Right,
+    /// The drive at this place has a deviation.
+    Deviates(usize, &'static Deviation),
+}
+
+/// One attempt.
+#[derive(Clone, Debug)]
+pub(crate) struct Note {
+    own: Arc<Own>,
+    /// What was known when it began.
+    begun: Player,
+    /// What was known of the drives in it.
+    drives: Vec<Known>,
+    shown: Shown,
+    /// The verdict.
+    pub(crate) verdict: Verdict,
+    /// Whether the drives did something that no correct drive does, as far as is known.
+    pub(crate) accuses: bool,
+    /// Whether time is virtual: what comes can be compared with a model, whatever the verdict.
+    pub(crate) exact: bool,
+    /// How many frames were received.
+    pub(crate) frames: usize,
+}
+
+/// What an attempt has shown.
+#[derive(Clone, Debug, PartialEq)]
+struct Shown {
+    /// Why the drives were not ready.
+    unanswered: Option<Error>,
+    /// How it ended, and at which place of the text.
+    ended: Option<(Verdict, Option<usize>)>,
+    /// The frames that were received before the scenario, without what means nothing.
+    before: BTreeSet<String>,
+    /// Those of the scenario: by identifier, length and register the contents, one behind the other where they change.
+    within: BTreeMap<String, Vec<String>>,
+}
+
+impl Shown {
+    fn of(gone: &Gone, link: &Observed<'_>, exact: bool) -> Self {
+        let [before, frames] = link.noted.kept();
+        let before = before.iter().map(|frame| meaning(frame, false));
+        let mut within: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for (head, contents) in frames.iter().map(|frame| meaning(frame, exact)) {
+            let own = within.entry(head).or_default();
+            if own.last() != Some(&contents) {
+                own.push(contents);
+            }
+        }
+        let (unanswered, ended) = match gone {
+            Gone::Unanswered(error) => (Some(error.clone()), None),
+            Gone::Skipped(_) => (None, None),
+            Gone::Played(outcome, _) => {
+                let place = outcome.finding.as_ref().map(|own| own.span.start);
+                (None, Some((outcome.verdict, place)))
+            }
+        };
+        Self {
+            unanswered,
+            ended,
+            before: before.map(|(head, own)| head + &own).collect(),
+            within,
+        }
+    }
+}
+
+/// Registers that follow a motor that turns: their contents depend on remainders that no register shows. Lines of scenarios compare them.
+const MOVING: [u8; 15] = [
+    0x20, 0x26, 0x27, 0x28, 0x30, 0x32, 0x33, 0x42, 0x43, 0x5C, 0x5D, 0x5F, 0x6D, 0x70, 0xA8,
+];
+
+/// Identifier, length and register of a frame, and its contents without what means nothing: the stuff byte, what follows a motor, and with
+/// `all` unset what a register that cannot be written reads, which may change by itself.
+fn meaning(frame: &Frame, all: bool) -> (String, String) {
+    let (register, contents) = frame.data().split_at(frame.data().len().min(1));
+    let changes = register.first().is_some_and(|own| {
+        let read_only = Register::of(*own).access == Access::RO;
+        MOVING.contains(own) || read_only && !all
+    });
+    let shown = match contents {
+        [_, _, _] | [_, _, _, _, _] if changes => &[],
+        [shown @ .., _] if matches!(shown.len(), 2 | 4) => shown,
+        _ => contents,
+    };
+    let head = (frame.id(), frame.is_remote(), frame.data().len());
+    let head = format!("{} {} {} {register:02X?} ", head.0, head.1, head.2);
+    (head, format!("{shown:02X?}"))
+}
+
+impl Note {
+    /// Notes the verdict.
+    pub(super) fn judge(&mut self, outcome: &Outcome) {
+        self.verdict = outcome.verdict;
+        let unready = self.shown.unanswered.is_some() && self.frames > 0;
+        self.accuses = outcome.verdict == Verdict::Failed || unready;
+    }
+
+    /// Whether the scenario was played, or the drives did not become ready for it.
+    fn was_tried(&self) -> bool {
+        self.shown.unanswered.is_some() || self.shown.ended.is_some()
+    }
+
+    /// Whether it has shown something: the scenario was tried, or the drives were asked for everything.
+    pub(crate) fn shows_something(&self) -> bool {
+        self.was_tried() || self.begun.known.is_none()
+    }
+
+    /// The name of the scenario.
+    pub(crate) fn name(&self) -> &String {
+        &self.own.name
+    }
+
+    /// The numbers of the drives, in their order.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = u8> {
+        self.begun.axes.iter().map(|axis| axis.node)
+    }
+
+    /// The values of a property of the drive at a place with which it would have shown the same, among those that are possible.
+    pub(crate) fn explaining<'v>(
+        &self,
+        place: usize,
+        values: &'v [Properties],
+    ) -> Vec<&'v Properties> {
+        let explains = |value: &&Properties| {
+            let mut all: Vec<_> = self.drives.iter().map(|own| own.properties).collect();
+            if let Some(own) = all.get_mut(place) {
+                *own = **value;
+            }
+            phases(EACH_PHASE).any(|phase| self.shows(Other::Right, &all, (phase, 0)))
+        };
+        values.iter().filter(explains).collect()
+    }
+
+    /// Whether drives that differ so would have shown the same.
+    pub(crate) fn is_explained_by(&self, other: Other) -> bool {
+        let known: Vec<_> = self.drives.iter().map(|own| own.properties).collect();
+        let each = match other {
+            Other::Right => 1,
+            Other::Deviates(..) => EACH_PHASE,
+        };
+        if phases(each).any(|phase| self.shows(other, &known, (phase, 0))) {
+            return true;
+        }
+        match other {
+            Other::Deviates(..) => {
+                let mut heard = HEARD_BEFORE;
+                heard.any(|heard| self.shows(other, &known, (Span::ZERO, heard)))
+            }
+            Other::Right => self.drives.iter().enumerate().any(|(place, own)| {
+                own.candidates().into_iter().any(|(_, properties)| {
+                    let mut all = known.clone();
+                    all[place] = properties;
+                    self.shows(other, &all, (Span::ZERO, 0))
+                })
+            }),
+        }
+    }
+
+    /// Plays the attempt on a model, whose clock is ahead and which has heard some requests before.
+    fn shows(&self, other: Other, properties: &[Properties], (phase, heard): (Span, u8)) -> bool {
+        let mut player = self.begun.clone();
+        player.beats.beat();
+        let drives = self.drives.iter().zip(properties).enumerate();
+        let drives = drives.map(|(place, (known, properties))| match other {
+            Other::Deviates(own, deviation) if own == place => {
+                deviant(known, *properties, deviation)
+            }
+            _ => right(known, *properties),
+        });
+        let setup = simulate::Setup::new(player.rate, drives.collect());
+        let mut bench = Bench::new(&setup);
+        for axis in player.axes.iter().cycle().take(heard.into()) {
+            let firmware = Request::Read { register: 0x1B };
+            let frame = firmware.encode(axis.rx).into_iter();
+            bench.send(0, Out::Frames(&frame.collect::<Vec<_>>()));
+            let now = bench.now();
+            bench.wait(now + Span::from_millis(10));
+        }
+        bench.wait(Instant::START + phase);
+        bench.begin();
+        let identifiers: Vec<_> = player.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
+        let mut link = guarded(bench, player.limits.clone(), &identifiers, false);
+        if let Some(gate) = link.segment_mut() {
+            player.tell(&self.drives, gate);
+        }
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        let mut link = Observed::new(&mut recording);
+        link.noted.keep();
+        let gone = match self.was_tried() {
+            true => player.go(&self.own, &mut link, false),
+            false => match player.learn(&mut link) {
+                Ok(()) => Gone::Skipped(Why::RunEnded.into()),
+                Err(error) => Gone::Unanswered(error),
+            },
+        };
+        Shown::of(&gone, &link, self.exact) == self.shown
+    }
+}
+
+/// Where the clock of a drive may stand: every `each`th place.
+fn phases(each: usize) -> impl Iterator<Item = Span> {
+    let phases = std::iter::once(0).chain(PHASES.step_by(each));
+    phases.map(|own| Span::from_micros(own * 1_000 / 32))
+}
+
+/// A drive as it is known; as delivered where nothing was read of it.
+fn right(known: &Known, properties: Properties) -> DriveSetup {
+    match known.cells.is_empty() {
+        true => DriveSetup {
+            identifiers: (known.axis.rx, known.axis.tx),
+            ..DriveSetup::new(known.axis.node)
+        },
+        false => known.model(properties),
+    }
+}
+
+/// A drive with a deviation, whose registers hold what makes it send what was read of it.
+fn deviant(known: &Known, properties: Properties, deviation: &'static Deviation) -> DriveSetup {
+    let mut guess = known.clone();
+    // What a correct drive works out from others is left as it is.
+    let usual = read(known, right(known, properties));
+    for tried in 0..2 {
+        let setup = DriveSetup {
+            deviation: Some(deviation),
+            ..right(&guess, properties)
+        };
+        let reads = read(known, setup);
+        let kept = |(register, wanted): &(&u8, &u32)| usual.get(register) == Some(wanted);
+        for (register, wanted) in known.cells.iter().filter(kept) {
+            // A deviation that exchanges something gives the contents back when it is applied again.
+            let better = match reads.get(register) {
+                Some(reads) if reads != wanted && tried == 0 => *reads,
+                Some(reads) if reads != wanted => Register::of(*register).dump,
+                _ => continue,
+            };
+            guess.cells.insert(*register, better);
+        }
+    }
+    DriveSetup {
+        deviation: Some(deviation),
+        ..right(&guess, properties)
+    }
+}
+
+/// What the registers of a simulated drive read.
+fn read(known: &Known, setup: DriveSetup) -> BTreeMap<u8, u32> {
+    let setup = simulate::Setup {
+        drives: vec![setup],
+        ..simulate::Setup::of(1)
+    };
+    let mut bench = Bench::new(&setup);
+    let mut driver = Driver::new(Box::new(&mut bench), &[known.axis], Span::from_millis(20));
+    let registers = REGISTERS.iter().map(|own| own.number);
+    let asked = registers.filter(|own| known.cells.contains_key(own));
+    asked
+        .filter_map(|register| {
+            let reply = driver.read(known.axis, register).ok()?;
+            let mask = Register::of(register).mask();
+            Some((register, reply.data.bits() & mask))
+        })
+        .collect()
+}
+
+impl Player {
+    /// A copy that keeps no attempts.
+    pub(super) fn without_notes(&mut self) -> Self {
+        let notes = std::mem::take(&mut self.notes);
+        let copy = self.clone();
+        self.notes = notes;
+        copy
+    }
+
+    /// Notes an attempt.
+    pub(super) fn note(&mut self, begun: Self, own: &Arc<Own>, link: &Observed<'_>, gone: &Gone) {
+        let drives = self.known.as_ref().unwrap_or(&self.partly).iter();
+        let first = begun.known.is_none();
+        let drives = drives.map(|own| match first {
+            // Probes have changed what they read at first.
+            true => own.as_at_first(),
+            false => own.clone(),
+        });
+        let exact = link.time_tolerance() == Span::ZERO;
+        let note = Note {
+            own: Arc::clone(own),
+            begun,
+            drives: drives.collect(),
+            shown: Shown::of(gone, link, exact),
+            exact,
+            verdict: Verdict::Skipped,
+            accuses: false,
+            frames: link.noted.kept().iter().map(|own| own.len()).sum(),
+        };
+        self.notes.push(note);
+    }
+}

@@ -1,0 +1,89 @@
+//! A scenario of this bus, read for a rig.
+
+use super::{AT_REST, Known};
+use crate::language::Unitek;
+use crate::language::plan::{Act, WantedFrame};
+use harness_bench::scenario::parse::parse;
+use harness_bench::scenario::pattern::Expected;
+use harness_bench::scenario::plan::{Plan, PlannedAction, plan};
+use harness_bench::scenario::problem::Problems;
+use harness_bench::scenario::source::Source;
+use harness_bench::scenario::syntax::Scenario;
+use harness_proto::can::Frame;
+use harness_proto::unitek::frame::Request;
+use harness_proto::unitek::properties::Dlc4;
+use std::collections::BTreeSet;
+
+/// CAN_TIMEOUT.
+const TIME_OUT: u8 = 0xD0;
+
+/// A scenario of this bus.
+#[derive(Debug)]
+pub struct Own {
+    /// The name of its source.
+    pub(super) name: String,
+    pub(super) scenario: Scenario<Unitek>,
+    pub(in super::super) plan: Plan<Unitek>,
+}
+
+impl Own {
+    /// Reads a scenario.
+    pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
+        let scenario: Scenario<Unitek> = parse(source)?;
+        let plan = plan(&scenario, source, None)?;
+        Ok(Self {
+            name: source.name.clone(),
+            scenario,
+            plan,
+        })
+    }
+
+    /// The frames that its lines send.
+    pub(in super::super) fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.plan.steps.iter().flat_map(|step| match &step.action {
+            PlannedAction::Send(_, frames) => frames.as_slice(),
+            PlannedAction::Own(Act::Send(frame) | Act::Read { request: frame, .. }) => {
+                std::slice::from_ref(frame)
+            }
+            _ => &[],
+        })
+    }
+
+    /// Whether a drive may supervise the time between frames in it (T-Out): every query of the bench would begin that time again.
+    pub(super) fn may_time_out(&self, drives: &[Known]) -> bool {
+        let held = drives.iter().any(|known| known.cell(TIME_OUT) != 0);
+        let header = self.plan.setup.drives.iter();
+        let mut header = header.flat_map(|own| &own.registers);
+        held || header.any(|(register, _)| *register == TIME_OUT)
+            || self.frames().any(|frame| writes(frame, TIME_OUT))
+    }
+
+    /// The registers whose contents its lines ask for.
+    pub(super) fn asks_for(&self) -> BTreeSet<u8> {
+        let first = |wanted: &WantedFrame| match wanted.data.first() {
+            Some(Expected::Byte(register)) => Some(*register),
+            _ => None,
+        };
+        let steps = self.plan.steps.iter();
+        let all = steps.flat_map(|step| match &step.action {
+            PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
+            PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
+            PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
+            PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
+            _ => Vec::new(),
+        });
+        all.collect()
+    }
+}
+
+/// Whether a frame may store parameters in the EEPROM.
+pub(in super::super) fn stores(frame: &Frame) -> bool {
+    writes(frame, 0x84)
+}
+
+/// Whether a frame writes a register.
+fn writes(frame: &Frame, number: u8) -> bool {
+    let rx = u16::try_from(frame.id().number()).unwrap_or(0);
+    let request = Request::decode(frame, rx, Dlc4::As3);
+    matches!(request, Ok(Request::Write { register, .. }) if register == number)
+}

@@ -1,0 +1,68 @@
+//! What the profile of a rig's file says of UNITEK drives.
+
+use super::known::Known;
+use crate::driver::Error;
+use crate::language::Unitek;
+use crate::language::plan::{node, octet_time};
+use crate::language::syntax::{PropertyValue, SetupKind};
+use harness_bench::rig::Rig;
+use harness_bench::scenario::expression::Scope;
+use harness_bench::scenario::parse::header::{Part, read};
+use harness_bench::scenario::problem::Problems;
+use harness_bench::scenario::source::Source;
+use harness_bench::scenario::syntax::Scenario;
+use harness_proto::can::BitRate;
+use harness_proto::unitek::properties::{Accepts, Description, Setting};
+
+/// The properties of drives that a profile says: the number of the drive, the property and its value.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Profiled(Vec<(u8, &'static Description, PropertyValue)>);
+
+impl Profiled {
+    /// Those of a rig; none where its file names no profile.
+    pub(super) fn of(rig: &Rig) -> Self {
+        let Some(profile) = &rig.profile else {
+            return Self::default();
+        };
+        let source = Source {
+            name: "profile".to_owned(),
+            text: profile.lines.join("\n").into(),
+        };
+        // The file was checked.
+        let read: Result<Scenario<Unitek>, Problems> = read(&source, Part::Header);
+        let lines = read.map_or_else(|_| Vec::new(), |own| own.header.drives);
+        let properties = lines.into_iter().filter_map(|line| match line.what {
+            SetupKind::Property(property, value) => {
+                Some((node(&line.drive, Scope::default()).ok()?, property, value))
+            }
+            _ => None,
+        });
+        Self(properties.collect())
+    }
+
+    /// Settles the properties of a drive.
+    ///
+    /// # Errors
+    /// The drive has shown another value: the profile is of another drive. How long something takes is not compared.
+    pub(super) fn settle(&self, known: &mut Known, rate: BitRate) -> Result<(), Error> {
+        let own = self.0.iter().filter(|own| own.0 == known.axis.node);
+        for (drive, property, value) in own {
+            let setting = match value {
+                PropertyValue::Word(word) => Setting::Word(word),
+                PropertyValue::Time(time) => Setting::Time(time.on(octet_time(rate))),
+            };
+            let before = known.properties;
+            let _fits = property.set(&mut known.properties, setting);
+            let time = matches!(property.accepts, Accepts::TimeUpTo(_));
+            if !known.settled.insert(property.name) && !time && known.properties != before {
+                return Err(Error::OtherThanProfile {
+                    node: *drive,
+                    property: property.name,
+                    says: property.of_drive(&known.properties).to_string(),
+                    shows: property.of_drive(&before).to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,314 @@
+//! A qualification of UNITEK drives: the deviations that explain what they did, and the values of the open points that were settled.
+
+use super::Axis;
+use super::known::Known;
+use super::player::{CONVERSATION, DriveIs, Note, Player};
+use harness_bench::qualify::segment::{Attempted, Attempts, Point, profile, qualified, repeats};
+use harness_bench::rig::Rig;
+use harness_bench::rig::segment::Qualified;
+use harness_bench::scenario::source::Source;
+use harness_proto::unitek::guard::Limits;
+use harness_proto::unitek::properties::{Description, PROPERTIES};
+use harness_sim::unitek::deviation::{Deviation, deviations};
+use include_dir::{Dir, include_dir};
+use std::ops::RangeInclusive;
+
+/// The conversations that are played with each drive behind the selected scenarios.
+static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/qualify/unitek");
+
+/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of the first one, the next higher one, and
+/// two that no drive of the rig uses, each with its bytes: one as printed and one that is not.
+const DRIVE: [&str; 12] = [
+    "{node}",
+    "{rx}",
+    "{tx}",
+    "{low}",
+    "{high}",
+    "{next}",
+    "{free}",
+    "{free-low}",
+    "{free-high}",
+    "{other}",
+    "{other-low}",
+    "{other-high}",
+];
+
+/// The identifiers in which a drive may receive (UNITEK 3.1).
+const PRINTED: RangeInclusive<u16> = 0x201..=0x27F;
+
+/// What a probe needs that is not made by default.
+#[derive(Clone, Copy)]
+enum Needs {
+    /// Nothing: reads, cycles, STATUS_MASK and the lock.
+    Nothing,
+    /// Motors may turn.
+    Motion,
+    /// Motors may turn, and the time-out may be set.
+    MotionAndBusSettings,
+    /// Identifiers may be changed, and not stored.
+    BusSettings,
+    /// The same, and where that shows nothing, the drive is switched off and on.
+    BusSettingsAndPowerUp,
+    /// The drive is switched off and on.
+    PowerUp,
+    /// Frames without an adapter between.
+    ExactTime,
+    /// An adapter at another bit rate, which brings the drive back.
+    OtherAdapter,
+}
+
+/// What the probe of a property needs, and the conversation whose frames show it; nothing for those that are not listed.
+const NEEDS: [(&str, Needs, &str); 14] = [
+    ("id-change", Needs::BusSettings, "write-identifier"),
+    ("id-range", Needs::BusSettings, "write-identifier-range"),
+    ("event-mask", Needs::PowerUp, ""),
+    ("lock-at-power-up", Needs::PowerUp, ""),
+    ("power-up-mode", Needs::PowerUp, ""),
+    ("lock-clears-command", Needs::Motion, "lock-and-commands"),
+    ("homing-time", Needs::Motion, ""),
+    ("time-out-clear", Needs::MotionAndBusSettings, ""),
+    ("enable-after-lock", Needs::MotionAndBusSettings, ""),
+    ("reply-delay", Needs::ExactTime, ""),
+    ("interval-accuracy", Needs::ExactTime, ""),
+    ("wide-replies", Needs::BusSettings, ""),
+    ("rate-change", Needs::OtherAdapter, ""),
+    ("second-identifiers", Needs::BusSettingsAndPowerUp, ""),
+];
+
+/// Why a property is not settled.
+fn why_open(property: &Description, limits: &Limits) -> String {
+    let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
+    let why = match needs.map_or(Needs::Nothing, |(_, needs, _)| *needs) {
+        Needs::Motion | Needs::MotionAndBusSettings if !limits.motion => {
+            "not asked: this needs `allow_motion` in [limits] and --allow-motion"
+        }
+        Needs::BusSettings | Needs::BusSettingsAndPowerUp | Needs::MotionAndBusSettings
+            if !limits.bus_settings =>
+        {
+            "not asked: this needs `allow_bus_settings` in [limits]"
+        }
+        Needs::Motion | Needs::MotionAndBusSettings => {
+            "the drive did not show it: its hardware enable is open, or it is not ready"
+        }
+        Needs::BusSettingsAndPowerUp => {
+            "it does not use them at once; whether it does later shows when it is switched on"
+        }
+        Needs::PowerUp => "not asked: it shows when the drive is switched on",
+        Needs::ExactTime => "not asked: the adapter and the computer take time, too",
+        Needs::OtherAdapter => {
+            "not asked: the drive could be brought back only by an adapter with another bit rate"
+        }
+        Needs::Nothing | Needs::BusSettings => "the drive has shown no value that is known",
+    };
+    why.to_owned()
+}
+
+/// Two identifiers for a drive to be tried with, which no drive of the rig uses, and which are those of no other drive either: one as
+/// printed (UNITEK 3.1), while there are some left, and one that is not.
+pub(super) fn free(axes: &[Axis], axis: Axis) -> [u16; 2] {
+    let place = axes.iter().position(|own| *own == axis).unwrap_or(0);
+    let used = |id: &u16| axes.iter().any(|own| own.rx == *id || own.tx == *id);
+    let other = || (0x100..=0x7FF).filter(|id| !PRINTED.contains(id) && !used(id));
+    // Not the last one, which is the highest neighbour that a drive may hear.
+    let printed = PRINTED.rev().skip(1).filter(|id| !used(id));
+    let free = printed.chain(other().skip(axes.len())).nth(place);
+    [free, other().nth(place)].map(|own| own.unwrap_or(axis.rx))
+}
+
+/// The conversations with these drives.
+pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
+    let mut files: Vec<_> = CONVERSATIONS.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let of_drive = |axis: &Axis| {
+        let [free, other] = free(axes, *axis);
+        let bytes = |id: u16| [id, id & 0xFF, id >> 8];
+        let [free, free_low, free_high] = bytes(free);
+        let [other, other_low, other_high] = bytes(other);
+        let values = [
+            axis.node.to_string(),
+            format!("{:03X}", axis.rx),
+            format!("{:03X}", axis.tx),
+            format!("{:02X}", axis.rx & 0xFF),
+            format!("{:02X}", axis.rx >> 8),
+            format!("{:03X}", axis.rx + 1),
+            format!("{free:03X}"),
+            format!("{free_low:02X}"),
+            format!("{free_high:02X}"),
+            format!("{other:03X}"),
+            format!("{other_low:02X}"),
+            format!("{other_high:02X}"),
+        ];
+        let several = axes.len() > 1;
+        let node = axis.node;
+        let sources = files.iter().filter_map(move |file| {
+            let name = file.path().file_stem()?.to_str()?;
+            let text = DRIVE.iter().zip(&values);
+            let text = text.fold(file.contents_utf8()?.to_owned(), |text, (place, value)| {
+                text.replace(place, value)
+            });
+            Some(Source {
+                name: match several {
+                    true => format!("{CONVERSATION}{name}-drive-{node}"),
+                    false => format!("{CONVERSATION}{name}"),
+                },
+                text: text.into(),
+            })
+        });
+        sources.collect::<Vec<_>>()
+    };
+    axes.iter().flat_map(of_drive).collect()
+}
+
+/// What the attempts of these players come to, one for each part of a qualification.
+pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) -> Qualified {
+    let notes = parts.iter().map(|player| {
+        let notes = player.notes().iter();
+        let notes = notes.filter(|own| own.shows_something());
+        notes.collect::<Vec<_>>()
+    });
+    let notes: Vec<_> = notes.collect();
+    let known = parts.iter().zip(&notes).map(|(player, notes)| {
+        let mut known = player.known().to_vec();
+        for place in 0..known.len() {
+            settle(&mut known, place, notes);
+        }
+        (known, player.limits())
+    });
+    let known: Vec<_> = known.collect();
+    let shown = known.iter().map(|(known, limits)| points(known, limits));
+    let profile = profile((rig, began), shown.map(Iterator::collect).collect());
+    let named = rig.file.deviation.iter().map(|own| own.name.clone());
+    let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
+    qualified(
+        &Notes(notes.concat(), repeats),
+        profile,
+        "frame",
+        &named.collect::<Vec<_>>(),
+        whole,
+    )
+}
+
+/// Settles the properties of a drive of which one value alone explains the conversation that shows it.
+fn settle(drives: &mut [Known], place: usize, notes: &[&Note]) {
+    let drive = &mut drives[place];
+    for (name, _, conversation) in NEEDS {
+        let property = Description::of(name).filter(|_| !drive.settled.contains(name));
+        let Some(property) = property else { continue };
+        let values = drive.values_of(property);
+        let shown = format!("{CONVERSATION}{conversation}");
+        let of_drive = format!("{shown}-drive-{}", drive.axis.node);
+        for note in notes {
+            let explaining = match [&shown, &of_drive].contains(&note.name()) {
+                true => note.explaining(place, &values),
+                false => continue,
+            };
+            if let [value] = explaining[..] {
+                let word = property.of_drive(value).to_string();
+                drive.settle(name, &word);
+            }
+        }
+    }
+}
+
+/// What a drive has shown of each point.
+fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = Point<'p>> {
+    PROPERTIES.iter().flat_map(move |property| {
+        drives.iter().map(move |known| Point {
+            drive: format!("drive {}", known.axis.node),
+            name: property.name,
+            section: format!("unitek {}", property.section),
+            value: match known.settled.contains(property.name) {
+                true => Ok(property.of_drive(&known.properties).to_string()),
+                false => Err(why_open(property, limits)),
+            },
+        })
+    })
+}
+
+/// The attempts of a qualification, and which of them repeat what another part has played.
+struct Notes<'n>(Vec<&'n Note>, Vec<bool>);
+
+/// A deviation of the drive at a place.
+struct Deviates {
+    place: usize,
+    node: u8,
+    deviation: &'static Deviation,
+}
+
+impl Attempts for Notes<'_> {
+    type Deviation = Deviates;
+
+    fn deviations(&self) -> Vec<Deviates> {
+        let nodes = self.0.first().into_iter().flat_map(|own| own.nodes());
+        let each = nodes.enumerate().flat_map(|(place, node)| {
+            deviations().map(move |deviation| Deviates {
+                place,
+                node,
+                deviation,
+            })
+        });
+        each.collect()
+    }
+
+    fn words(&self, own: &Deviates) -> String {
+        let Deviation {
+            name,
+            section,
+            about,
+            ..
+        } = own.deviation;
+        format!("drive {}: {name} (UNITEK {section}): {about}", own.node)
+    }
+
+    fn attempts(&self) -> Vec<Attempted> {
+        let attempted = self.0.iter().zip(&self.1).map(|(own, repeats)| Attempted {
+            verdict: own.verdict,
+            accuses: own.accuses,
+            exact: own.exact,
+            received: own.frames,
+            repeats: *repeats,
+        });
+        attempted.collect()
+    }
+
+    fn is_right(&self, attempt: usize) -> bool {
+        self.0[attempt].is_explained_by(DriveIs::Right)
+    }
+
+    fn explains(&self, own: &Deviates, attempt: usize) -> bool {
+        self.0[attempt].is_explained_by(DriveIs::Deviates(own.place, own.deviation))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No drive is tried with an identifier of another one, or with that which another one is tried with.
+    #[test]
+    fn each_drive_is_tried_with_identifiers_of_its_own() {
+        for drives in [1u8, 2, 126, 127] {
+            let axis = |node: u8| Axis {
+                node,
+                rx: 0x200 + u16::from(node),
+                tx: 0x180 + u16::from(node),
+            };
+            let axes: Vec<_> = (1..=drives).map(axis).collect();
+            let tried = axes.iter().flat_map(|own| free(&axes, *own));
+            let own = axes.iter().flat_map(|own| [own.rx, own.tx]);
+            let all: Vec<_> = tried.chain(own).collect();
+            let each: std::collections::BTreeSet<_> = all.iter().collect();
+            assert_eq!(each.len(), all.len(), "{drives} drives");
+            assert!(all.iter().all(|own| (1..=0x7FF).contains(own)));
+        }
+    }
+
+    #[test]
+    fn every_need_is_of_a_property_and_its_conversation_is_there() {
+        for (name, _, shown) in NEEDS {
+            assert!(Description::of(name).is_some(), "{name}");
+            let file = format!("{shown}.scn");
+            assert!(shown.is_empty() || CONVERSATIONS.contains(file), "{name}");
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! UNITEK drives on which scenarios are played: what their player offers.
+
+use super::player::{Own, Player, stores};
+use super::profile::Profiled;
+use super::qualify::{conversations, qualify};
+use super::session::UnitekDrives;
+use super::set_back::set_back;
+use super::{Session, axes, limits, rate};
+use crate::simulate::Bench;
+use harness_bench::bus::Bus;
+use harness_bench::link::frames::SLACK;
+use harness_bench::link::{Link, LinkEvent, Replay};
+use harness_bench::rig::Rig;
+use harness_bench::rig::left::NotPutBack;
+use harness_bench::rig::port_file::Port;
+use harness_bench::rig::port_session::patience;
+use harness_bench::rig::segment::observed::Beats;
+use harness_bench::rig::segment::run::PortPlayer;
+use harness_bench::rig::segment::{OnSegment, Qualified};
+use harness_bench::scenario::problem::Problems;
+use harness_bench::scenario::run::{Outcome, Skip};
+use harness_bench::scenario::source::Source;
+use harness_proto::can::BitRate;
+use harness_proto::time::Span;
+use std::sync::Arc;
+
+/// The shortest time between two writes of 84 (UNITEK ex 7: our choice).
+const EEPROM_REST: Span = Span::from_millis(60_000);
+
+/// How long one wait lasts at most: a request to end is looked for between them.
+const NAP: Span = Span::from_millis(50);
+
+impl PortPlayer for Player {
+    const BUS: Bus = Bus::Unitek;
+    const ANEW: bool = false;
+    type Drives = UnitekDrives;
+    type Own = Own;
+
+    fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
+        let port = rig.port();
+        let segment = Self::segment(rig, allow_motion);
+        let mut player = Self::of(
+            port.map(axes).unwrap_or_default(),
+            port.map_or(BitRate::K500, rate),
+            port.map_or(Span::ZERO, patience),
+            limits(rig, allow_motion),
+            (
+                segment.capabilities,
+                port.is_none_or(Port::carries_remote_frames),
+            ),
+        );
+        match qualifies {
+            true => {
+                player.qualify();
+                player
+            }
+            false => player.with_profile(Profiled::of(rig)),
+        }
+    }
+
+    fn doubt(&mut self) {
+        self.forget();
+    }
+
+    fn shows_life(&mut self, beats: Beats) {
+        self.beats = beats;
+    }
+
+    fn tells(&mut self, left: NotPutBack) {
+        self.left = left;
+    }
+
+    fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {
+        let limits = limits(rig, allow_motion);
+        let rate = rig.port().map_or(0, |port| rate(port).bits_per_second());
+        let permitted = (limits.motion, limits.eeprom);
+        OnSegment::of(rig, (rate, SLACK), &Bench::CAPABILITIES, permitted)
+    }
+
+    fn read(source: &Source) -> Result<Own, Box<Problems>> {
+        Own::read(source)
+    }
+
+    fn not_begun(&self, own: &Own) -> Option<Skip> {
+        Self::not_begun(self, own)
+    }
+
+    fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
+        Self::replay(self, events, tolerance)
+    }
+
+    /// Waits until 84 may be written again.
+    fn wait(&mut self, own: &Own, link: &mut dyn Link) {
+        if !self.has_stored() || !own.frames().any(stores) {
+            return;
+        }
+        let end = link.now() + EEPROM_REST;
+        while link.now() < end && link.trouble().is_none() {
+            let now = link.now();
+            link.wait(end.min(now + NAP));
+            while link.receive(0).is_some() {}
+        }
+    }
+
+    fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+        Self::attempt(self, own, link)
+    }
+
+    /// Sets registers back that a scenario has changed.
+    fn set_back(&mut self, own: &Own, session: &mut Session) -> Vec<String> {
+        if own.frames().any(stores) {
+            self.note_stored();
+        }
+        set_back(self, session)
+    }
+
+    fn conversations(rig: &Rig) -> Vec<Source> {
+        conversations(&rig.port().map(axes).unwrap_or_default())
+    }
+
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
+        Some(qualify(parts, rig, began, whole))
+    }
+}

@@ -1,0 +1,323 @@
+//! What a scenario or a probe has left of its own in drives: set back behind it, and read. What cannot be set back is said, with the command
+//! that does it.
+
+use super::known::Known;
+use super::observed::{Given, Written};
+use super::player::Player;
+use super::{Axis, Session};
+use crate::driver::{Driver, Error};
+use crate::rig::OfUnitek as _;
+use crate::safe_state::last_words;
+use harness_bench::medium::Pieces;
+use harness_bench::rig::Rig;
+use harness_bench::rig::left::NotPutBack;
+use harness_proto::time::Span;
+use harness_proto::unitek::frame::Data;
+use harness_proto::unitek::guard::{Class, class};
+use harness_proto::unitek::master::Job;
+use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS, ERRORS_FAULT, set_bits};
+use harness_proto::unitek::{Access, Register, Width};
+use std::collections::BTreeSet;
+
+/// Registers that commands and functions change, which the safe state sets.
+const COMMANDS: [u8; 4] = [0x31, 0x51, 0x6E, 0x90];
+
+/// CAN_TIMEOUT: set back first, since a drive may time out again while others are.
+const TIME_OUT: u8 = 0xD0;
+
+const MODE: u8 = 0x51;
+const ERROR_MAP: u8 = 0x8F;
+
+/// The function that clears errors, and the value that clients write.
+const CANCEL: (u8, u16) = (0x8E, 0x4D44);
+
+/// The registers of the identifiers: to receive, and to send.
+const IDENTIFIERS: [u8; 2] = [0x68, 0x69];
+
+/// The most identifiers beside those of the rig's file on which a watchdog stops drives.
+const MOST_STOPPED: usize = 16;
+
+/// How often something is tried: a frame may be lost.
+const TRIES: usize = 3;
+
+/// What a drive needs to take notice: some of its scans of 1 ms.
+const SCANS: Span = Span::from_millis(5);
+
+/// Sets back what was changed in the drives since they were read at first. Returns what is left to say.
+pub(super) fn set_back(player: &Player, session: &mut Session) -> Vec<String> {
+    let rig = session.rig().clone();
+    // No motor is released behind an interlock that has tripped.
+    let may_release = rig.file.interlock.is_empty();
+    let mut notes = Vec::new();
+    for known in player.read_so_far() {
+        let axis = known.axis;
+        let mut driver = session.driver();
+        let mut own = SetBack {
+            driver: &mut driver,
+            axis,
+            rig: &rig,
+        };
+        let registers = own.registers(known, player);
+        let silent = registers.is_err();
+        notes.extend(registers.unwrap_or_else(|error| vec![error.to_string()]));
+        if !silent {
+            let errors = own.errors(known, may_release);
+            notes.extend(errors.unwrap_or_else(|error| Some(error.to_string())));
+        }
+        let stored = player.stored_levels();
+        let levels = stored.iter().filter(|own| own.0 == axis.rx);
+        notes.extend(levels.map(|(_, level)| own.level(*level)));
+    }
+    notes
+}
+
+/// Says what is about to be written to drives, and the identifiers that they are given, with the commands that set it back. A drive is stopped on
+/// these identifiers too.
+pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, given: &[Given]) {
+    let origin = left.origin();
+    let of_drive = |known: &Known| {
+        let mut before = held_before(known, written);
+        let has = |register| before.iter().any(|own: &(u8, u32)| own.0 == register);
+        let node = known.axis.node;
+        let cleared = match has(TIME_OUT) {
+            true => {
+                let delete = delete_error(node, origin);
+                format!("; `{delete}` clears a time-out of the bus behind that")
+            }
+            false => String::new(),
+        };
+        let moved = moved(known.axis, given, origin);
+        before.retain(|own| !IDENTIFIERS.contains(&own.0));
+        let moves = before.iter().any(|own| needs_motion(own.0));
+        let moves = if moves { "--move " } else { "" };
+        let values: String = before
+            .iter()
+            .map(|own| assignment(own.0, own.1) + " ")
+            .collect();
+        let command = format!("drivebench write {node} {values}{moves}--rig {origin}");
+        let note =
+            format!("drive {node}: registers may be left changed; `{command}` sets them back");
+        [moved, (!before.is_empty()).then(|| note + &cleared)]
+    };
+    let all = drives.iter().flat_map(of_drive).flatten().collect();
+    let elsewhere = drives.iter().flat_map(|known| {
+        let own = places(known.axis, given, 0x68).skip(1);
+        own.map(|rx| Axis { rx, ..known.axis })
+    });
+    let elsewhere: Vec<_> = elsewhere.take(MOST_STOPPED).collect();
+    let stops = Pieces::Frames(last_words(&elsewhere));
+    left.foretell(all, (!elsewhere.is_empty()).then_some(stops));
+}
+
+/// The identifiers that a drive may have: that of the rig's file first, and those that were written to a register.
+fn places(axis: Axis, given: &[Given], register: u8) -> impl Iterator<Item = u16> {
+    let first = if register == 0x68 { axis.rx } else { axis.tx };
+    let own = given
+        .iter()
+        .filter(move |own| (own.0, own.2) == (register, axis.rx));
+    let own: BTreeSet<u16> = own.map(|own| own.1).filter(|id| *id != first).collect();
+    std::iter::once(first).chain(own)
+}
+
+/// On which identifiers a drive may be found, and the command that sets them back; `None` for those of the rig's file.
+fn moved(axis: Axis, given: &[Given], origin: &str) -> Option<String> {
+    let [rx, tx] = IDENTIFIERS.map(|register| {
+        let ids = places(axis, given, register).map(|id| format!("{id:03X}"));
+        ids.collect::<Vec<_>>().join(" or ")
+    });
+    let Axis {
+        node,
+        rx: first,
+        tx: second,
+    } = axis;
+    (rx.len() + tx.len() > 6).then(|| {
+        format!(
+            "drive {node} may receive on {rx} and send on {tx} (68, 69): with its `rx` and `tx` in the rig's file it is found there, and \
+             `drivebench write {node} 0x69=0x{second:04X} 0x68=0x{first:04X} --hold --rig {origin}` sets them back"
+        )
+    })
+}
+
+/// What the registers held at first that may have been written, CAN_TIMEOUT before the others.
+fn held_before(known: &Known, written: &Written) -> Vec<(u8, u32)> {
+    let written = |register| written.contains(&(known.axis.rx, register));
+    // 83 has loaded all parameters.
+    let all = written(0x83);
+    let changed = |register: &u8| {
+        let access = Register::of(*register).access;
+        (all || written(*register))
+            && matches!(access, Access::RW | Access::SP)
+            && !COMMANDS.contains(register)
+    };
+    let before = known.first.iter().filter(|(register, _)| changed(register));
+    let mut before: Vec<_> = before.map(|(register, raw)| (*register, *raw)).collect();
+    before.sort_by_key(|(register, _)| *register != TIME_OUT);
+    before
+}
+
+/// The command that clears errors.
+fn delete_error(node: u8, origin: &str) -> String {
+    format!("drivebench delete-error {node} --move --rig {origin}")
+}
+
+/// A register and its value for `drivebench write`.
+fn assignment(register: u8, raw: u32) -> String {
+    let digits = digits(Register::of(register));
+    format!("0x{register:02X}=0x{raw:0digits$X}")
+}
+
+/// Whether `drivebench write` needs `--move` for a register.
+fn needs_motion(register: u8) -> bool {
+    matches!(class(register), Class::Motion | Class::EepromAndMotion)
+}
+
+/// How many hexadecimal digits a register has.
+const fn digits(register: &Register) -> usize {
+    match register.width {
+        Width::Bits16 => 4,
+        Width::Bits32 => 8,
+    }
+}
+
+/// One drive.
+struct SetBack<'d, 'l> {
+    driver: &'d mut Driver<'l>,
+    axis: Axis,
+    rig: &'d Rig,
+}
+
+impl SetBack<'_, '_> {
+    /// Sets registers back that may have been written.
+    fn registers(&mut self, known: &Known, player: &Player) -> Result<Vec<String>, Error> {
+        let mut notes = Vec::new();
+        for (register, raw) in held_before(known, player.written()) {
+            notes.extend(self.register(register, raw)?);
+        }
+        Ok(notes)
+    }
+
+    /// Sets a register back to what it was. Returns what is left to say.
+    fn register(&mut self, register: u8, raw: u32) -> Result<Option<String>, Error> {
+        let about = Register::of(register);
+        let mut reads = self.driver.read(self.axis, register)?.data.bits() & about.mask();
+        let data = Data::of(about, raw);
+        let job = Job::Write { register, data };
+        let denied = self.driver.denied(&[(self.axis, job)]);
+        for _ in 0..TRIES {
+            if reads == raw || denied.is_some() {
+                break;
+            }
+            match self.driver.write(self.axis, register, data) {
+                Ok(_) => return Ok(None),
+                Err(Error::Differs { reads: own, .. }) => reads = own.data.bits() & about.mask(),
+                Err(error) => return Err(error),
+            }
+        }
+        if reads == raw {
+            return Ok(None);
+        }
+        let why = denied.unwrap_or_else(|| "the drive does not take it".to_owned());
+        let digits = digits(about);
+        Ok(Some(format!(
+            "drive {}: register {register:02X} ({}) reads {reads:0digits$X} and is not set back to {raw:0digits$X}: {why}; `{}` sets it back",
+            self.axis.node,
+            about.name,
+            self.write(register, raw),
+        )))
+    }
+
+    /// The command that writes a register.
+    fn write(&self, register: u8, raw: u32) -> String {
+        let moves = if needs_motion(register) {
+            " --move"
+        } else {
+            ""
+        };
+        format!(
+            "drivebench write {} {}{moves} --rig {}",
+            self.axis.node,
+            assignment(register, raw),
+            self.rig.origin
+        )
+    }
+
+    /// Clears errors that are latched now and were not at first: by 8E (dump), and where that is not enough for a time-out of the bus, by a
+    /// lock and its release with commands 0 [field]. Returns what is left to say.
+    fn errors(&mut self, known: &Known, may_release: bool) -> Result<Option<String>, Error> {
+        let Some(before) = known.first.get(&ERROR_MAP) else {
+            return Ok(None);
+        };
+        let cancel = Data::Short(CANCEL.1);
+        let job = Job::Write {
+            register: CANCEL.0,
+            data: cancel,
+        };
+        let denied = self.driver.denied(&[(self.axis, job)]);
+        let mut left = self.latched(*before)?;
+        for _ in 0..TRIES {
+            if left == 0 || denied.is_some() {
+                break;
+            }
+            self.driver.write(self.axis, CANCEL.0, cancel)?;
+            self.driver.run(SCANS)?;
+            left = self.latched(*before)?;
+            let releases = may_release && self.driver.permits_write(self.axis, MODE, 0);
+            if left & ERROR_TIME_OUT != 0 && releases {
+                self.release_and_lock()?;
+                left = self.latched(*before)?;
+            }
+        }
+        if left == 0 {
+            return Ok(None);
+        }
+        let names: Vec<_> = set_bits(ERRORS, left).map(|bit| bit.name).collect();
+        let (node, rig) = (self.axis.node, &self.rig.origin);
+        let delete = delete_error(node, rig);
+        let cleared = format!("`{delete}` clears it when its cause is gone");
+        let (why, way) = match denied {
+            Some(why) => (why, cleared),
+            None if left & ERROR_TIME_OUT != 0 => (
+                "8E does not clear it".to_owned(),
+                format!(
+                    "`drivebench write {node} MODE=0x0004 MODE=0x0000 --move --rig {rig}`, a lock and its release, may"
+                ),
+            ),
+            None => ("8E does not clear it".to_owned(), cleared),
+        };
+        let names = names.join(", ");
+        Ok(Some(format!(
+            "drive {node}: {names} was not there before: {why}; {way}"
+        )))
+    }
+
+    /// The errors that were not there before.
+    fn latched(&mut self, before: u32) -> Result<u32, Error> {
+        let now = self.driver.read(self.axis, ERROR_MAP)?.data.bits();
+        Ok(now & !before & ERRORS_FAULT)
+    }
+
+    /// Locks a drive that has commands 0, releases it and locks it again.
+    fn release_and_lock(&mut self) -> Result<(), Error> {
+        self.driver.lock(self.axis)?;
+        let released = self.driver.write(self.axis, MODE, Data::Short(0));
+        let waited = self.driver.run(SCANS);
+        self.driver.lock(self.axis)?;
+        released.and(waited)
+    }
+
+    /// What is to be said of a level of the EEPROM that was stored (ex 7).
+    fn level(&self, level: u16) -> String {
+        let node = self.axis.node;
+        let loaded = match level {
+            0 => " and loads it at its next power-up",
+            _ => "",
+        };
+        format!(
+            "drive {node}: level {level} of its EEPROM keeps what the scenario stored{loaded}; its registers are set back, and `{}` stores them there",
+            self.write(0x84, level.into())
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;
