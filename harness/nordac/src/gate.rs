@@ -3,8 +3,8 @@
 use harness_bench::guard::{Denied, Gate, Guarded};
 use harness_bench::link::{AnyStimulus, Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use harness_bench::medium::{Heard, Medium, Out};
+use harness_proto::limit::LimitSetting;
 use harness_proto::nordac::guard::{self, Denial, GuardedSlave, Limits, Missing};
-use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use std::any::Any;

@@ -25,6 +25,7 @@ extern crate std;
 pub mod can;
 pub mod counted;
 pub mod decode;
+pub mod limit;
 pub mod line;
 pub mod marks;
 pub mod nd21;

@@ -204,7 +204,7 @@ mod tests {
     use crate::link::Capability;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
-    use harness_proto::novobus::guard::LimitSetting;
+    use harness_proto::limit::LimitSetting;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();

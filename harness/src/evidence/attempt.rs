@@ -4,7 +4,7 @@ use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
 use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::rings::rig::Beside;
+use crate::buses::rings::rig::BesideTwin;
 use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::LinkName;
 use crate::library::Entry;
@@ -155,7 +155,7 @@ pub(super) fn again(
     let mut attempt = Attempt::new(outcome, Vec::new());
     (attempt.opening, attempt.unplaced) = (opening, unplaced);
     if header.qualified {
-        let beside = Beside {
+        let beside = BesideTwin {
             conversations,
             comparisons,
             driven,

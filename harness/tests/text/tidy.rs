@@ -103,7 +103,7 @@ fn imports_go_one_way() {
         ),
         // A scenario sees a link; only `simulate` makes simulated ones.
         (
-            "harness/src/scenario/run",
+            "harness/bench/src/scenario/run",
             &["harness_sim", "SimulatedLink"],
         ),
         (
@@ -114,6 +114,7 @@ fn imports_go_one_way() {
                 "SimulatedLink",
             ],
         ),
+        ("harness/bench/src/report", &["crate::link"]),
         ("harness/src/report", &["crate::link", "crate::cli"]),
         (
             "harness/src/buses/novobus/report",
@@ -138,10 +139,11 @@ fn imports_go_one_way() {
     }
 }
 
-/// The rooms of `harness/src`: each imports from those in front of it only. The buses are not in the list: a bus imports from all rooms in
-/// front of the command line, and a room imports what `buses/mod.rs` or its own `mod.rs` takes from a bus.
-const ROOMS: [&str; 32] = [
+/// The rooms of the engine and of the program: each imports from those in front of it only. The compiler keeps the buses out of the engine; in
+/// the program `buses` stands in front of the command line and behind nothing.
+const ROOMS: [&str; 33] = [
     "counted",
+    "bus",
     "regular",
     "partition",
     "signals",
@@ -177,14 +179,16 @@ const ROOMS: [&str; 32] = [
 
 #[test]
 fn rooms_import_from_rooms_in_front_of_them() {
-    let base = root().join("harness/src");
     let mut seen = BTreeSet::new();
-    for source in files("harness/src", "rs") {
-        let inner = source
-            .strip_prefix(&base)
-            .expect("inside")
-            .display()
-            .to_string();
+    let all = ["harness/bench/src", "harness/src"].map(|top| {
+        let base = root().join(top);
+        files(top, "rs")
+            .into_iter()
+            .map(move |source| (base.clone(), source))
+    });
+    for (base, source) in all.into_iter().flatten() {
+        let inner = source.strip_prefix(&base).expect("inside");
+        let inner = inner.display().to_string();
         let room = inner.split(['/', '.']).next().expect("a name").to_owned();
         if room == "lib" {
             continue;
@@ -218,43 +222,31 @@ fn rooms_import_from_rooms_in_front_of_them() {
     assert!(missing.is_empty(), "no such room: {missing:?}");
 }
 
-/// No file outside the buses' own folders names a bus in its code, but the three that declare these folders.
+/// What each crate of the workspace may depend on, of this workspace: the engine knows no bus, and no bus another.
 #[test]
-fn files_outside_the_buses_name_no_bus() {
-    const NAMES: [&str; 8] = [
-        "novobus", "nd21", "ringsize", "synco", "unitek", "nordac", "profibus", "posicon",
+fn crates_depend_one_way() {
+    let below: [(&str, &[&str]); 7] = [
+        ("proto", &[]),
+        ("sim", &["proto"]),
+        ("uart", &[]),
+        ("socketcan", &["proto"]),
+        ("bench", &["proto", "sim", "socketcan", "uart"]),
+        ("unitek", &["bench", "proto", "sim"]),
+        ("nordac", &["bench", "proto", "sim"]),
     ];
-    const DECLARE: [&str; 2] = ["harness/proto/src/lib.rs", "harness/sim/src/lib.rs"];
-    let crates = ["harness/src", "harness/sim/src", "harness/proto/src"];
-    let own = |path: &Path| {
-        let folders = ["novobus", "nd21", "unitek", "profibus", "nordac"];
-        let of_crate = |folder| {
-            crates[1..]
-                .iter()
-                .any(|top| path.starts_with(root().join(top).join(folder)))
-        };
-        path.starts_with(root().join("harness/src/buses"))
-            || folders.iter().any(of_crate)
-            || DECLARE.iter().any(|file| path == root().join(file))
-    };
-    let all = crates.map(|top| files(top, "rs")).concat();
-    let outside = all.iter().filter(|path| !own(path));
-    let naming: Vec<_> = outside
-        .filter(|path| {
-            read(path).lines().any(|line| {
-                let code = line.split("//").next().unwrap_or_default().to_lowercase();
-                NAMES.iter().any(|name| code.contains(name))
-            })
-        })
-        .map(|path| path.display().to_string())
-        .collect();
-    assert!(
-        naming.is_empty(),
-        "these files name a bus; what they need of it belongs into its folder or into buses/mod.rs: {naming:#?}"
-    );
+    for (name, allowed) in below {
+        let text = read(&root().join(format!("harness/{name}/Cargo.toml")));
+        let lines = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("harness-"));
+        let used = lines.filter_map(|line| line.split(['.', ' ']).next());
+        for other in used {
+            assert!(allowed.contains(&other), "{name} depends on {other}");
+        }
+    }
 }
 
-/// A bus costs its own folders and `buses/mod.rs`: it takes nothing from another one.
+/// A bus takes nothing from the folders of another one.
 #[test]
 fn no_bus_imports_another() {
     let buses: [&[&str]; 4] = [
@@ -264,18 +256,18 @@ fn no_bus_imports_another() {
         &["toy"],
     ];
     for own in buses {
-        for top in ["harness/proto/src", "harness/sim/src", "harness/src/buses"] {
-            let folders = own.iter().map(|name| format!("{top}/{name}"));
+        for place in ["proto/src/*", "sim/src/*", "src/buses/*", "*/src"] {
+            let folders = own
+                .iter()
+                .map(|name| format!("harness/{}", place.replace('*', name)));
             let folders = folders.filter(|folder| root().join(folder).is_dir());
             for source in folders.flat_map(|folder| files(&folder, "rs")) {
                 for (number, line) in read(&source).lines().enumerate() {
                     let code = line.split("//").next().unwrap_or_default();
                     let others = buses.iter().filter(|other| **other != own);
                     let imported = others.copied().flatten().find(|other| {
-                        let paths = ["buses", "harness_proto", "harness_sim", "crate"];
-                        paths
-                            .iter()
-                            .any(|path| code.contains(&format!("{path}::{other}")))
+                        let mut paths = ["buses", "harness_proto", "harness_sim", "crate"].iter();
+                        paths.any(|path| code.contains(&format!("{path}::{other}")))
                     });
                     assert_eq!(imported, None, "{}:{}", source.display(), number + 1);
                 }
@@ -290,9 +282,8 @@ fn the_page_on_a_fourth_bus_holds() {
     let page = read(&root().join("CONTRIBUTING.md"));
     let start = page.find("## A fourth bus").expect("the page");
     let page = page[start..].split("\n## ").next().expect("its end");
-    let sources = files("harness/src", "rs")
-        .into_iter()
-        .chain(files("harness/sim/src", "rs"));
+    let sources = ["harness/src", "harness/bench/src", "harness/sim/src"];
+    let sources = sources.into_iter().flat_map(|top| files(top, "rs"));
     let sources: String = sources.map(|path| read(&path)).collect();
     let rows = page.lines().filter(|line| line.starts_with("| ")).skip(1);
     let cells = rows.filter_map(|row| row.split('|').nth(2));
@@ -317,8 +308,16 @@ const NAMES_TWICE: usize = 10;
 fn a_name_is_one_type() {
     let mut declared: BTreeMap<String, BTreeMap<&str, BTreeSet<PathBuf>>> = BTreeMap::new();
     let tests = ["tests.rs", "_test.rs", "reference.rs"];
-    let folders = ["harness/src", "harness/proto/src", "harness/sim/src"];
-    for path in folders.map(|folder| files(folder, "rs")).concat() {
+    let folders = [
+        "src",
+        "bench/src",
+        "unitek/src",
+        "nordac/src",
+        "proto/src",
+        "sim/src",
+    ];
+    let folders = folders.map(|folder| format!("harness/{folder}"));
+    for path in folders.map(|folder| files(&folder, "rs")).concat() {
         let place = path.display().to_string();
         if tests.iter().any(|ending| place.ends_with(ending)) {
             continue;

@@ -4,7 +4,7 @@ use harness_bench::guard::{Denied, Gate, Guarded};
 use harness_bench::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use harness_bench::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, Frame};
-use harness_proto::novobus::guard::LimitSetting;
+use harness_proto::limit::LimitSetting;
 use harness_proto::time::Instant;
 use harness_proto::unitek::guard::{self, Denial, Limits, Missing};
 use std::any::Any;

@@ -142,7 +142,7 @@ pub fn live(
 }
 
 /// What a user asks for.
-pub enum Asked {
+pub enum TopOrder {
     /// The end.
     Quit,
     /// The end, as by a signal.
@@ -162,7 +162,7 @@ pub trait TopView {
     fn show(&mut self, reader: &mut dyn TopReader, reading: &Snapshot);
 
     /// Waits for so long, or until the user asks for something.
-    fn wait(&mut self, time: Duration) -> Option<Asked>;
+    fn wait(&mut self, time: Duration) -> Option<TopOrder>;
 }
 
 /// What has been read, and what comes next.
@@ -262,14 +262,14 @@ impl<'r> Work<'r> {
             };
             match view.wait(idle) {
                 None => {}
-                Some(Asked::Quit) => return Ok(Exit::Passed),
-                Some(Asked::Interrupt) => interrupt()?,
-                Some(Asked::Stop(wanted)) => {
+                Some(TopOrder::Quit) => return Ok(Exit::Passed),
+                Some(TopOrder::Interrupt) => interrupt()?,
+                Some(TopOrder::Stop(wanted)) => {
                     self.stop(wanted)?;
                     // What came of it is read at once.
                     next = self.reader.now();
                 }
-                Some(Asked::Broken(error)) => {
+                Some(TopOrder::Broken(error)) => {
                     // Nobody sees the drives any more: the end is that of a signal.
                     interrupt()?;
                     let _noticed = self.reader.run(NOTICE);
@@ -330,7 +330,7 @@ impl<T> RateWindow<T> {
 struct Desk {
     thread: JoinHandle<()>,
     news: SyncSender<Snapshot>,
-    asked: Receiver<Asked>,
+    asked: Receiver<TopOrder>,
     stop: Arc<AtomicBool>,
 }
 
@@ -377,12 +377,12 @@ impl TopView for Desk {
         let _not_now = self.news.try_send(reading.clone());
     }
 
-    fn wait(&mut self, time: Duration) -> Option<Asked> {
+    fn wait(&mut self, time: Duration) -> Option<TopOrder> {
         match self.asked.recv_timeout(time) {
             Ok(asked) => Some(asked),
             Err(RecvTimeoutError::Timeout) => None,
             // The view panicked; `close` passes the panic on.
-            Err(RecvTimeoutError::Disconnected) => Some(Asked::Quit),
+            Err(RecvTimeoutError::Disconnected) => Some(TopOrder::Quit),
         }
     }
 }
@@ -402,8 +402,8 @@ fn desk(
     mut top: Top,
     readings: &Receiver<Snapshot>,
     stop: &AtomicBool,
-    orders: &Sender<Asked>,
-) -> Asked {
+    orders: &Sender<TopOrder>,
+) -> TopOrder {
     let mut stale = true;
     loop {
         loop {
@@ -413,29 +413,29 @@ fn desk(
                     stale = true;
                 }
                 Err(TryRecvError::Empty) => break,
-                Err(TryRecvError::Disconnected) => return Asked::Quit,
+                Err(TryRecvError::Disconnected) => return TopOrder::Quit,
             }
         }
         if stop.load(Ordering::Relaxed) {
-            return Asked::Quit;
+            return TopOrder::Quit;
         }
         if stale && let Err(error) = screen.draw(&mut top) {
-            return Asked::Broken(error);
+            return TopOrder::Broken(error);
         }
         stale = match screen.input(KEYS) {
             Ok(ScreenInput::Key(key)) => match top.press(key) {
                 Press::Stay => true,
-                Press::Quit => return Asked::Quit,
-                Press::Interrupt => return Asked::Interrupt,
+                Press::Quit => return TopOrder::Quit,
+                Press::Interrupt => return TopOrder::Interrupt,
                 Press::Stop(wanted) => {
                     // The receiver is gone if the bus has ended by itself.
-                    let _ended = orders.send(Asked::Stop(wanted));
+                    let _ended = orders.send(TopOrder::Stop(wanted));
                     true
                 }
             },
             Ok(ScreenInput::Redraw) => true,
             Ok(ScreenInput::Nothing) => false,
-            Err(error) => return Asked::Broken(error),
+            Err(error) => return TopOrder::Broken(error),
         };
     }
 }
@@ -510,7 +510,7 @@ mod tests {
     }
 
     /// A view whose user orders this, one after the other, each when all drives have been shown.
-    struct Orders(Vec<Asked>, Snapshot);
+    struct Orders(Vec<TopOrder>, Snapshot);
 
     impl TopView for Orders {
         fn is_wanted(&mut self, _reader: &mut dyn TopReader) -> bool {
@@ -521,7 +521,7 @@ mod tests {
             self.1 = reading.clone();
         }
 
-        fn wait(&mut self, _time: Duration) -> Option<Asked> {
+        fn wait(&mut self, _time: Duration) -> Option<TopOrder> {
             match self.1.drives.len() {
                 6 if !self.0.is_empty() => Some(self.0.remove(0)),
                 _ => None,
@@ -529,7 +529,7 @@ mod tests {
         }
     }
 
-    fn pumped(bench: &mut Bench, orders: Vec<Asked>) -> (Result<Exit, Failure>, Snapshot) {
+    fn pumped(bench: &mut Bench, orders: Vec<TopOrder>) -> (Result<Exit, Failure>, Snapshot) {
         let mut view = Orders(orders, Snapshot::default());
         let every = Span::from_millis(1_000);
         let end = Work::new(bench).pump(every, &AtomicBool::new(false), &mut view);
@@ -550,10 +550,10 @@ mod tests {
     fn all_drives_are_stopped_but_one_that_refuses() {
         let mut own = bench(false);
         let orders = vec![
-            Asked::Stop(None),
-            Asked::Stop(Some(2)),
-            Asked::Stop(Some(1)),
-            Asked::Quit,
+            TopOrder::Stop(None),
+            TopOrder::Stop(Some(2)),
+            TopOrder::Stop(Some(1)),
+            TopOrder::Quit,
         ];
         let (end, shown) = pumped(&mut own, orders);
         assert!(matches!(end, Ok(Exit::Passed)), "{end:?}");
@@ -575,7 +575,7 @@ mod tests {
 
     #[test]
     fn a_lost_link_ends_the_view() {
-        let (end, _) = pumped(&mut bench(true), vec![Asked::Stop(None)]);
+        let (end, _) = pumped(&mut bench(true), vec![TopOrder::Stop(None)]);
         assert!(
             matches!(end, Err(Failure::Bus(Exit::RigError, _))),
             "{end:?}"

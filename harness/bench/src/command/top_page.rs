@@ -1,7 +1,7 @@
 //! `top --web`: the page of a bench in use. It only looks on.
 
 use super::failure::Failure;
-use super::top::{Asked, TopReader, TopScene, TopView};
+use super::top::{TopOrder, TopReader, TopScene, TopView};
 use crate::top::{Heading, Snapshot, Top, TopEvent};
 use crate::web::{LiveNews, LivePage, LiveScene, MAX_ROWS};
 use std::time::{Duration, Instant};
@@ -111,7 +111,7 @@ impl TopView for TopPage {
         self.page.feed().publish(text.unwrap_or_default());
     }
 
-    fn wait(&mut self, time: Duration) -> Option<Asked> {
+    fn wait(&mut self, time: Duration) -> Option<TopOrder> {
         std::thread::sleep(time);
         None
     }

@@ -2,7 +2,7 @@
 
 use crate::link::{Line, Moment, PlacedFault};
 use crate::medium::{Heard, Out};
-use harness_proto::novobus::guard::LimitSetting;
+use harness_proto::limit::LimitSetting;
 use harness_proto::time::Instant;
 use std::any::Any;
 use std::fmt;

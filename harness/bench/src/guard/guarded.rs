@@ -6,8 +6,8 @@ use crate::link::{
     Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble, wait_keeping,
 };
 use crate::medium::{Heard, Medium, Out};
+use harness_proto::limit::LimitSetting;
 use harness_proto::line::Received;
-use harness_proto::novobus::guard::LimitSetting;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;

@@ -4,7 +4,7 @@ use crate::bus::Bus;
 use crate::link::{Capability, Link, is_wrong_parity};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
-use harness_proto::novobus::guard::LimitSetting;
+use harness_proto::limit::LimitSetting;
 use std::collections::BTreeSet;
 use std::fmt;
 

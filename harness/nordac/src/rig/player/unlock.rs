@@ -4,9 +4,9 @@ use super::{Own, Player};
 use crate::rig::known::{INTERFACE, Known};
 use crate::rig::{MASTER, RigSlave};
 use harness_bench::scenario::run::Unlock;
+use harness_proto::limit::LimitSetting;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::{Highest, Limits};
-use harness_proto::novobus::guard::LimitSetting;
 use std::collections::BTreeSet;
 
 /// A setting of `[limits]` that can keep a scenario from being played.

@@ -1,6 +1,7 @@
 //! The permissions of a rig, and the permissions that an act needs.
 
 use super::denial::Cause;
+use crate::limit::LimitSetting;
 use core::fmt;
 
 /// The permissions of a rig. Reading and stopping need none.
@@ -140,61 +141,6 @@ impl Limits {
             has |= Need::EVERYTHING.0;
         }
         Need(need.0 & !has)
-    }
-}
-
-/// A setting of a rig's `[limits]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LimitSetting {
-    /// [`Limits::motion`].
-    Motion,
-    /// [`Limits::eeprom`].
-    Eeprom,
-    /// [`Limits::reset`].
-    Reset,
-    /// [`Limits::outputs`].
-    Outputs,
-    /// [`Limits::monitoring`].
-    Monitoring,
-    /// [`Limits::max_speed`].
-    MaxSpeed,
-    /// [`Limits::bytes_per_second`].
-    BytesPerSecond,
-}
-
-impl LimitSetting {
-    /// Those that permit something.
-    pub const PERMISSIONS: [Self; 5] = [
-        Self::Motion,
-        Self::Eeprom,
-        Self::Reset,
-        Self::Outputs,
-        Self::Monitoring,
-    ];
-    /// All, in the order of a rig's file.
-    pub const ALL: [Self; 7] = [
-        Self::Motion,
-        Self::Eeprom,
-        Self::Reset,
-        Self::Outputs,
-        Self::Monitoring,
-        Self::MaxSpeed,
-        Self::BytesPerSecond,
-    ];
-}
-
-/// The change of the setting that permits more.
-impl fmt::Display for LimitSetting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Motion => "`allow_motion`",
-            Self::Eeprom => "`allow_eeprom`",
-            Self::Reset => "`allow_reset`",
-            Self::Outputs => "`allow_outputs`",
-            Self::Monitoring => "`allow_monitoring`",
-            Self::MaxSpeed => "no `max_speed`",
-            Self::BytesPerSecond => "a higher `max_bytes_per_second`",
-        })
     }
 }
 

@@ -76,6 +76,6 @@ pub use denial::{Cause, Denial};
 pub use effect::DriveAct;
 pub use gate::Guard;
 pub use known::{Configuration, Facts, Found};
-pub use limits::{LimitSetting, Limits, Need};
+pub use limits::{Limits, Need};
 pub use stage::Stage;
 pub use touched::Touched;

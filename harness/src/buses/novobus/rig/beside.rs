@@ -10,7 +10,7 @@ use harness_proto::time::Span;
 
 /// What an attempt on rings has beside its outcome.
 #[derive(Clone, Debug)]
-pub struct Beside {
+pub struct BesideTwin {
     /// The conversations, those of the health check and of what is set up before among them.
     pub conversations: Vec<Conversation>,
     /// How they compare with the twin's.
@@ -22,14 +22,14 @@ pub struct Beside {
 }
 
 /// Of an attempt that no twin stands beside.
-static NOTHING: Beside = Beside {
+static NOTHING: BesideTwin = BesideTwin {
     conversations: Vec::new(),
     comparisons: Vec::new(),
     driven: None,
     assumed: Header::NONE,
 };
 
-impl Beside {
+impl BesideTwin {
     /// The same, compared with drives of these choices.
     pub(crate) fn with(self, assumed: Option<Explanation>) -> Self {
         match assumed {
@@ -46,7 +46,7 @@ impl Beside {
 /// An attempt on rings.
 pub trait OnRings {
     /// What it has beside its outcome.
-    fn beside(&self) -> &Beside;
+    fn beside(&self) -> &BesideTwin;
 
     /// Whether the first byte that differs follows a silence or a delay of the bench, which may be its cause.
     fn is_silenced(&self) -> bool;
@@ -59,7 +59,7 @@ pub trait OnRings {
 }
 
 impl OnRings for Attempt {
-    fn beside(&self) -> &Beside {
+    fn beside(&self) -> &BesideTwin {
         let own = self.own.as_ref();
         own.and_then(|own| own.downcast_ref()).unwrap_or(&NOTHING)
     }
@@ -166,7 +166,7 @@ mod tests {
             untimely: late.map(|_| divergence),
             ..Comparison::default()
         };
-        let beside = Beside {
+        let beside = BesideTwin {
             comparisons: vec![comparison],
             ..NOTHING.clone()
         };

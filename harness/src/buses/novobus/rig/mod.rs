@@ -19,7 +19,7 @@ pub(crate) mod session;
 pub(crate) mod sim;
 pub(crate) mod wrong_parity;
 
-pub use beside::{Beside, OnRings, PlayedOnRings};
+pub use beside::{BesideTwin, OnRings, PlayedOnRings};
 pub use cause::LikelyCause;
 pub use condition::{InterlockCondition, condition};
 pub use driven::Driven;

@@ -1,7 +1,7 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
-use super::beside::Beside;
+use super::beside::BesideTwin;
 use super::driven::Driven;
 use super::health::{Unhealthy, examine};
 use super::judge::{AttemptFacts, judge, known};
@@ -24,8 +24,9 @@ use crate::link::{
 use crate::rig::{Again, Attempt, Keeper, PlayedScenario, Rig, SessionError, attempts_of};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well};
+use harness_proto::limit::LimitSetting;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::guard::{LimitSetting, Limits, Touched};
+use harness_proto::novobus::guard::{Limits, Touched};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
 use std::collections::BTreeSet;
@@ -235,7 +236,7 @@ impl<'s> Run<'s> {
         };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
         let assumed = judge(&mut outcome, &facts);
-        let beside = Beside {
+        let beside = BesideTwin {
             conversations,
             comparisons,
             driven,

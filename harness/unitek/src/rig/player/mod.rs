@@ -33,7 +33,7 @@ use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
-use harness_proto::novobus::guard::LimitSetting;
+use harness_proto::limit::LimitSetting;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
