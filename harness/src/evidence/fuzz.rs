@@ -5,8 +5,6 @@ use super::error::RecordError;
 use super::read::read;
 use super::record::RecordLine;
 use super::verify::{Beside, judge_record};
-/// The scenario of every attempt, whatever its name.
-pub use crate::buses::rings::fuzz::RECORDED as SCENARIO;
 use crate::rig::Rig;
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
@@ -17,6 +15,9 @@ const LONGEST: usize = 32 * 1024;
 
 /// A conversation is not judged beyond this time, so that a fuzzer goes on: the twin lives through all of it.
 const SHORT: Span = Span::from_millis(2_000);
+
+/// The scenario of every attempt, whatever its name.
+pub const SCENARIO: &str = "title A read\nsource nd21 10.1\nring 2\n> 88 FE C0 13 FE D1\n";
 
 /// The bench of every record.
 pub const RIG: &str = "schema = 1\n[rig]\nid = \"fuzz\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n[limits]\nallow_motion = true\n\

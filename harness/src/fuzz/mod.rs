@@ -6,14 +6,13 @@
 //! the inputs to keep.
 
 pub use harness_bench::fuzz::*;
+pub mod coverage;
+mod noted;
 mod text;
 
 pub use text::{rig, scenario};
 
 use crate::buses;
-/// The matrix of protocol transitions is that of the ring.
-pub use crate::buses::rings::fuzz::coverage;
-use crate::buses::rings::fuzz::noted;
 use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
 
 /// The targets whose bodies need the whole bench.

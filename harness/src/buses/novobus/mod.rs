@@ -8,7 +8,6 @@ pub(crate) mod cli;
 pub mod driver;
 pub mod drives;
 pub mod explore;
-pub mod fuzz;
 pub mod gate;
 pub mod guard;
 pub mod language;

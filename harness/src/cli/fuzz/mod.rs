@@ -1,5 +1,7 @@
 //! `drivebench fuzz`: generated conversations, and what the kept inputs of the fuzz targets reach.
 
+mod coverage;
+mod distil;
 mod replay;
 mod run;
 
@@ -22,9 +24,9 @@ pub enum FuzzCommand {
     /// Show which protocol transitions the kept inputs reach.
     ///
     /// The exit code is 1 if a reachable transition is missing.
-    Coverage(crate::buses::commands::coverage::CoverageArguments),
+    Coverage(coverage::CoverageArguments),
     /// Add the inputs of a grown corpus that reach something new to the kept ones.
-    Distil(crate::buses::commands::distil::DistilArguments),
+    Distil(distil::DistilArguments),
 }
 
 /// Does it.
@@ -33,9 +35,7 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
         FuzzCommand::Power(arguments) => crate::buses::commands::power::power(arguments, output),
-        FuzzCommand::Coverage(arguments) => {
-            crate::buses::commands::coverage::coverage(arguments, output)
-        }
-        FuzzCommand::Distil(arguments) => crate::buses::commands::distil::distil(arguments, output),
+        FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
+        FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
     }
 }

@@ -3,9 +3,7 @@
 mod axes;
 pub(crate) mod cells;
 mod control;
-pub(crate) mod coverage;
 pub(crate) mod deviations;
-pub(crate) mod distil;
 pub(crate) mod fuzz;
 pub(crate) mod held;
 mod info;

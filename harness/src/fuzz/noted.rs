@@ -1,11 +1,11 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
+use super::text::{rig as rig_body, scenario as scenario_body};
 use crate::bus::Bus;
 use crate::buses::novobus::capture::scenario as sketch;
 use crate::buses::novobus::language::syntax::Scenario;
 use crate::capture::{self, CaptureError};
 use crate::evidence;
-use crate::fuzz::{rig as rig_body, scenario as scenario_body};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::Problems;

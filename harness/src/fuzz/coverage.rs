@@ -1,8 +1,8 @@
 //! Which transitions of a drive's end of the bus (ND21 9.1-9.9) the kept inputs reach, and which were reached on hardware; and what
 //! the inputs of each target reach, summed up.
 
-use crate::fuzz::input::{InputError, input};
-use crate::fuzz::noting;
+use super::input::{InputError, input};
+use super::noting;
 use harness_sim::fuzz::{Feature, Noting, features};
 use harness_sim::novobus::fuzz::{WATCHING, of_cell};
 use harness_sim::novobus::transitions::{
@@ -18,7 +18,7 @@ use std::path::Path;
 static CORPUS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/fuzz");
 
 /// What was reached on hardware.
-const HARDWARE: &str = include_str!("../../../../../corpora/fuzz/hardware.toml");
+const HARDWARE: &str = include_str!("../../../corpora/fuzz/hardware.toml");
 
 /// The largest input file that is read, in bytes.
 const MAX_SIZE: u64 = 1 << 20;
