@@ -4,9 +4,9 @@
 //! bytes, without a check. `shared` plays the same cases as a campaign does: they share what they have in common.
 
 use divan::counter::ItemsCount;
+use harness::buses::novobus::campaign::find::find;
+use harness::buses::novobus::campaign::{Campaign, CaseFaults};
 use harness::buses::novobus::simulate::bench;
-use harness::campaign::find::find;
-use harness::campaign::{Campaign, CaseFaults};
 use harness::link::Octets;
 use std::path::Path;
 

@@ -35,8 +35,8 @@ pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
 pub use harness_bench::{
-    bus, capture, explore, file, frames, guard, html, link, listen, manual, medium, partition,
-    port, qualify, regular, scenario, serve, signals, top, traffic, trouble, web,
+    bus, campaign, capture, explore, file, frames, guard, html, link, listen, manual, medium,
+    partition, port, qualify, regular, scenario, serve, signals, top, traffic, trouble, web,
 };
 use harness_proto::counted;
 pub use scenario::verdict::Verdict;
@@ -46,8 +46,6 @@ mod embed;
 
 #[doc(hidden)]
 pub mod buses;
-#[doc(hidden)]
-pub mod campaign;
 #[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]

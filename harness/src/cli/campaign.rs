@@ -2,13 +2,13 @@
 
 use super::args::CampaignArguments;
 use crate::buses::novobus::campaign::class::CaseClass;
+use crate::buses::novobus::campaign::find::{FindCampaignError, find, names};
+use crate::buses::novobus::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
+use crate::buses::novobus::campaign::replay::scenario;
 use crate::buses::novobus::campaign::report::{json, line as case_line, table};
+use crate::buses::novobus::campaign::{Campaign, CaseFaults, Contradiction, PlayedCampaign};
 use crate::buses::{line_campaign, line_campaigns};
-use crate::campaign::find::{FindCampaignError, find, names};
 use crate::campaign::line::{self, LineCampaign, PlayedLine};
-use crate::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
-use crate::campaign::replay::scenario;
-use crate::campaign::{Campaign, CaseFaults, Contradiction, PlayedCampaign};
 use crate::command::args::TableFormat;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -263,7 +263,7 @@ fn pairs(
 fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {
     let sections = (all.len() + 1..).zip(on_lines);
     let sections = sections.map(|(number, own)| line::section(number, own));
-    crate::campaign::campaigns(all, sections.collect())
+    crate::buses::novobus::campaign::campaigns(all, sections.collect())
 }
 
 /// Plays campaigns on shared lines, and shows them.

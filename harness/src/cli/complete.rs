@@ -3,8 +3,8 @@
 
 use super::args::Shell;
 use super::help::command;
+use crate::buses::novobus::campaign::find as campaigns;
 use crate::buses::{cell_names, commands::deviations};
-use crate::campaign::find as campaigns;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::rig::find;

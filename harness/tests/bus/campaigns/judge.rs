@@ -1,9 +1,9 @@
 //! The classes of a ring of two beside a judge that knows nothing but the reference model.
 
 use harness::buses::novobus::campaign::class::{CaseClass, CaseEvidence, Wrong};
-use harness::campaign::fault::{FaultEffect, LineBit};
-use harness::campaign::find::find;
-use harness::campaign::{CaseFaults, CaseOutcome};
+use harness::buses::novobus::campaign::fault::{FaultEffect, LineBit};
+use harness::buses::novobus::campaign::find::find;
+use harness::buses::novobus::campaign::{CaseFaults, CaseOutcome};
 use harness_sim::novobus::reference;
 
 /// What a case is, by the reference model alone: no code of the simulator, the master or the campaign. It knows no

@@ -5,12 +5,12 @@ mod cli;
 mod judge;
 
 use harness::buses::novobus::campaign::class::{CaseClass, Wrong};
+use harness::buses::novobus::campaign::find::{find, names};
+use harness::buses::novobus::campaign::pairs::Apart;
 use harness::buses::novobus::campaign::report::{json, table};
+use harness::buses::novobus::campaign::{Campaign, CaseFaults, PlayedCampaign};
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::buses::novobus::simulate::simulated;
-use harness::campaign::find::{find, names};
-use harness::campaign::pairs::Apart;
-use harness::campaign::{Campaign, CaseFaults, PlayedCampaign};
 use harness::library::Entry;
 use harness::link::{Link, Octets};
 use harness::scenario::problem::Problems;
@@ -71,7 +71,7 @@ fn every_campaign_pins_every_figure_and_the_page_shows_them() {
     assert!(names.len() >= 9, "{names:?}");
     for name in names {
         let text = std::fs::read_to_string(root().join(format!("corpora/campaigns/{name}.toml")));
-        let file: harness::campaign::file::CampaignFile =
+        let file: harness::buses::novobus::campaign::file::CampaignFile =
             toml::from_str(&text.expect("a file")).expect("a campaign");
         let cases = file.expect.cases.unwrap_or_else(|| panic!("{name}"));
         let mut row = format!("| `{name}` | {cases} |");
@@ -269,7 +269,8 @@ fn a_replay_is_the_case() {
         let campaign = built_in(name);
         let case = CaseFaults::from_name(case, campaign.shape.drives).expect("a case");
         let (outcome, _) = campaign.play(&case).expect("a class");
-        let text = harness::campaign::replay::scenario(&campaign, &case).expect("a text");
+        let text =
+            harness::buses::novobus::campaign::replay::scenario(&campaign, &case).expect("a text");
         let source = Source {
             name: "replay".to_owned(),
             text: text.clone().into(),
@@ -349,7 +350,8 @@ fn a_conversation_that_cannot_be_repeated_is_refused() {
     let text = "schema = 1\ntitle = \"t\"\nscenario = \"twice.scn\"\nfaults = [\"bits\"]\n";
     std::fs::write(&path, text).expect("a file");
     let error = find(&path).expect_err("a mistake");
-    let harness::campaign::find::FindCampaignError::Mistakes(problems) = error else {
+    let harness::buses::novobus::campaign::find::FindCampaignError::Mistakes(problems) = error
+    else {
         panic!("{error}");
     };
     let message = &problems.all()[0].message;

@@ -4,9 +4,9 @@
 use super::class::{CaseEvidence, Wrong, named};
 use super::sound::Sound;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::campaign::fault::CaseFaults;
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options};
 use crate::buses::novobus::language::plan::PlannedCall;
-use crate::campaign::fault::CaseFaults;
 use crate::link::{Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::novobus::address::RingSize;
@@ -281,7 +281,7 @@ impl Line for Spied {
 
 #[cfg(test)]
 mod tests {
-    use crate::campaign::find::{find, names};
+    use crate::buses::novobus::campaign::find::{find, names};
     use std::path::Path;
 
     /// A case that begins before the step of its first fault against the same case from the start of the conversation: a random sample

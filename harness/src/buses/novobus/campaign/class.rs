@@ -1,6 +1,6 @@
 //! What can come of a fault.
 
-use crate::campaign::fault::link_index;
+use crate::buses::novobus::campaign::fault::link_index;
 use harness_proto::novobus::master::{Fault, LinkEnd};
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -1,7 +1,7 @@
 //! What the master sends in a campaign, taken from a scenario, and what must come back (ND21 9.1-9.6).
 
+use crate::buses::novobus::campaign::plan::Shape;
 use crate::buses::novobus::language::plan::{Plan, PlannedCall, RingAct};
-use crate::campaign::plan::Shape;
 use crate::scenario::plan::{PlannedAction, PlannedWhen};
 use crate::scenario::problem::{Problem, TextSpan};
 use harness_proto::line::Received;

@@ -1,7 +1,7 @@
 //! The results of a campaign, for people and for tools.
 
 use super::class::{CaseClass, CaseEvidence, Wrong};
-use crate::campaign::run::{CaseOutcome, PlayedCampaign};
+use crate::buses::novobus::campaign::run::{CaseOutcome, PlayedCampaign};
 use crate::campaign::share::share;
 use crate::link::link_name;
 use harness_proto::nd21::cells::cell_at;

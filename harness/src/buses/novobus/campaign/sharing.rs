@@ -8,7 +8,7 @@
 use super::by_manual::{ByManual, Wire};
 use super::class::CaseEvidence;
 use super::sound::DrivesBeyondBus;
-use crate::campaign::fault::{CaseFaults, Injected};
+use crate::buses::novobus::campaign::fault::{CaseFaults, Injected};
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_sim::novobus::cells::Cells;

@@ -1,10 +1,10 @@
 //! The counts of campaigns as a file, so that parts that were played on several machines can be added.
 
 use super::file::ExpectedCounts;
-use super::line::{LineCampaign, PlayedLine};
 use super::pairs::{Apart, MOST_SINGLES, PairCounts, PlayedPairs};
 use super::{Campaign, PlayedCampaign};
 use crate::buses::novobus::campaign::class::CaseClass;
+use crate::campaign::line::{LineCampaign, PlayedLine};
 use crate::counted::counted;
 use crate::partition::{Partition, Spread};
 use crate::regular::{self, Links};

@@ -1,9 +1,9 @@
 //! The page of campaigns: how many cases of each class, and where in the ring which class happens, as a map of letters and colours.
 
+use crate::buses::novobus::campaign::PlayedCampaign;
 use crate::buses::novobus::campaign::class::CaseClass;
+use crate::buses::novobus::campaign::fault::{FaultEffect, LineBit};
 use crate::buses::novobus::campaign::report::{WORST, happened};
-use crate::campaign::PlayedCampaign;
-use crate::campaign::fault::{FaultEffect, LineBit};
 use crate::campaign::share::share;
 use crate::html::Html;
 use crate::report::html::{FoldedPart, Section, page};
