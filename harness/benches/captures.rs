@@ -4,9 +4,10 @@
 use divan::counter::ItemsCount;
 use harness::buses::novobus::report::csv;
 use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
+use harness::buses::novobus::report::vcd;
+use harness::buses::novobus::report::vcd::Signals;
 use harness::capture::read;
-use harness::report::vcd::Signals;
-use harness::report::{pcapng, vcd};
+use harness::report::pcapng;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
 use harness_sim::record::LineByte;

@@ -1,6 +1,6 @@
 //! A finding as a text for people: its line in the scenario, what was expected, what was received, and the table around it.
 
-use super::mismatch::mismatch;
+use crate::buses::novobus::report::mismatch::mismatch;
 use crate::library::Entry;
 use crate::scenario::run::Mismatch;
 use crate::scenario::source::line_number;

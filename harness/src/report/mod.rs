@@ -2,7 +2,4 @@
 
 pub use harness_bench::report::*;
 pub mod finding;
-pub mod html;
-pub mod mismatch;
 pub mod page;
-pub mod vcd;

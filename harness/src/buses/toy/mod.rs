@@ -13,10 +13,10 @@ mod language;
 mod report;
 mod valve;
 
+use crate::buses::novobus::report::html::{Head, ScenarioView, run, section};
 use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::report::finding::explain;
-use crate::report::html::{Head, ScenarioView, run, section};
 use crate::report::page::page;
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtMismatch, Outcome};

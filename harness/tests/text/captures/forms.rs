@@ -3,8 +3,8 @@
 use super::{DAMAGED, built_in, root, run};
 use harness::buses::novobus::report::csv;
 use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
+use harness::buses::novobus::report::vcd;
 use harness::capture::Capture;
-use harness::report::vcd;
 use quick_xml::Reader;
 use quick_xml::events::Event;
 

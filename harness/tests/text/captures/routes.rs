@@ -2,7 +2,7 @@
 
 use super::{built_in, file};
 use crate::{debian, python};
-use harness::report::vcd::{self, Signals};
+use harness::buses::novobus::report::vcd::{self, Signals};
 use std::path::Path;
 use std::process::{Command, Output};
 

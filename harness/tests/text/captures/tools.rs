@@ -3,8 +3,8 @@
 use super::{DAMAGED, built_in, file, pcapng, root, run};
 use crate::debian::has;
 use harness::buses::novobus::report::csv::{self, status};
+use harness::buses::novobus::report::vcd::{self, Signals};
 use harness::capture::{Capture, read};
-use harness::report::vcd::{self, Signals};
 use std::collections::BTreeMap;
 use std::process::Command;
 

@@ -8,12 +8,8 @@
 //! |---|---|
 //! | `../../html.rs` | the only way into a page: everything but the program's own words is escaped |
 //! | `page.rs` | the page around its sections, within its bounds |
-//! | `summary.rs` | the verdicts of a run in a table |
-//! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
-//! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
 //! | `sequence.rs` | what the master and the drives of a shared line said, one after another |
 //! | `../chart` | values against time |
-//! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
 
 pub mod page;

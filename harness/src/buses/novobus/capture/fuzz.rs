@@ -2,9 +2,10 @@
 
 use super::diff::{ComparedRun, diff};
 use super::scenario::{JudgeOptions, scenario};
+use crate::buses::novobus::report::vcd;
 use crate::buses::novobus::report::{csv, json, svg};
 use crate::capture::{ReadSettings, read, read_with};
-use crate::report::{pcapng, vcd};
+use crate::report::pcapng;
 use harness_proto::time::Span;
 
 /// The longest input that is looked at.

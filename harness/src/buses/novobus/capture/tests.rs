@@ -1,9 +1,9 @@
 //! Files that were written are read as they were.
 
 use crate::buses::novobus::report::csv;
+use crate::buses::novobus::report::vcd::{self, Signals};
 use crate::capture::{Capture, read};
 use crate::report::pcapng::name;
-use crate::report::vcd::{self, Signals};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte, Trace};

@@ -2,11 +2,11 @@
 
 use super::setup::planted_line;
 use crate::buses::novobus::explore::FuzzSettings;
+use crate::buses::novobus::report::html::ShownScenario;
 use crate::counted::counted;
 use crate::explore::Progress;
 use crate::html::Html;
 use crate::report::chart::{Along, Chart, Curve, Points};
-use crate::report::html::ShownScenario;
 use crate::report::html::{Section, page};
 use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
 
@@ -114,7 +114,10 @@ fn findings(html: &mut Html, all: &[ShownScenario]) {
             html.element("tr", &[], |html| {
                 html.line(
                     "td",
-                    &[("class", &crate::report::html::colour(row.verdict))],
+                    &[(
+                        "class",
+                        &crate::buses::novobus::report::html::colour(row.verdict),
+                    )],
                     row.verdict,
                 );
                 html.element("th", &[("scope", &"row")], |html| {

@@ -3,15 +3,18 @@
 mod cells;
 pub mod csv;
 pub(crate) mod diagram;
+pub mod html;
 pub mod json;
 pub(crate) mod lines;
 pub(crate) mod live;
 pub mod meaning;
+pub mod mismatch;
 mod picture;
 pub mod plot;
 pub(crate) mod sequence;
 pub mod svg;
 pub mod table;
+pub mod vcd;
 pub mod walk;
 
 /// The dissector for Wireshark.

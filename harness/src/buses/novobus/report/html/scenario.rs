@@ -1,12 +1,12 @@
 //! The section of a scenario: its outcome, what was expected beside what was received, and its pictures.
 
-use super::page::{FoldedPart, Section};
 use super::summary::{Row, ShownScenario, colour};
 use crate::buses::novobus::language::run::bytes::show;
 use crate::buses::novobus::report::diagram::diagram;
 use crate::buses::novobus::report::lines::lines;
 use crate::buses::novobus::report::sequence::sequence;
 use crate::html::Html;
+use crate::report::html::{FoldedPart, Section};
 use crate::scenario::run::{ByteDifference, Mismatch, Outcome};
 use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;

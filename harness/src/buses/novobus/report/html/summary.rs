@@ -1,10 +1,10 @@
 //! The front part of a run's page: how many verdicts there are of each kind, and a table of all scenarios.
 
-use super::page::{Section, page};
 use super::scenario::ScenarioView;
 use crate::buses::novobus::locate::locate;
 use crate::counted::counted;
 use crate::html::Html;
+use crate::report::html::{Section, page};
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

@@ -22,8 +22,8 @@
 //! A line that all stations share has for each station one wire with what this station sends, 8E1, and no `state`. The time scale is 10 ns: a bit
 //! at 1.5 Mbit/s is 66.7 of them.
 
-use super::pcapng::name;
 use crate::buses::novobus::report::walk::{Reader, SenderState};
+use crate::report::pcapng::name;
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};
