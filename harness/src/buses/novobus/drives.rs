@@ -2,11 +2,11 @@
 
 use super::driver::cell::{CellFound, find, write};
 use super::driver::{self, Axis, OpenRings, State};
-use crate::buses::SimulatedLink;
 use crate::buses::find_rig_in;
 use crate::buses::novobus::language::argument::{assignments, cells, encode};
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::embed::Error;

@@ -1,7 +1,7 @@
 //! The simulated rings that a plan asks for.
 
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::{Plan, PlannedSetupKind};
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::{Line, Link};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::{ee, ram};

@@ -3,10 +3,10 @@
 
 use super::class::{CaseEvidence, Wrong, named};
 use super::sound::Sound;
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::campaign::fault::CaseFaults;
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options};
 use crate::buses::novobus::language::plan::PlannedCall;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::{Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::novobus::address::RingSize;

@@ -5,8 +5,8 @@
 use super::class::{CaseEvidence, Wrong};
 use super::conversation::Answers;
 use super::sound::{DrivesBeyondBus, Sound};
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::campaign::fault::{CaseFaults, link_index};
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::link::{Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;

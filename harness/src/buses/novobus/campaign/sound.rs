@@ -1,7 +1,7 @@
 //! Compares the cells of a ring with those of the same ring without a fault.
 
 use super::class::Wrong;
-use crate::buses::SimulatedLink;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::Link;
 use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
 use harness_proto::novobus::bus_end::BusEnd;

@@ -2,12 +2,12 @@
 //! file or name, is taken and given back as by `run --rig`.
 
 use super::axes;
-use crate::buses::SimulatedLink;
 use crate::buses::find_rig;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::simulate;
 use crate::command::drive::RigArguments;

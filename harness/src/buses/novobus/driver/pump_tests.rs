@@ -1,7 +1,7 @@
 //! How far ahead of the line bytes are handed over, in virtual time.
 
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options};
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Rate;

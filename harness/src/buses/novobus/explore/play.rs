@@ -1,7 +1,7 @@
 //! A case on simulated rings without the way over its text: thousands a second. A test holds that both ways are one.
 
 use super::case::{ActKind, Case};
-use crate::buses::SimulatedLink;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};

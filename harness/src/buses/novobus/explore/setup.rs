@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::play::{MasterView, play};
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::plan_header;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup as HeaderLine, SetupKind};
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::rig::sim;
 use crate::buses::novobus::simulate;
 use crate::explore::Planted;

@@ -205,10 +205,10 @@ fn shown(bytes: &[Received]) -> String {
 mod tests {
     use super::super::line_test::RingPace;
     use super::*;
-    use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options, SpellingCause};
     use crate::buses::novobus::gate::guard_rings;
     use crate::buses::novobus::link::BesideTheBus as _;
+    use crate::buses::novobus::link::SimulatedLink;
     use crate::buses::novobus::simulate;
     use crate::library::Entry;
     use crate::link::{Line, LinkFault, Moment, PlacedFault};

@@ -1,7 +1,7 @@
 //! Verdicts of attempts on a port whose bytes come late or early, or unasked.
 
 use super::tests::{READ, judged_early, judged_on, judged_with, link, plan};
-use crate::buses::SimulatedLink;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::qualify::{Meant, Sighting};
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};

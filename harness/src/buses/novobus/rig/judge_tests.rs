@@ -4,8 +4,8 @@
 mod right;
 
 use super::{AttemptFacts, judge, known};
-use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::simulate::bench;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::buses::parse_rig as parse;

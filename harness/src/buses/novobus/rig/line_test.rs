@@ -193,7 +193,7 @@ pub(super) mod tests {
     }
 
     /// A simulated ring of three drives at a rate.
-    pub(in super::super) fn ring(line: &str) -> crate::buses::SimulatedLink {
+    pub(in super::super) fn ring(line: &str) -> crate::buses::novobus::link::SimulatedLink {
         let text = format!("title t\nring 3\nline {line}\n> 80\n");
         let entry = Entry::new(source("ring.scn", text), None).expect("a scenario");
         simulate::bench(&entry.plan.expect("a plan"))

@@ -22,7 +22,7 @@ fn what_changes_by_itself_is_not_compared() {
     let mut link = bench(&plan.expect("novobus"));
     // 9.3, 10.2: nsoll of drive 0 becomes 0400.
     let turn = [0x8C, 0xFF, 0x63, 0x00, 0x04, 0x08, 0xFF, 0x6E];
-    let cells = |link: &crate::buses::SimulatedLink| -> Vec<(u16, Option<u8>)> {
+    let cells = |link: &crate::buses::novobus::link::SimulatedLink| -> Vec<(u16, Option<u8>)> {
         (0xFD80..=0xFF7F)
             .map(|cell| (cell, link.peek(0, 0, cell)))
             .collect()

@@ -3,7 +3,7 @@
 //! It does what the pump of real ports does (`link/pump.rs`): bytes are stamped when they are read, and counted as lost some time after
 //! they are due. The drives go on while the computer stands still.
 
-use crate::buses::SimulatedLink;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::link::lateness::Lateness;
 use crate::link::pump::SLACK;
 use crate::link::stamp::stamped;
