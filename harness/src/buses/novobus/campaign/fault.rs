@@ -1,6 +1,6 @@
 //! One fault of a case: where it is and what it does, with the name by which people call it.
 
-use crate::buses::syntax::LinkFaultKind;
+use crate::buses::novobus::language::syntax::LinkFaultKind;
 use crate::file::values::{LinkName, Time};
 use crate::link::{LinkFault, link_name};
 use crate::scenario::times;

@@ -2,8 +2,8 @@
 
 use super::fault::CaseFaults;
 use super::run::{Campaign, Contradiction};
+use crate::buses::novobus::language::syntax::{FaultStep, Header, JobStep, LinkEnds, RingStep};
 use crate::buses::novobus::language::write::Text;
-use crate::buses::syntax::{FaultStep, Header, JobStep, LinkEnds, RingStep};
 use crate::link::link_name;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::syntax::{Action, Scenario};
