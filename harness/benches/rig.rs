@@ -19,12 +19,13 @@
 mod ring;
 
 use harness::buses::novobus::language::plan::Plan;
+use harness::buses::novobus::rig::{Run, Session};
 use harness::buses::novobus::simulate;
 use harness::buses::parse_rig as parse;
 use harness::library::Entry;
 use harness::link::{Line, Link, Octets};
 use harness::port::PortAddress;
-use harness::rig::{Rig, Run, Session, UseOptions};
+use harness::rig::{Rig, UseOptions};
 use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::source::Source;
 use harness_proto::time::Span;

@@ -11,8 +11,6 @@ pub mod novobus;
 mod toy;
 pub use harness_unitek as unitek;
 
-/// The bus whose drives stand in rings: what rooms take of it by type.
-pub use novobus as rings;
 pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
 pub use novobus::stream::StreamLink;

@@ -3,8 +3,12 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
+use crate::buses::novobus::rig::BesideTwin;
+use crate::buses::novobus::rig::judge::known;
+use crate::buses::novobus::rig::judge::{AttemptFacts, judge};
+use crate::buses::novobus::rig::run::{Way, opening, twin};
 use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::rings::rig::BesideTwin;
+use crate::buses::novobus::rig::{Driven, play_one};
 use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::LinkName;
 use crate::library::Entry;
@@ -12,11 +16,8 @@ use crate::link::{
     Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
 };
 use crate::rig::file::{Interposer, Transport};
-use crate::rig::judge::known;
-use crate::rig::judge::{AttemptFacts, judge};
-use crate::rig::run::{Way, opening, twin};
 use crate::rig::segment::SegmentJudge;
-use crate::rig::{Attempt, Driven, Rig, SessionError, play_one};
+use crate::rig::{Attempt, Rig, SessionError};
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;

@@ -3,10 +3,10 @@
 use super::files::{SCENARIOS, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
+use crate::buses::novobus::rig::run::not_played;
 use crate::counted::counted;
 use crate::library::Entry;
 use crate::link::{LinkEvent, Replay};
-use crate::rig::run::not_played;
 use crate::rig::{Again as Retries, Attempt, PlayedScenario, Rig, attempts_of};
 use crate::scenario::run::{DENIED, Outcome, Skip, Why};
 use crate::scenario::source::Source;

@@ -10,9 +10,3 @@ pub(crate) mod shared;
 pub use open::OpenRigError;
 pub(crate) use open::{line_rate, stated_rate};
 pub use shared::{Shared, SharedLine};
-
-/// Rigs with rings in use, and how they are examined and judged.
-pub use crate::buses::rings::rig::{
-    Driven, LikelyCause, RingHealth, Run, Session, Unhealthy, Way, examine, figures, play_one,
-};
-pub(crate) use crate::buses::rings::rig::{judge, run, wrong_parity};

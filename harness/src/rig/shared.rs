@@ -1,6 +1,7 @@
 //! A rig in use as a line that a driver can own, with the rig itself kept for its end.
 
-use super::{End, Session};
+use super::End;
+use crate::buses::novobus::rig::Session;
 use crate::link::{Lead, Line, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Rate;

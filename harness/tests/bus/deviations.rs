@@ -7,12 +7,13 @@
 use crate::blind::Blind;
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::qualify::deviating_masters;
+use harness::buses::novobus::rig::OnRings as _;
+use harness::buses::novobus::rig::{Run, Session};
 use harness::buses::novobus::simulate::simulated;
 use harness::buses::parse_rig as parse;
-use harness::buses::rings::rig::OnRings as _;
 use harness::library::Entry;
 use harness::link::{Capability, Line, Link};
-use harness::rig::{PlayedScenario, Run, Session, UseOptions};
+use harness::rig::{PlayedScenario, UseOptions};
 use harness::scenario::files::sources;
 use harness::scenario::run::run;
 use harness::scenario::source::Source;

@@ -12,11 +12,11 @@ use harness::buses::novobus::qualify::{
     Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
     conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
+use harness::buses::novobus::rig::{Way, play_one};
 use harness::buses::novobus::simulate::bench;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::Entry;
 use harness::link::{Capability, LinkEvent, Octets, Recording};
-use harness::rig::{Way, play_one};
 use harness::scenario::files::sources;
 use harness::scenario::run::lacks;
 use harness::scenario::source::Source;

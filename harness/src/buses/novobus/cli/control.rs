@@ -4,13 +4,13 @@ use super::axes;
 use super::rig::{self, OpenBench};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings, State};
 use crate::buses::novobus::language::run::over_bus::reset_drives;
+use crate::buses::novobus::rig::Session;
 use crate::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::rig_name::{RigName, Use};
 use crate::link::Line;
-use crate::rig::Session;
 use harness_proto::nd21::bits::status;
 use harness_proto::time::Span;
 

@@ -3,13 +3,14 @@
 use crate::buses::novobus::cli::give_back_session as give_back;
 use crate::buses::novobus::explore::{CaseScope, RingScope, RingSetup, Spice};
 use crate::buses::novobus::language::run::over_bus::start_anew;
+use crate::buses::novobus::rig::wrong_parity;
+use crate::buses::novobus::rig::{Run, Session};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of};
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
-use crate::rig::wrong_parity;
-use crate::rig::{Rig, Run, Session, UseOptions};
+use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
 use harness_proto::novobus::guard::Limits;
 

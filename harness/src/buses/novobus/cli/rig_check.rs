@@ -1,6 +1,8 @@
 //! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
 
 use crate::buses::novobus::driver::{Error, SpelledOut, SpellingCause};
+use crate::buses::novobus::rig::Session;
+use crate::buses::novobus::rig::figures::{Figures, RingFigures, WrongParity, measure};
 use crate::command::args::ListFormat;
 use crate::command::exit::Exit;
 use crate::command::failure::exit_of_trouble;
@@ -8,8 +10,7 @@ use crate::command::output::Output;
 use crate::command::play::progress_bar;
 use crate::command::rig_failure::{alarm, exit_of, tell_end};
 use crate::counted::counted;
-use crate::rig::figures::{Figures, RingFigures, WrongParity, measure};
-use crate::rig::{Rig, Session, UseOptions};
+use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
 use clap::Args;
 use harness_proto::time::Span;

@@ -4,6 +4,7 @@ use crate::buses::find_rig;
 use crate::buses::novobus::cli::fuzz::{on_ports, scope, sizes};
 use crate::buses::novobus::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::buses::novobus::explore::{Case, Difference, Finding, OnRig, OnSim, RingSetup};
+use crate::buses::novobus::rig::Run;
 use crate::command::exit::Exit;
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::fuzz::tell;
@@ -11,7 +12,7 @@ use crate::command::output::Output;
 use crate::counted::counted;
 use crate::explore::Planted;
 use crate::explore::{ExploreError, Target};
-use crate::rig::{Run, UseOptions};
+use crate::rig::UseOptions;
 use harness_sim::novobus::deviation::deviations;
 use std::path::Path;
 

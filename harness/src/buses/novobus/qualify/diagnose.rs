@@ -2,8 +2,8 @@
 
 use super::hypothesis::{Fit, fit, judge};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
+use crate::buses::novobus::rig::Driven;
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
-use crate::rig::Driven;
 use harness_sim::novobus::deviation::{
     Deviation, MasterDeviation, deviations, master_deviations, relatives,
 };

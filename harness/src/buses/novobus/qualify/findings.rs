@@ -3,10 +3,11 @@
 use super::blame::{Culprit, Meant, Sighting, Trial, agreed, culprit};
 use super::diagnose::{Named, RingSeen};
 use super::pinned::Pinned;
+use crate::buses::novobus::rig::Driven;
 use crate::buses::novobus::rig::{OnRings, PlayedOnRings};
 use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::counted::counted;
-use crate::rig::{Attempt, Driven, PlayedScenario};
+use crate::rig::{Attempt, PlayedScenario};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;

@@ -13,11 +13,12 @@ use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough
 use super::settle::{Answer, answer, silence};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::rig::OnRings;
+use crate::buses::novobus::rig::Run;
 use crate::buses::novobus::twin::{Exactness, SILENCED, Twin};
 use crate::library::Entry;
 use crate::link::{Link as _, Octets as _};
 use crate::rig::segment::Qualified;
-use crate::rig::{Attempt, PlayedScenario, Profile, Rig, Run};
+use crate::rig::{Attempt, PlayedScenario, Profile, Rig};
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

@@ -4,13 +4,13 @@ use super::left_open::{self, Explanation};
 use super::sim;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
+use crate::buses::novobus::rig::run::{Way, play_one, twin};
 use crate::buses::novobus::twin::{
     Comparison, Conversation, Divergence, Exactness, OwnByte, SILENCED, Unasked,
 };
 use crate::link::{LinkEvent, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
-use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::pattern::Expected;
 use crate::scenario::run::{ByteDifference, Mismatch, Outcome};
 use crate::scenario::verdict::Verdict;

@@ -3,9 +3,9 @@
 use super::tests::{READ, judged_early, judged_on, judged_with, link, plan};
 use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::qualify::{Meant, Sighting};
+use crate::buses::novobus::rig::run::Way;
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};
-use crate::rig::run::Way;
 use crate::scenario::verdict::Verdict;
 use crate::scenario::verdict::Verdict::{Failed, Inconclusive, Marginal, Passed};
 use harness_proto::line::Received;

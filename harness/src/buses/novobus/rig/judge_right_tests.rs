@@ -1,9 +1,9 @@
 //! Every built-in scenario that a rig of ports can play, on drives that are right and not as the model.
 
 use super::{judged_on, link_of};
+use crate::buses::novobus::rig::run::Way;
 use crate::library::Entry;
 use crate::link::{Capability, LinkEvent, Recording};
-use crate::rig::run::Way;
 use crate::scenario::files::sources;
 use crate::scenario::run::lacks;
 use crate::scenario::verdict::Verdict::{Inconclusive, Passed};

@@ -7,8 +7,8 @@ use super::sim;
 use crate::buses::novobus::choice::{Choice, SELF_TEST_TIME, of_drives, of_self_tests, of_the_bus};
 use crate::buses::novobus::language::syntax::{DriveRange, Header};
 use crate::buses::novobus::language::write::ring_prefix;
+use crate::buses::novobus::rig::run::twin;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Done};
-use crate::rig::run::twin;
 use crate::scenario::times::Duration;
 use harness_proto::time::Span;
 
