@@ -1,11 +1,11 @@
 //! How long the page of a 100-axis run takes (the parity error of ND21 9.7 and the check sequence of 9.8), beside a baseline that
 //! only reads what every byte is; and how long a browser takes to open it, beside an empty page.
 
-use harness::buses::novobus::report::html::{Head, ScenarioView, run, section};
 use harness::buses::novobus::report::walk::Reader;
 use harness::buses::novobus::simulate::simulated;
 use harness::library::Entry;
 use harness::link::Link;
+use harness::report::pages::{Head, ScenarioView, run, section};
 use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::source::Source;
 use harness_sim::record::Trace;

@@ -1,9 +1,9 @@
 //! `--html FILE`: the page of a run, collected while it goes on and written at its end.
 
-use crate::buses::novobus::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use crate::command::output::Output;
 use crate::command::page::{NotWritable, writable, write};
 use crate::library::Entry;
+use crate::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};

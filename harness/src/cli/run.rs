@@ -7,7 +7,6 @@ use super::run_segment;
 use super::tally::{EarlierVerdicts, Tally};
 use crate::bus::Bus;
 use crate::buses::find_any_rig;
-use crate::buses::novobus::report::html::Head;
 use crate::buses::novobus::report::plot::plot;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::cli::page::Page;
@@ -20,6 +19,7 @@ use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_la
 use crate::library::Entry;
 use crate::link::Recording;
 use crate::report::finding::explain;
+use crate::report::pages::Head;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::files::{LibraryError, is_named, sources};
 use crate::scenario::problem::Problems;

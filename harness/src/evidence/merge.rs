@@ -19,9 +19,9 @@ use super::read_parts::{PARTS, ReadPart, copy, entries, failed, parts_of, place,
 use super::reports::{file, moved};
 use super::signature::Signer;
 use super::verify::{Opened, Verified, verify};
-use crate::buses::novobus::report::html::{Head, run};
 use crate::partition::Partition;
 use crate::regular;
+use crate::report::pages::{Head, run};
 use crate::rig::segment::Qualified;
 use crate::scenario::run::DENIED;
 use crate::scenario::verdict::Verdict;

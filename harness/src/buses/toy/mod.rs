@@ -13,11 +13,11 @@ mod language;
 mod report;
 mod valve;
 
-use crate::buses::novobus::report::html::{Head, ScenarioView, run, section};
 use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::report::finding::explain;
 use crate::report::page::page;
+use crate::report::pages::{Head, ScenarioView, run, section};
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::settle;

@@ -3,7 +3,7 @@
 use super::devtools::Browser;
 use super::parser::{Element, parse, sound};
 use super::{folder, played};
-use harness::buses::novobus::report::html::{Head, ScenarioView, run, section};
+use harness::report::pages::{Head, ScenarioView, run, section};
 use harness::scenario::run::AtMismatch;
 use serde_json::json;
 

@@ -9,10 +9,10 @@ mod pages;
 mod parser;
 mod program;
 
-use harness::buses::novobus::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use harness::buses::novobus::simulate::simulated;
 use harness::library::Entry;
 use harness::link::Link;
+use harness::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::source::Source;
 use harness_sim::record::Trace;

@@ -2,7 +2,7 @@
 
 use super::parser::{outline, parse, sound};
 use super::{FAILS, page, text};
-use harness::buses::novobus::report::html::{Head, ScenarioView, ShownScenario, run, section};
+use harness::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use harness::scenario::run::Outcome;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
