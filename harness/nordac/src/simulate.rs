@@ -145,7 +145,7 @@ impl Bench {
             line: OctetSegment::new(setup.rate.format(), stations),
             rate: setup.rate,
             addresses: setup.slaves.iter().map(|own| own.address).collect(),
-            clock: BenchClock::new(),
+            clock: BenchClock::default(),
             master: setup.master,
         }
     }

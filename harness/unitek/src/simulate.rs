@@ -151,7 +151,7 @@ impl Bench {
         Self {
             segment: setup.segment(guests),
             nodes: setup.drives.iter().map(|own| own.node).collect(),
-            clock: BenchClock::new(),
+            clock: BenchClock::default(),
         }
     }
 

@@ -15,10 +15,6 @@ pub struct Planted {
     pub name: String,
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde calls it with a reference"
-)]
 pub const fn is_first(ring: &usize) -> bool {
     *ring == 0
 }

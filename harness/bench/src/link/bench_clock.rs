@@ -16,8 +16,8 @@ pub struct BenchClock {
     scheduled: VecDeque<(Instant, PlacedFault)>,
 }
 
-impl BenchClock {
-    pub const fn new() -> Self {
+impl Default for BenchClock {
+    fn default() -> Self {
         Self {
             now: Instant::START,
             left: Instant::START,
@@ -25,7 +25,9 @@ impl BenchClock {
             scheduled: VecDeque::new(),
         }
     }
+}
 
+impl BenchClock {
     /// Begins a conversation: faults that have not happened are dropped.
     pub fn begin(&mut self) {
         self.origin = self.now;

@@ -32,7 +32,7 @@ impl Bench {
         Self {
             segment: Segment::new(RATE, stations.collect()),
             valves: valves.iter().map(|own| own.0).collect(),
-            clock: BenchClock::new(),
+            clock: BenchClock::default(),
         }
     }
 
