@@ -36,7 +36,7 @@ pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
 pub use harness_bench::{
     bus, campaign, capture, explore, file, frames, guard, html, link, listen, manual, medium,
-    partition, port, qualify, regular, scenario, serve, signals, top, traffic, trouble, web,
+    partition, port, qualify, regular, rig, scenario, serve, signals, top, traffic, trouble, web,
 };
 use harness_proto::counted;
 pub use scenario::verdict::Verdict;
@@ -56,5 +56,3 @@ pub mod fuzz;
 pub mod library;
 #[doc(hidden)]
 pub mod report;
-#[doc(hidden)]
-pub mod rig;

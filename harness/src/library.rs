@@ -2,11 +2,11 @@
 
 use crate::bus::Bus;
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::Scenario;
 use crate::buses::settle;
 use crate::scenario::files;
-use crate::scenario::parse::{self, parse};
-use crate::scenario::plan::plan;
+use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
@@ -39,23 +39,7 @@ impl Entry {
             let found = settle(bus, &source, size)?;
             return Ok(Self::of_other(source, found));
         }
-        Self::of_ring(parse(&source)?, source, size)
-    }
-
-    /// A scenario of [`Bus::DEFAULT`], settled.
-    fn of_ring(
-        scenario: Scenario,
-        source: Source,
-        size: Option<u8>,
-    ) -> Result<Self, Box<Problems>> {
-        let own = plan(&scenario, &source, size)?;
-        Ok(Self {
-            name: source.name.clone(),
-            source,
-            scenario,
-            plan: Some(own),
-            other: None,
-        })
+        Ok(RingScenario::new(source, size)?.into())
     }
 
     /// A scenario of another bus than [`Bus::DEFAULT`], read and settled.
@@ -78,11 +62,7 @@ impl Entry {
         if parse::bus(&source) != Bus::DEFAULT {
             return Self::new(source, None);
         }
-        let scenario: Scenario = parse(&source)?;
-        let range = scenario.header.rings.first();
-        let fits = |drives: &u8| range.is_some_and(|own| own.contains(*drives));
-        let size = drives.filter(fits);
-        Self::of_ring(scenario, source, size)
+        Ok(RingScenario::fitting(source, drives)?.into())
     }
 
     /// The name without folders and ending.
@@ -123,6 +103,18 @@ impl Entry {
             .into_iter()
             .chain(places.by_ref())
             .any(|place| place.to_lowercase().contains(&text))
+    }
+}
+
+impl From<RingScenario> for Entry {
+    fn from(own: RingScenario) -> Self {
+        Self {
+            name: own.source.name.clone(),
+            source: own.source,
+            scenario: own.scenario,
+            plan: Some(own.plan),
+            other: None,
+        }
     }
 }
 

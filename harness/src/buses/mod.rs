@@ -7,20 +7,20 @@ mod interrupt_tests;
 mod live_tests;
 pub use harness_nordac as nordac;
 pub mod novobus;
+mod sim;
 #[cfg(test)]
 mod toy;
 pub use harness_unitek as unitek;
 
 pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
-pub use novobus::stream::StreamLink;
 
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
-pub(crate) use novobus::{cli as commands, driver, drives, twin};
+pub(crate) use novobus::{cli as commands, driver, twin};
 
 use crate::bus::Bus;
 use crate::campaign::line::LineCampaign;
@@ -38,10 +38,8 @@ use crate::command::rig_failure::{self, exit_of};
 use crate::command::rig_name::RigName;
 use crate::evidence::Signer;
 use crate::explore::read_as;
-use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::medium::ErrorMarks;
-use crate::port::Wire;
 use crate::rig::buses::RigBuses;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
@@ -57,13 +55,12 @@ use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::Trace;
-use novobus::language::plan::Plan;
 use novobus::language::syntax::Scenario;
 use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// The manuals of the buses; that of [`Bus::DEFAULT`] first.
 pub const MANUALS: [Manual; 3] = [
@@ -110,23 +107,6 @@ pub(crate) fn fuzz_noting() -> impl Iterator<Item = Noting> {
         .chain(harness_sim::nordac::fuzz::NOTING)
 }
 
-/// A link to the drives that a plan simulates, warmed up: their self-tests are over.
-pub(crate) fn simulated(plan: &Plan) -> Box<dyn Link> {
-    Box::new(novobus::simulate::warm(plan))
-}
-
-/// A link over open ports, each with its number of drives, and over the ports of inner links.
-pub(crate) fn over_ports(
-    wires: Vec<(Wire, u8)>,
-    inner: Vec<InnerLink>,
-    (rate, tolerance): (Rate, Span),
-    interrupt: Arc<AtomicBool>,
-) -> Box<dyn PortLink> {
-    let mut link = StreamLink::new(wires, inner, rate, interrupt);
-    link.set_time_tolerance(tolerance);
-    Box::new(link)
-}
-
 /// The buses, as the files of rigs know them.
 pub static RIG_BUSES: RigBuses = RigBuses {
     rings: novobus::rig::RINGS,
@@ -156,18 +136,6 @@ pub fn find_rig_in(name: &str, folder: &Path) -> Result<Rig, FindError> {
 /// All its mistakes, each with its place.
 pub fn parse_rig(source: &Source) -> Result<Rig, Problems> {
     check::parse(source, &RIG_BUSES)
-}
-
-/// Finds the rig of this name, for a command that serves rings only; reports what is wrong with it.
-pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
-    let rig = find_any_rig(name, output)?;
-    match rig.of_rings() {
-        Ok(()) => Some(rig),
-        Err(error) => {
-            output.complain(&error.to_string());
-            None
-        }
-    }
 }
 
 /// Finds the rig of this name, whatever its bus; reports what is wrong with it.
@@ -331,17 +299,23 @@ pub(crate) fn telegram_difference(
 }
 
 /// Runs a command on drives, in the words of the bus of its bench.
-pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn drive(mut command: DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+    if let DriveCommand::Sim(arguments) = &command {
+        return told(sim::sim(arguments, output), output);
+    }
     let Some(RigName::Named(name)) = command.rig().and_then(|own| own.rig.as_ref()) else {
-        return novobus::cli::drive(command, output);
+        return novobus::cli::drive(&command, output);
     };
     let Some(rig) = find_any_rig(name, output) else {
         return Ok(Exit::Usage);
     };
     let Some(own) = commands_of(&rig) else {
-        return novobus::cli::drive(command, output);
+        if let Some(arguments) = command.rig_mut() {
+            arguments.found = Some(Rc::new(rig));
+        }
+        return novobus::cli::drive(&command, output);
     };
-    let end = (own.command)(&rig, command, output);
+    let end = (own.command)(&rig, &command, output);
     told(end, output)
 }
 
@@ -411,7 +385,7 @@ fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit
 ///
 /// # Errors
 /// The header has mistakes, or the bus carries no frames.
-pub(crate) fn serve_frames(
+fn serve_frames(
     bus: Bus,
     (drives, header): (Option<u8>, Option<&Source>),
     options: &ServeOptions<FramePlace>,
@@ -430,7 +404,7 @@ pub(crate) fn serve_frames(
 ///
 /// # Errors
 /// The header has mistakes, or the bus has no such line.
-pub(crate) fn serve_octets(
+fn serve_octets(
     bus: Bus,
     (slaves, header): (Option<&[u8]>, Option<&Source>),
     marks: ErrorMarks,

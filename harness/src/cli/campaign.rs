@@ -13,7 +13,7 @@ use crate::command::args::TableFormat;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{save, writable, write};
-use crate::command::play::progress_bar;
+use crate::command::progress::progress_bar;
 use crate::partition::Partition;
 use clap::ValueEnum;
 use std::path::PathBuf;

@@ -102,7 +102,7 @@ fn dispatch(command: ProgramCommand, output: &mut Output) -> std::io::Result<Exi
         ProgramCommand::Rig { command } => rig::rig(&command, output),
         ProgramCommand::Campaign(arguments) => campaign::campaign(&arguments, output),
         ProgramCommand::Deviations(arguments) => deviations::deviations(&arguments, output),
-        ProgramCommand::Drive(command) => crate::buses::drive(&command, output),
+        ProgramCommand::Drive(command) => crate::buses::drive(*command, output),
         ProgramCommand::Completions { shell } => complete::completions(shell, output),
         ProgramCommand::Complete { words } => complete::complete(&words, output),
         ProgramCommand::Man { folder } => man::man(folder.as_deref(), output),

@@ -7,6 +7,7 @@ use super::run_rig::{EarlyEnd, PlayOrder, over, play, show, work};
 use super::run_segment;
 use super::tally::EarlierVerdicts;
 use crate::buses::find_any_rig;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::qualify::{Qualification, QualifiedBench};
 use crate::buses::novobus::rig::Run;
 use crate::buses::syntax::Header;
@@ -15,8 +16,8 @@ use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
-use crate::library::Entry;
-use crate::rig::{PlayedScenario, state};
+use crate::rig::PlayedScenario;
+use crate::rig::state;
 use crate::scenario::problem::Problems;
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -86,8 +87,8 @@ pub(super) struct Live<'l, 's> {
 impl QualifiedBench for Live<'_, '_> {
     type Stop = EarlyEnd;
 
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, EarlyEnd> {
-        let (_, played) = play(self.run, entry, self.folder.as_deref_mut())?;
+    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, EarlyEnd> {
+        let (_, played) = play(self.run, &entry.clone().into(), self.folder.as_deref_mut())?;
         Ok(played)
     }
 
@@ -103,8 +104,8 @@ impl QualifiedBench for Live<'_, '_> {
         Ok(self.output.result(text)?)
     }
 
-    fn show(&mut self, entry: &Entry, played: &PlayedScenario) -> Result<(), EarlyEnd> {
-        Ok(show(entry, played, self.output)?)
+    fn show(&mut self, entry: &RingScenario, played: &PlayedScenario) -> Result<(), EarlyEnd> {
+        Ok(show(&entry.clone().into(), played, self.output)?)
     }
 }
 

@@ -13,7 +13,7 @@ use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::write;
-use crate::command::play::progress_bar;
+use crate::command::progress::progress_bar;
 use crate::command::rig_failure::{alarm, exit_of};
 use crate::counted::counted;
 use crate::evidence::{AboutRun, EvidenceError, Folder, Keep, PAGE, SplitRun, size};

@@ -10,6 +10,6 @@ use crate::explore::bus_of;
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
     match bus_of(&arguments.finding).and_then(line_fuzz) {
         Some(own) => (own.shrink)(arguments, &RIG_BUSES, output),
-        None => shrink_rings(arguments, output),
+        None => shrink_rings(arguments, &RIG_BUSES, output),
     }
 }

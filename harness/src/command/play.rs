@@ -1,9 +1,8 @@
-//! A scenario played on a simulated bench, and how far a list of them is.
+//! A scenario played on a simulated bench.
 
 use crate::library::Entry;
 use crate::scenario::run::{AtMismatch, Outcome, Skip};
 use harness_sim::record::Trace;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::AtomicBool;
 
 /// A scenario that was played, with what it left.
@@ -35,15 +34,4 @@ pub(crate) fn play_entry_until(
         outcome,
         traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
     }
-}
-
-pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
-    let target = if shown && length > 1 {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
 }

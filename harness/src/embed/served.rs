@@ -1,7 +1,7 @@
 //! Simulated rings for a controller under test, served from a thread of another program.
 
 use super::Error;
-use crate::buses::drives::released;
+use super::drives::released;
 use crate::buses::novobus::serve::Server;
 use crate::medium::ErrorMarks;
 use crate::serve::{EndRequest, Pace, ServeError, ServeHost, ServeOptions, ServedAt, serve_until};

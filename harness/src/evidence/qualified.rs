@@ -4,11 +4,11 @@ use super::attempt::reached;
 use super::files::{DEVIATIONS, PROFILE, read_text, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::qualify::{Qualification, QualificationFacts, QualifiedBench, thorough};
 use crate::buses::novobus::rig::run::twin;
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
-use crate::library::Entry;
 use crate::rig::segment::Qualified;
 use crate::rig::{Attempt, PlayedScenario};
 use crate::scenario::problem::Problems;
@@ -222,7 +222,7 @@ enum Stop {
 impl QualifiedBench for Record<'_> {
     type Stop = Stop;
 
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Stop> {
+    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, Stop> {
         let case = self.cases.pop_front().ok_or(Stop::Missing)?;
         if case.sum != sum(entry.source.text.as_bytes()) {
             return Err(Stop::Other(case.name));
@@ -243,7 +243,7 @@ impl QualifiedBench for Record<'_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), Stop> {
+    fn show(&mut self, _: &RingScenario, _: &PlayedScenario) -> Result<(), Stop> {
         Ok(())
     }
 }

@@ -4,11 +4,11 @@ use super::error::EvidenceError;
 use super::files::sum;
 use super::qualified::{Case, cases, course, is_thorough};
 use super::verify::{Judged, Opened};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::qualify::{QualifiedBench, TRIALS};
 use crate::buses::novobus::rig::run::twin;
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
-use crate::library::Entry;
 use crate::rig::PlayedScenario;
 use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
@@ -112,7 +112,7 @@ impl QualifiedBench for Record<'_> {
 
     /// What a part has asked its own drives follows from what it has heard: such a trial may be of another part. What no part has played stays
     /// open.
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Infallible> {
+    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, Infallible> {
         let (name, sum) = (entry.short_name(), sum(entry.source.text.as_bytes()));
         let is_trial = TRIALS.iter().any(|own| name.starts_with(own));
         let own = self.take(&sum);
@@ -141,7 +141,7 @@ impl QualifiedBench for Record<'_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), Infallible> {
+    fn show(&mut self, _: &RingScenario, _: &PlayedScenario) -> Result<(), Infallible> {
         Ok(())
     }
 }

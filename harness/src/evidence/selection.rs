@@ -4,8 +4,8 @@ use super::attempt::reached;
 use super::files::sum;
 use super::record::RecordLine;
 use super::verify::Opened;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::qualify::{TRIALS, conversations, probes, thorough};
-use crate::library::Entry;
 
 /// How the scenarios of a record compare with those that were to be played.
 #[derive(Debug, Default)]
@@ -108,7 +108,7 @@ fn qualifying(opened: &Opened) -> Vec<Qualifying> {
     let all = reached(&opened.rig, header);
     let reaches =
         |place: usize| place == 0 || place < usize::from(drives) && all.contains(&(0, place));
-    let listed = |entry: &Entry, always| Qualifying {
+    let listed = |entry: &RingScenario, always| Qualifying {
         name: entry.short_name().to_owned(),
         sum: sum(entry.source.text.as_bytes()),
         always,

@@ -7,6 +7,7 @@ mod eeprom;
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::language::plan::Plan;
 use harness::buses::novobus::language::plan::asks_the_driver;
+use harness::buses::novobus::language::read::RingScenario;
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::qualify::{
     Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
@@ -95,7 +96,7 @@ fn plans() -> &'static [Plan] {
                     .is_ok_and(|outcome| outcome.took < SHORT)
         };
         let built_in = built_in.filter(fits);
-        let own = own.into_iter().filter_map(|entry| entry.plan);
+        let own = own.into_iter().map(|entry| entry.plan);
         let own = own.filter(|plan| !asks_the_driver(plan));
         own.chain(built_in).collect()
     })
@@ -194,12 +195,12 @@ fn verdict(lines: &[String]) -> Verdict {
     let seen: Vec<_> = sightings.iter().map(|(_, own)| own.meant).collect();
     let asked = questions(DRIVES, &sightings);
     let pinned = asked.iter().filter_map(|question| {
-        let plan = question.entry.plan.as_ref().expect("novobus");
+        let plan = &question.entry.plan;
         question.answer(&played(plan, &link))
     });
     let pinned: Vec<_> = pinned.collect();
-    let trials = exchange(DRIVES, sightings, &mut |entry: &Entry| {
-        let plan = entry.plan.as_ref().expect("novobus");
+    let trials = exchange(DRIVES, sightings, &mut |entry: &RingScenario| {
+        let plan = &entry.plan;
         let (differs, sighting) = play.play(&link, plan);
         let meant = sighting.map_or(Meant::Nobody, |own| own.meant);
         Ok::<_, ()>(Some(differs.then_some(meant)))
@@ -323,10 +324,10 @@ const STANDS: &str = "drive 0..last memory scope_status = 80";
 fn named_plan(name: &str) -> Plan {
     let own = conversations(DRIVES, &|_| false).expect("no mistakes");
     let built_in = sources(&[]).expect("built-in scenarios").into_iter();
-    let built_in = built_in.filter_map(|source| Entry::new(source, Some(DRIVES)).ok());
+    let built_in = built_in.filter_map(|source| RingScenario::new(source, Some(DRIVES)).ok());
     let mut all = built_in.chain(own);
     let entry = all.find(|entry| entry.short_name() == name).expect(name);
-    entry.plan.expect("novobus")
+    entry.plan
 }
 
 /// What a ring with these lines shows when it is asked, where this scenario or conversation differed.
@@ -340,7 +341,7 @@ fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
     let sightings = [(name.to_owned(), sighting)];
     let asked = questions(DRIVES, &sightings);
     let pinned = asked.iter().filter_map(|question| {
-        let plan = question.entry.plan.as_ref().expect("novobus");
+        let plan = &question.entry.plan;
         question.answer(&played_in_time(plan, &link))
     });
     pinned.map(|own| (own.drive, own.section)).collect()
@@ -595,7 +596,7 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
             .iter()
             .filter(|own| time_outs.contains(&own.property))
         {
-            let entries = probe.entries.iter().filter_map(|entry| entry.plan.as_ref());
+            let entries = probe.entries.iter().map(|entry| &entry.plan);
             let seen: Vec<_> = entries.map(|plan| played(plan, &link)).collect();
             let found = answer(probe, DRIVES, &seen, THROUGH_A_PORT, &twin_of).expect("rings");
             let manual = &hypotheses(probe.property, DRIVES)[0];

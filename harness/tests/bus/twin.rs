@@ -219,7 +219,7 @@ fn answered(drives: u8, probe: &Probe, exactness: Exactness, header: &Header) ->
     let entries = probe.entries.iter();
     let seen = entries.map(|entry| {
         let (_, mut link) = model_of(drives, &header.lines());
-        conversations(entry.plan.as_ref().expect("novobus"), &mut link)
+        conversations(&entry.plan, &mut link)
     });
     let twin = |header: &Header| -> Result<Twin, ()> {
         let (plan, link) = model_of(drives, &header.lines());

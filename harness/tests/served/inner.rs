@@ -2,8 +2,9 @@
 //! the same links as in the simulator.
 
 use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
+use harness::buses::novobus::link::SimulatedLink;
 use harness::buses::novobus::simulate;
-use harness::buses::{SimulatedLink, StreamLink};
+use harness::buses::novobus::stream::StreamLink;
 use harness::library::Entry;
 use harness::link::{
     InnerLink, InnerPorts, Line, Link, LinkFault, Moment, Octets, PlacedFault, PortLink as _,

@@ -2,9 +2,9 @@
 //! same verdicts as on the simulator.
 
 use crate::ring::Served;
-use harness::buses::StreamLink;
 use harness::buses::novobus::language::run::over_bus::{play_over_bus, start_anew};
 use harness::buses::novobus::simulate::simulated;
+use harness::buses::novobus::stream::StreamLink;
 use harness::library::Entry;
 use harness::link::{Line, Octets, PortLink as _};
 use harness::port::{PortAddress, PortSettings, Wire, open};

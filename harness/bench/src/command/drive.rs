@@ -5,6 +5,7 @@ use super::cyclic::CyclicCommand;
 use super::drawing::DrawingArguments;
 use super::rig_name::RigName;
 use super::sim::{SIM_HELP, SimArguments};
+use crate::rig::Rig;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
@@ -163,6 +164,9 @@ pub struct RigArguments {
     /// The bench of a session, in place of one that is opened for the command: what the bus of its drives holds.
     #[arg(skip)]
     pub held: Option<Rc<dyn Any>>,
+    /// The rig of this name, read.
+    #[arg(skip)]
+    pub found: Option<Rc<Rig>>,
 }
 
 /// For commands that change something on drives with ports.

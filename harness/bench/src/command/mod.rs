@@ -17,6 +17,7 @@ pub mod output;
 pub mod page;
 pub mod port_bench;
 pub mod port_row;
+pub mod progress;
 pub mod rig_failure;
 pub mod rig_name;
 pub mod sim;

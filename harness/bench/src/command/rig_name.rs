@@ -13,6 +13,16 @@ pub enum RigName {
     Named(String),
 }
 
+impl RigName {
+    /// The numbers of drives of simulated rings.
+    pub fn sizes(&self) -> Option<&[u8]> {
+        match self {
+            Self::Simulated(sizes) => Some(sizes),
+            Self::Named(_) => None,
+        }
+    }
+}
+
 impl FromStr for RigName {
     type Err = String;
 

@@ -90,6 +90,29 @@ impl RigBuses {
         }
     }
 
+    /// A table in which rings are these, and ports say nothing.
+    #[cfg(any(test, feature = "trials"))]
+    pub const fn of_rings(rings: RingRow) -> Self {
+        const NONE: PortRow = PortRow {
+            bus: PortBus::Unitek,
+            adapters: &[],
+            keys: &[],
+            limits: &[],
+            simulated: |_| Default::default(),
+            named: |_| Ok(()),
+            has_rate: |_| true,
+            drive: |_, _| (0, Vec::new()),
+            setup_mistakes: |_, _| None,
+            steps: |_| None,
+            special_register: |_| Ok(0),
+            interlock: ("", |_| Ok(())),
+        };
+        Self {
+            rings,
+            ports: [&NONE; PortBus::ALL.len()],
+        }
+    }
+
     /// What a bus knows of `[port.1]`.
     pub const fn port(&self, bus: PortBus) -> &'static PortRow {
         self.ports[bus as usize]

@@ -5,6 +5,7 @@ mod distil;
 mod replay;
 mod run;
 
+use crate::buses::RIG_BUSES;
 use crate::command::exit::Exit;
 use crate::command::fuzz::replay::ReplayArguments;
 use crate::command::fuzz::run::FuzzRunArguments;
@@ -34,7 +35,9 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
     match command {
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
-        FuzzCommand::Power(arguments) => crate::buses::commands::power::power(arguments, output),
+        FuzzCommand::Power(arguments) => {
+            crate::buses::commands::power::power(arguments, &RIG_BUSES, output)
+        }
         FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
         FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
     }

@@ -12,13 +12,13 @@ fn a_march_over_an_eeprom_leaves_what_was_there() {
         name: "ring".to_owned(),
         text: text.into(),
     };
-    let ring = Entry::new(source, None).expect("no mistakes");
-    let mut link = bench(&ring.plan.expect("novobus"));
+    let ring = RingScenario::new(source, None).expect("no mistakes");
+    let mut link = bench(&ring.plan);
     let byte_time = link.byte_time();
-    let mut play = |entry: &Entry| {
+    let mut play = |entry: &RingScenario| {
         let mut events: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut events);
-        let plan = entry.plan.as_ref().expect("novobus");
+        let plan = &entry.plan;
         let outcome = play_one(&mut recording, plan, &as_they_are()).expect("it is played");
         assert_eq!(outcome.verdict, harness::scenario::verdict::Verdict::Passed);
         Conversation::all(&events, byte_time, true)
@@ -44,9 +44,9 @@ fn a_march_over_an_eeprom_leaves_what_was_there() {
 fn a_copy_of_parameters_that_is_not_made_is_found() {
     let copied = |link: &SimulatedLink| {
         let (drive, read) = dumps(DRIVES).swap_remove(1);
-        let read = played_in_time(&read.plan.expect("novobus"), link);
+        let read = played_in_time(&read.plan, link);
         let mut written = marches(DRIVES, drive, &read);
-        written.pop().and_then(|own| own.plan).expect("the copy")
+        written.pop().expect("the copy").plan
     };
     let held = "drive 1 eeprom 3E = 12 34";
     assert_eq!(sighted_by(&[held], copied), None);

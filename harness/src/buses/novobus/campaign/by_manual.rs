@@ -5,7 +5,8 @@
 use super::class::{CaseEvidence, Wrong};
 use super::conversation::Answers;
 use super::sound::{DrivesBeyondBus, Sound};
-use crate::buses::novobus::campaign::fault::{CaseFaults, link_index};
+use crate::buses::novobus::campaign::fault::CaseFaults;
+use crate::buses::novobus::campaign::fault::link_index;
 use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::link::{Link, Moment, Octets, PlacedFault};

@@ -7,12 +7,12 @@ use super::diff::{ComparedRun, Summary, compare};
 use super::open::explanations;
 use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::locate::locate;
 use crate::buses::novobus::simulate::simulated;
 use crate::capture::Capture;
 use crate::capture::gap;
-use crate::library::Entry;
 use crate::link::{Link, link_name};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, play};
@@ -364,10 +364,8 @@ fn model(
     };
     let text = scenario_with(capture, &options, more)?;
     let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
-    let entry = Entry::new(source, None)?;
-    let Some(plan) = &entry.plan else {
-        return Err(JudgeError::Aborted("it is of another bus".to_owned()));
-    };
+    let entry = RingScenario::new(source, None)?;
+    let plan = &entry.plan;
     let mut link = simulated(plan);
     let outcome = play(plan, &mut link, AtMismatch::GoOn);
     if matches!(

@@ -1,6 +1,6 @@
 //! What `fuzz` and `shrink` do on rings. A rig with ports is opened as `run --rig` opens it and given back in its safe state.
 
-use crate::buses::novobus::cli::give_back_session as give_back;
+use super::give_back_session as give_back;
 use crate::buses::novobus::explore::{CaseScope, RingScope, RingSetup, Spice};
 use crate::buses::novobus::language::run::over_bus::start_anew;
 use crate::buses::novobus::rig::wrong_parity;

@@ -1,10 +1,13 @@
 //! Rings that a session holds.
 
 use super::rig::OpenBench;
+use crate::bus::Bus;
 use crate::buses::novobus::gate::GuardsRings as _;
 use crate::buses::novobus::language::plan::{Plan, PlannedStep, RingAct};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::run::now::{Now, now};
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::rig::shared::Shared;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::buses::novobus::rig::{Run, Session};
 use crate::command::drive::DriveCommand;
@@ -13,9 +16,14 @@ use crate::command::failure::Failure;
 use crate::command::held::{HeldBench, HeldRecord, record_from_now};
 use crate::command::output::Output;
 use crate::command::rig_name::Use;
-use crate::library::Entry;
 use crate::link::{Line, Link, Moment, PlacedFault, Trouble};
-use crate::rig::{End, PlayedScenario, Rig, SessionError, Shared, UseOptions};
+use crate::rig::End;
+use crate::rig::PlayedScenario;
+use crate::rig::Rig;
+use crate::rig::SessionError;
+use crate::rig::UseOptions;
+use crate::scenario::files;
+use crate::scenario::parse;
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::{PlannedAction, plan_step};
 use crate::scenario::source::Source;
@@ -159,14 +167,15 @@ impl HeldBench for HeldRings {
 
     fn play(&mut self, source: &Source) -> Result<PlayedScenario, Failure> {
         let size = self.plan.rings.first().map(|ring| ring.drives());
-        let entry = Entry::fitting(source.clone(), size);
-        let entry = entry.map_err(|problems| Failure::refused(problems.lines()))?;
-        let Some(plan) = &entry.plan else {
+        if parse::bus(source) != Bus::DEFAULT {
             return Err(Failure::refused(format!(
                 "{}: the scenario is for another bus",
-                entry.short_name()
+                files::last(&source.name)
             )));
-        };
+        }
+        let entry = RingScenario::fitting(source.clone(), size);
+        let entry = entry.map_err(|problems| Failure::refused(problems.lines()))?;
+        let plan = &entry.plan;
         self.apart(|session| {
             let played = Run::new(session)?.play(plan, None);
             // What is written between scenarios is meant to stay.

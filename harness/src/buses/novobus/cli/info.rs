@@ -11,7 +11,7 @@ use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::output::columns;
-use crate::command::play::progress_bar;
+use crate::command::progress::progress_bar;
 use crate::command::rig_name::Use;
 use crate::counted::counted;
 use harness_proto::nd21::units::{Date, Scale, Value};

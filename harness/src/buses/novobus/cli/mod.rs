@@ -18,7 +18,7 @@ pub(crate) mod rig_check;
 mod scope;
 pub(crate) mod shrink;
 mod signal;
-mod sim;
+pub(crate) mod sim;
 mod top;
 mod top_page;
 mod watch;
@@ -61,10 +61,9 @@ fn perform(command: &DriveCommand, output: &mut Output) -> Result<Exit, Failure>
         DriveCommand::Reset(arguments) => control::reset(arguments, output),
         DriveCommand::DeleteError(arguments) => control::delete_error(arguments, output),
         DriveCommand::Recover(arguments) => recover::recover(arguments, output),
-        DriveCommand::Cyclic(_) => Err(Failure::refused(
+        DriveCommand::Cyclic(_) | DriveCommand::Sim(_) => Err(Failure::refused(
             "this command is for slaves with a cyclic master, such as --rig sim:nordac; on a ring there are go, stop, block and delete-error",
         )),
-        DriveCommand::Sim(arguments) => sim::sim(arguments, output),
     }
 }
 

@@ -1,6 +1,5 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
-use crate::buses::find_rig_in;
 use crate::buses::novobus::cli::fuzz::simulated;
 use crate::buses::novobus::explore::masters;
 use crate::buses::novobus::explore::{
@@ -12,12 +11,15 @@ use crate::command::output::Output;
 use crate::counted::counted;
 use crate::explore::Planted;
 use crate::explore::{Bounds, ExploreError, Progress, Watcher};
+use crate::rig::buses::RigBuses;
+use crate::rig::find;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
 use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 
 const FOUND_BY_SCENARIOS: &str = include_str!("../../../../../corpora/deviations.toml");
 
@@ -130,7 +132,11 @@ impl<'a> Table<'a> {
 }
 
 /// Shows the tables.
-pub(crate) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn power(
+    arguments: &PowerArguments,
+    buses: &'static RigBuses,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let filter = arguments.filter.as_deref().unwrap_or_default();
     let wanted: Vec<_> = deviations()
         .filter(|own| own.name.contains(filter))
@@ -150,7 +156,7 @@ pub(crate) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io:
         let head = "drives: cases until found: median of the seeds (least, most), and by which means a scenario finds it";
         let mut table = Table::begin(arguments, head, output)?;
         for deviation in wanted {
-            let counts = match counts(deviation, arguments) {
+            let counts = match counts(deviation, arguments, buses) {
                 Ok(counts) => counts,
                 Err(error) => return Ok(tell(&error, output)),
             };
@@ -190,8 +196,9 @@ pub(crate) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io:
 fn counts(
     deviation: &Deviation,
     arguments: &PowerArguments,
+    buses: &'static RigBuses,
 ) -> Result<Vec<Option<u64>>, ExploreError> {
-    let rig = find_rig_in(&format!("sim:{DRIVES}"), std::path::Path::new(""))
+    let rig = find(&format!("sim:{DRIVES}"), Path::new(""), buses)
         .map_err(|error| ExploreError::Usage(error.to_string()))?;
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {

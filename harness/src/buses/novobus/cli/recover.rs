@@ -16,12 +16,13 @@ use serde_json::json;
 
 /// Recovers every ring of a bench.
 pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let Some(RigName::Named(name)) = &arguments.rig.rig else {
-        let (plan, mut link) = rig::link(&arguments.rig, output)?;
+    let Some(RigName::Named(_)) = &arguments.rig.rig else {
+        let sizes = arguments.rig.rig.as_ref().and_then(RigName::sizes);
+        let (plan, mut link) = rig::link(&arguments.rig, sizes)?;
         return show(arguments, &every(&mut link, plan.rings.len()), output);
     };
-    let rig = rig::named(name, &arguments.rig, output)?;
-    let mut session = rig::take(&rig, &arguments.rig, Use::look("recover"), true)?;
+    let rig = rig::named(&arguments.rig)?;
+    let mut session = rig::take(rig, &arguments.rig, Use::look("recover"), true)?;
     let rings = session.rings().len();
     let before = session.opening().cloned();
     let mut found = every(session.link(), rings);

@@ -2,25 +2,27 @@
 //! file or name, is taken and given back as by `run --rig`.
 
 use super::axes;
-use crate::buses::find_rig;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options, Width};
 use crate::buses::novobus::drives;
 use crate::buses::novobus::language::parse::header::parse_setup;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::link::SimulatedLink;
 use crate::buses::novobus::rig::Session;
+use crate::buses::novobus::rig::shared::Shared;
 use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::novobus::simulate;
 use crate::command::drive::RigArguments;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
-use crate::command::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
+use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
 use crate::command::rig_name::{RigName, Use};
 use crate::counted::counted;
 use crate::link::{Line, Link};
 use crate::medium::{Heard, Medium, Out};
-use crate::rig::{self, End, Rig, Shared};
+use crate::rig;
+use crate::rig::End;
+use crate::rig::Rig;
+use crate::rig::buses::RigBuses;
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use harness_proto::nd21::ram;
@@ -224,8 +226,9 @@ pub(crate) fn on_after(
     if let Some(bench) = arguments.held.as_ref().and_then(|held| held.downcast_ref()) {
         return act(bench, output);
     }
-    let Some(RigName::Named(name)) = &arguments.rig else {
-        let (plan, link) = link(arguments, output)?;
+    let Some(RigName::Named(_)) = &arguments.rig else {
+        let sizes = arguments.rig.as_ref().and_then(RigName::sizes);
+        let (plan, link) = link(arguments, sizes)?;
         let created = CreatedRings(Arc::new(Mutex::new(link)));
         let line = Box::new(created.clone());
         let bus = OpenRings::open(line, &plan.rings, Options::default())?;
@@ -233,9 +236,9 @@ pub(crate) fn on_after(
         let place = BenchPlace::Created(created);
         return act(&OpenBench { bus, plan, place }, output);
     };
-    let rig = named(name, arguments, output)?;
+    let rig = named(arguments)?;
     let plan = rig.plan()?;
-    let mut session = take(&rig, arguments, as_what, false)?;
+    let mut session = take(rig, arguments, as_what, false)?;
     let done = first(&mut session, output);
     let sizes = session.rings().to_vec();
     let shared = Shared::new(session);
@@ -273,18 +276,32 @@ pub(crate) fn take(
     Session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
 }
 
-/// The rig of this name.
-pub(crate) fn named(
-    name: &str,
-    arguments: &RigArguments,
-    output: &mut Output,
-) -> Result<Rig, Failure> {
-    if arguments.setup.is_some() {
-        return Err(Failure::refused(
+/// The rig that has been found for a command.
+pub(crate) fn named(arguments: &RigArguments) -> Result<&Rig, Failure> {
+    without_setup(arguments)?;
+    arguments.found.as_deref().ok_or(Failure::Told(Exit::Usage))
+}
+
+/// Refuses a setup beside the name of a rig.
+pub(crate) fn without_setup(arguments: &RigArguments) -> Result<(), Failure> {
+    match arguments.setup {
+        Some(_) => Err(Failure::refused(
             "--setup is for sim:N; what stands in a rig's file is set up by its [sim] setup",
-        ));
+        )),
+        None => Ok(()),
     }
-    find_rig(name, output).ok_or(Failure::Told(Exit::Usage))
+}
+
+/// Finds the rig of this name, for a command that serves rings only; reports what is wrong with it.
+pub(crate) fn find_rig(name: &str, buses: &'static RigBuses, output: &mut Output) -> Option<Rig> {
+    let rig = find_any_rig(name, buses, output)?;
+    match rig.of_rings() {
+        Ok(()) => Some(rig),
+        Err(error) => {
+            output.complain(&error.to_string());
+            None
+        }
+    }
 }
 
 /// Gives a rig back and reports its state.
@@ -329,24 +346,14 @@ pub(crate) fn give_back_session(
     (end, exit)
 }
 
-/// The simulated drives of a bench, with nothing sent to them. A rig with ports is represented by its simulated model.
+/// Simulated drives, with nothing sent to them, on rings of these sizes where they are given.
 pub(crate) fn link(
     arguments: &RigArguments,
-    output: &mut Output,
+    given: Option<&[u8]>,
 ) -> Result<(Plan, SimulatedLink), Failure> {
-    let given = match &arguments.rig {
-        Some(RigName::Named(name)) => {
-            let plan = named(name, arguments, output)?.plan()?;
-            let mut link = simulate::bench(&plan);
-            link.stop_recording();
-            return Ok((plan, link));
-        }
-        Some(RigName::Simulated(sizes)) => Some(sizes),
-        None => None,
-    };
     let source = match (&arguments.setup, given) {
         (Some(path), _) => read(path)?,
-        (None, sizes) => drives::released_header(sizes.map_or(&[3], Vec::as_slice)),
+        (None, sizes) => drives::released_header(sizes.unwrap_or(&[3])),
     };
     if let Some(sizes) = given {
         let stated = parse_setup(&source, sizes)?.header.rings.len();
@@ -359,7 +366,7 @@ pub(crate) fn link(
             )));
         }
     }
-    Ok(drives::simulated(&source, given.map(Vec::as_slice))?)
+    Ok(drives::simulated(&source, given)?)
 }
 
 fn read(path: &Path) -> Result<Source, Failure> {

@@ -7,7 +7,7 @@ use crate::command::args::ListFormat;
 use crate::command::exit::Exit;
 use crate::command::failure::exit_of_trouble;
 use crate::command::output::Output;
-use crate::command::play::progress_bar;
+use crate::command::progress::progress_bar;
 use crate::command::rig_failure::{alarm, exit_of, tell_end};
 use crate::counted::counted;
 use crate::rig::{Rig, UseOptions};

@@ -1,6 +1,6 @@
 //! `drivebench shrink` for a finding on rings.
 
-use crate::buses::find_rig;
+use super::rig::find_rig;
 use crate::buses::novobus::cli::fuzz::{on_ports, scope, sizes};
 use crate::buses::novobus::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::buses::novobus::explore::{Case, Difference, Finding, OnRig, OnSim, RingSetup};
@@ -13,11 +13,16 @@ use crate::counted::counted;
 use crate::explore::Planted;
 use crate::explore::{ExploreError, Target};
 use crate::rig::UseOptions;
+use crate::rig::buses::RigBuses;
 use harness_sim::novobus::deviation::deviations;
 use std::path::Path;
 
 /// Makes a finding small, and writes what came of it beside it.
-pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn shrink(
+    arguments: &ShrinkArguments,
+    buses: &'static RigBuses,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let (finding, path) = match Finding::read_as(&arguments.finding) {
         Ok(read) => read,
         Err(error) => return Ok(tell(&error, output)),
@@ -41,7 +46,7 @@ pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::i
         ));
         return Ok(Exit::Usage);
     };
-    let Some(rig) = find_rig(name, output) else {
+    let Some(rig) = find_rig(name, buses, output) else {
         return Ok(Exit::Usage);
     };
     if rig.is_simulated() || sizes(&rig) != finding.case.sizes() {

@@ -1,15 +1,15 @@
 //! `drivebench sim`: simulated rings for anyone's master.
 
 use super::rig;
-use crate::bus::Bus;
+use crate::buses::novobus::rig::sim::RigOfRings as _;
 use crate::buses::novobus::serve::Server;
-use crate::buses::{self};
+use crate::buses::novobus::simulate::bench;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::rig_name::RigName;
 use crate::command::sim::{SimArguments, SimSpeed};
-use crate::medium::ErrorMarks;
-use crate::scenario::source::Source;
+use crate::rig::buses::RigBuses;
 use crate::serve::{
     ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, serve,
 };
@@ -61,32 +61,6 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
     Ok(all)
 }
 
-/// Serves simulated drives.
-pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let only_page = arguments.tcp.is_empty()
-        && arguments.pty.is_empty()
-        && arguments.frames.places().is_empty();
-    if arguments.once && only_page {
-        return Err(Failure::refused(
-            "--once ends when the last client has gone, and a page alone has no clients: --tcp, --pty or another place expected, or --for",
-        ));
-    }
-    let end = match arguments.frames.bus {
-        Bus::Novobus => rings(arguments, output)?,
-        bus if bus.shares_octets() => octets(bus, arguments, output)?,
-        bus => frames(bus, arguments, output)?,
-    };
-    let end = end.map_err(|error| match error {
-        ServeError::Output(error) => Failure::Output(error),
-        ServeError::Wait(_) => Failure::Said(Exit::RigError, error.to_string()),
-        error => Failure::refused(error.to_string()),
-    })?;
-    Ok(match end {
-        ServeEnd::Interrupted => Exit::Interrupted,
-        ServeEnd::TimeOver | ServeEnd::ClientsGone => Exit::Passed,
-    })
-}
-
 /// Where lines of control come from.
 fn control(arguments: &SimArguments) -> Option<ControlPlace> {
     arguments.control.as_deref().map(|place| match place {
@@ -95,25 +69,8 @@ fn control(arguments: &SimArguments) -> Option<ControlPlace> {
     })
 }
 
-/// Options that a bus does not have, and what it has instead.
-fn refuse(bus: Bus, given: &[(&str, bool)], expected: &str) -> Result<(), Failure> {
-    match given.iter().find(|(_, given)| *given) {
-        Some((option, _)) => Err(Failure::refused(format!(
-            "{option} is not for the bus {}; {expected} expected",
-            bus.name()
-        ))),
-        None => Ok(()),
-    }
-}
-
-/// The header of `--setup`.
-fn header(arguments: &SimArguments) -> Result<Option<Source>, Failure> {
-    let header = arguments.rig.setup.as_deref().map(Source::read).transpose();
-    header.map_err(|error| Failure::File(error.into()))
-}
-
 /// Where `masters` are served: nowhere, if only a live page is asked for.
-fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
+pub(crate) fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
     let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
     let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
     let only_page = arguments.tcp.is_empty() && arguments.pty.is_empty();
@@ -121,36 +78,8 @@ fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = Serv
     tcp.chain(pty).chain(nowhere.into_iter().flatten())
 }
 
-/// Serves the drives of a shared line of octets: every place is a master's.
-fn octets(
-    bus: Bus,
-    arguments: &SimArguments,
-    output: &mut Output,
-) -> Result<Result<ServeEnd, ServeError>, Failure> {
-    let others = [
-        ("--tap", !arguments.tap.is_empty()),
-        ("--cut", !arguments.cut.is_empty()),
-        ("--pace", arguments.pace != SimSpeed::Line),
-        ("--drives", arguments.frames.drives.is_some()),
-        (
-            "--slcan and --socketcand",
-            !arguments.frames.places().is_empty(),
-        ),
-        ("--rig", arguments.rig.rig.is_some()),
-    ];
-    refuse(
-        bus,
-        &others,
-        "--tcp or --pty, a place for each master, and --slaves",
-    )?;
-    let options = options(arguments, places(arguments, 1).collect());
-    let header = header(arguments)?;
-    let slaves = (arguments.frames.slaves.as_deref(), header.as_ref());
-    buses::serve_octets(bus, slaves, arguments.marks, &options, output).map_err(Failure::from)
-}
-
 /// What the arguments say of serving at these places.
-fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
+pub(crate) fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
     ServeOptions {
         places,
         control: control(arguments),
@@ -161,36 +90,10 @@ fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
     }
 }
 
-/// Serves the drives of a bus of frames.
-fn frames(
-    bus: Bus,
-    arguments: &SimArguments,
-    output: &mut Output,
-) -> Result<Result<ServeEnd, ServeError>, Failure> {
-    let rings = [
-        ("--tcp", !arguments.tcp.is_empty()),
-        ("--pty", !arguments.pty.is_empty()),
-        ("--tap", !arguments.tap.is_empty()),
-        ("--cut", !arguments.cut.is_empty()),
-        ("--pace", arguments.pace != SimSpeed::Line),
-        ("--marks", arguments.marks != ErrorMarks::None),
-        ("--slaves", arguments.frames.slaves.is_some()),
-        ("--rig", arguments.rig.rig.is_some()),
-    ];
-    refuse(
-        bus,
-        &rings,
-        "--slcan, --slcan-pty or --socketcand, and --drives",
-    )?;
-    let options = options(arguments, arguments.frames.places());
-    let header = header(arguments)?;
-    let drives = (arguments.frames.drives, header.as_ref());
-    Ok(buses::serve_frames(bus, drives, &options, output)?)
-}
-
 /// Serves the rings of a simulated bench.
-fn rings(
+pub(crate) fn rings(
     arguments: &SimArguments,
+    buses: &'static RigBuses,
     output: &mut Output,
 ) -> Result<Result<ServeEnd, ServeError>, Failure> {
     if !arguments.frames.places().is_empty() {
@@ -203,7 +106,17 @@ fn rings(
             "--slaves are those of a PROFIBUS segment; --bus nordac expected with it",
         ));
     }
-    let (plan, link) = rig::link(&arguments.rig, output)?;
+    let (plan, link) = match &arguments.rig.rig {
+        Some(RigName::Named(name)) => {
+            rig::without_setup(&arguments.rig)?;
+            let rig = rig::find_rig(name, buses, output).ok_or(Failure::Told(Exit::Usage))?;
+            let plan = rig.plan()?;
+            let mut link = bench(&plan);
+            link.stop_recording();
+            (plan, link)
+        }
+        sizes => rig::link(&arguments.rig, sizes.as_ref().and_then(RigName::sizes))?,
+    };
     let pace = match arguments.pace {
         SimSpeed::Line => Pace::Line,
         SimSpeed::Free => Pace::Free,

@@ -7,14 +7,16 @@ use crate::buses::novobus::explore::Case;
 use crate::buses::novobus::explore::Finding;
 use crate::buses::novobus::explore::play;
 use crate::buses::novobus::explore::{KeptRun, LogLine};
-use crate::buses::novobus::report::html::{ScenarioView, ShownScenario, section};
+use crate::buses::novobus::language::read::RingScenario;
+use crate::buses::novobus::report::html::ScenarioView;
+use crate::buses::novobus::report::html::ShownScenario;
+use crate::buses::novobus::report::html::section;
 use crate::buses::novobus::simulate::simulated;
 use crate::explore::ExploreError;
 use crate::explore::read_as;
-use crate::library::Entry;
 use crate::link::Link;
 use crate::scenario::problem::TextSpan;
-use crate::scenario::run::{self, AtMismatch, Outcome, Skip};
+use crate::scenario::run::{self, AtMismatch, Outcome};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
@@ -174,14 +176,8 @@ fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>)
         name: "the ring under test".to_owned(),
         text: text.as_str().into(),
     };
-    let entry = Entry::new(source, None)?;
-    let Some(plan) = &entry.plan else {
-        return Ok((
-            text,
-            Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
-            Vec::new(),
-        ));
-    };
+    let entry = RingScenario::new(source, None)?;
+    let plan = &entry.plan;
     let mut link = simulated(plan);
     let outcome = run::play(plan, &mut link, AtMismatch::GoOn);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();

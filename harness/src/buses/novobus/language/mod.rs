@@ -3,6 +3,7 @@
 pub mod argument;
 pub(crate) mod parse;
 pub mod plan;
+pub mod read;
 pub mod run;
 pub(crate) mod scale;
 pub mod syntax;

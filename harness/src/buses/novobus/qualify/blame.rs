@@ -8,8 +8,8 @@ use super::diagnose::{Named, Whose, proven};
 use super::exchange::{Sent, begin};
 use super::pinned::Pinned;
 use crate::buses::novobus::calm::calm;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Symptom};
-use crate::library::Entry;
 use crate::scenario::source::Source;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -171,7 +171,7 @@ const MOST_TRIED: usize = 3;
 const MOST_EXCHANGED: u8 = 8;
 
 /// Plays a scenario and returns the owner of the byte that differed from the model, if one did; `None` if the run shows nothing.
-type Ask<'a, E> = &'a mut dyn FnMut(&Entry) -> Result<Option<Option<Meant>>, E>;
+type Ask<'a, E> = &'a mut dyn FnMut(&RingScenario) -> Result<Option<Option<Meant>>, E>;
 
 /// Plays differing attempts again with exchanged roles, the clearest and shortest first. Each sighting has the name of its scenario. `ask`
 /// plays a scenario.
@@ -207,7 +207,7 @@ pub fn exchange<E>(
                 name: format!("{}{name}-by-{step}", super::EXCHANGED),
                 text: text.into(),
             };
-            let Ok(entry) = Entry::new(source, Some(drives)) else {
+            let Ok(entry) = RingScenario::new(source, Some(drives)) else {
                 break;
             };
             let Some(found) = ask(&entry)? else { break };

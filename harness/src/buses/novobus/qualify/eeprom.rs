@@ -1,9 +1,9 @@
 //! A march over the EEPROM of each drive (ND21 14.10.5): every cell is written with the complement of what it holds, read, and written with
 //! the old value again. What a cell holds is read first, so the scenarios depend on the drive. Then `ProgParam` is to copy the parameters.
 
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::section::EEPROM;
 use crate::buses::novobus::twin::Conversation;
-use crate::library::Entry;
 use crate::scenario::source::Source;
 use harness_proto::nd21::{EE_PARAMETERS, PARAMETERS, ram};
 use harness_proto::novobus::address::RingSize;
@@ -34,7 +34,7 @@ const CELLS_A_LINE: usize = 8;
 
 /// The scenarios that read all cells, one for each drive.
 #[must_use]
-pub fn dumps(drives: u8) -> Vec<(u8, Entry)> {
+pub fn dumps(drives: u8) -> Vec<(u8, RingScenario)> {
     let of = |drive: u8| {
         let mut text = header("read every cell that is tested later", drives);
         let cells: Vec<u8> = GROUPS.into_iter().flat_map(|(_, cells)| cells).collect();
@@ -53,7 +53,7 @@ pub fn dumps(drives: u8) -> Vec<(u8, Entry)> {
 
 /// The scenarios that write the cells of a drive, where the played [`dumps`] have read all of them.
 #[must_use]
-pub fn marches(drives: u8, drive: u8, read: &[Conversation]) -> Vec<Entry> {
+pub fn marches(drives: u8, drive: u8, read: &[Conversation]) -> Vec<RingScenario> {
     let held = values(drives, drive, read);
     let of = |(group, cells): (&str, RangeInclusive<u8>)| {
         let mut text = header(&format!("write the {group} and read them back"), drives);
@@ -110,12 +110,12 @@ fn header(title: &str, drives: u8) -> String {
     )
 }
 
-fn entry(what: &str, drives: u8, drive: u8, text: String) -> Option<Entry> {
+fn entry(what: &str, drives: u8, drive: u8, text: String) -> Option<RingScenario> {
     let source = Source {
         name: format!("{}{what}-drive-{drive}", super::EEPROM_TRIAL),
         text: text.into(),
     };
-    Entry::new(source, Some(drives)).ok()
+    RingScenario::new(source, Some(drives)).ok()
 }
 
 /// What cells hold, by the answers to the master's reads.

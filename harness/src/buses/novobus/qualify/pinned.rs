@@ -4,8 +4,8 @@
 
 use super::blame::Sighting;
 use crate::buses::novobus::language::plan::Exchange;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::twin::Conversation;
-use crate::library::Entry;
 use crate::scenario::source::Source;
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::command::Command;
@@ -82,7 +82,7 @@ pub struct Question<'s> {
     sighting: &'s Sighting,
     drives: u8,
     /// The scenario.
-    pub entry: Entry,
+    pub entry: RingScenario,
 }
 
 /// The questions about sightings on a ring of `drives`, each sighting with the name of its scenario; those with the fewest bytes first.
@@ -120,7 +120,7 @@ pub fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Question<'
             name: format!("{}{}-{name}", super::ASKED, kind.word()),
             text: text.into(),
         });
-        let entry = source.and_then(|source| Entry::new(source, Some(drives)).ok());
+        let entry = source.and_then(|source| RingScenario::new(source, Some(drives)).ok());
         questions.extend(entry.map(|entry| Question {
             kind,
             sighting,

@@ -2,9 +2,9 @@
 
 use super::hypothesis::Hypothesis;
 use crate::buses::novobus::language::plan::Exchange;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
 use crate::buses::novobus::twin::DecidingBits;
-use crate::library::Entry;
 use crate::link::link_name;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
@@ -61,9 +61,9 @@ pub struct Probe {
     /// What is assumed of the drive.
     pub assumed: Header,
     /// The conversations.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<RingScenario>,
     /// The conversation in place of them for a drive that is silent while it tests itself (property `self-test-bus`): it cannot be polled.
-    pub of_silent: Option<Entry>,
+    pub of_silent: Option<RingScenario>,
 }
 
 impl Probe {
@@ -214,7 +214,7 @@ fn released(drive: u8) -> Setup {
     Setup::new(DriveRange::one(0, drive), SetupKind::Influence(inputs))
 }
 
-fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
+fn probe(name: &str, text: &str, drives: u8) -> Result<RingScenario, Box<Problems>> {
     let mut text = text.to_owned();
     for (stands, data) in MONITORING {
         if text.contains(stands) {
@@ -225,7 +225,7 @@ fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
         name: format!("probe-{name}"),
         text: text.into(),
     };
-    Entry::new(source, Some(drives))
+    RingScenario::new(source, Some(drives))
 }
 
 /// The telegrams that write a byte to a cell of every drive (9.1, 10.2), the first drive behind the master first, as a scenario has bytes.
@@ -252,7 +252,7 @@ const RECEIVER: &str = "{receiver}";
 pub fn conversations(
     drives: u8,
     reaches: &dyn Fn(usize) -> bool,
-) -> Result<Vec<Entry>, Box<Problems>> {
+) -> Result<Vec<RingScenario>, Box<Problems>> {
     let mut files: Vec<_> = CONVERSATIONS.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let named = files.into_iter().filter_map(|file| {
@@ -297,11 +297,11 @@ pub fn conversations(
 }
 
 /// A scenario on a ring of `drives`; `None` where it is for smaller rings.
-fn entry_for(source: Source, drives: u8) -> Result<Option<Entry>, Box<Problems>> {
-    match Entry::new(source.clone(), Some(drives)) {
+fn entry_for(source: Source, drives: u8) -> Result<Option<RingScenario>, Box<Problems>> {
+    match RingScenario::new(source.clone(), Some(drives)) {
         Ok(entry) => Ok(Some(entry)),
         // Without a size it is planned for its default.
-        Err(problems) => match Entry::new(source, None) {
+        Err(problems) => match RingScenario::new(source, None) {
             Ok(_) => Ok(None),
             Err(_) => Err(problems),
         },
@@ -312,7 +312,7 @@ fn entry_for(source: Source, drives: u8) -> Result<Option<Entry>, Box<Problems>>
 ///
 /// # Errors
 /// One of them has mistakes.
-pub fn thorough(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
+pub fn thorough(drives: u8) -> Result<Vec<RingScenario>, Box<Problems>> {
     let mut files: Vec<_> = THOROUGH.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let entries = files.into_iter().filter_map(|file| {

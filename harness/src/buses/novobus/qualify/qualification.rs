@@ -11,11 +11,11 @@ use super::parts::{Asking, Parts};
 use super::pinned::questions;
 use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
 use super::settle::{Answer, answer, silence};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::rig::OnRings;
 use crate::buses::novobus::rig::Run;
 use crate::buses::novobus::twin::{Exactness, SILENCED, Twin};
-use crate::library::Entry;
 use crate::link::{Link as _, Octets as _};
 use crate::rig::segment::Qualified;
 use crate::rig::{Attempt, PlayedScenario, Profile, Rig};
@@ -42,7 +42,7 @@ pub(crate) trait QualifiedBench {
     ///
     /// # Errors
     /// Nothing more can be played.
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, Self::Stop>;
+    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, Self::Stop>;
 
     /// Whether nothing more may be played.
     fn over(&mut self) -> bool;
@@ -76,7 +76,7 @@ pub(crate) trait QualifiedBench {
     ///
     /// # Errors
     /// It cannot be written.
-    fn show(&mut self, entry: &Entry, played: &PlayedScenario) -> Result<(), Self::Stop>;
+    fn show(&mut self, entry: &RingScenario, played: &PlayedScenario) -> Result<(), Self::Stop>;
 }
 
 /// What is known of a qualification before anything is played.
@@ -275,7 +275,7 @@ impl Qualification {
     fn compare<B: QualifiedBench>(
         &mut self,
         bench: &mut B,
-        entry: &Entry,
+        entry: &RingScenario,
     ) -> Result<Option<PlayedScenario>, B::Stop> {
         let played = bench.play(entry)?;
         bench.show(entry, &played)?;
@@ -297,7 +297,7 @@ impl Qualification {
         &mut self,
         bench: &mut B,
         drive: u8,
-        read: &Entry,
+        read: &RingScenario,
     ) -> Result<bool, B::Stop> {
         let Some(played) = self.compare(bench, read)? else {
             return Ok(true);
@@ -341,7 +341,7 @@ impl Qualification {
             return Ok(());
         }
         let sightings = self.findings.sightings().to_vec();
-        let trials = exchange(self.drives, sightings, &mut |entry: &Entry| {
+        let trials = exchange(self.drives, sightings, &mut |entry: &RingScenario| {
             if bench.over() {
                 return Ok(None);
             }
@@ -577,7 +577,7 @@ impl Qualification {
         &mut self,
         bench: &mut B,
         (property, drive): (&str, u8),
-        entry: &Entry,
+        entry: &RingScenario,
     ) -> Result<Result<Answer, String>, B::Stop> {
         let played = bench.play(entry)?;
         let Some(attempt) = played.last_played().and_then(Attempt::sound) else {

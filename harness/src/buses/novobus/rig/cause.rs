@@ -455,7 +455,7 @@ mod tests {
     fn a_ring_that_counts_up_lacks_marks() {
         let of = |port: &str, byte: u8| {
             let text = format!("schema = 1\n[rig]\nid = \"x\"\n[ring.1]\ndrives = 3\n{port}\n");
-            let rig = crate::buses::parse_rig(&source("x.toml", text)).expect("a rig");
+            let rig = crate::buses::novobus::rig::parse(&source("x.toml", text)).expect("a rig");
             let ring = rig.file.rings().next().expect("a ring").clone();
             let pass = || vec![Received::good(byte); SENT];
             of_marks(&ring, &heard(pass(), pass()))
@@ -474,7 +474,7 @@ mod tests {
         let rig = |ring: &str, more: &str| {
             let text =
                 format!("schema = 1\n[rig]\nid = \"x\"\n[ring.1]\ndrives = 3\n{ring}\n{more}");
-            crate::buses::parse_rig(&source("x.toml", text)).expect("a rig")
+            crate::buses::novobus::rig::parse(&source("x.toml", text)).expect("a rig")
         };
         let tcp = "transport = \"tcp\"\nport = \"127.0.0.1:4021\"";
         let found = neighbours(&rig(tcp, "[hooks.before]\ncommand = [\"true\"]\n"));

@@ -1,6 +1,8 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::line_test::{self, RingPace};
+use super::open::stated_rate;
+use super::shared::Shared;
 pub use super::wrong_parity::WrongParity;
 use super::wrong_parity::try_wrong_parity;
 use crate::buses::novobus::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut, State};
@@ -8,8 +10,6 @@ use crate::buses::novobus::rig::Session;
 use crate::link::{Line as _, Octets};
 use crate::rig::End;
 use crate::rig::Rig;
-use crate::rig::shared::Shared;
-use crate::rig::stated_rate;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;

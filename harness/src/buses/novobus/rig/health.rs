@@ -207,10 +207,10 @@ mod tests {
     use super::*;
     use crate::buses::novobus::driver::{OpenRings, Options, SpellingCause};
     use crate::buses::novobus::gate::guard_rings;
+    use crate::buses::novobus::language::read::RingScenario;
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::buses::novobus::link::SimulatedLink;
     use crate::buses::novobus::simulate;
-    use crate::library::Entry;
     use crate::link::{Line, LinkFault, Moment, PlacedFault};
     use crate::medium::{Heard, Medium, Out};
     use crate::scenario::source::Source;
@@ -223,8 +223,8 @@ mod tests {
     fn monitoring(drives: u8, monitor: &str) -> SimulatedLink {
         let text = format!("title t\nring {drives}\ndrive {monitor} eeprom 47 = 80\n> 80\n");
         let source = Source::from_bytes("ring.scn".to_owned(), text.into_bytes()).expect("a text");
-        let entry = Entry::new(source, None).expect("a scenario");
-        let mut link = simulate::bench(&entry.plan.expect("a plan"));
+        let entry = RingScenario::new(source, None).expect("a scenario");
+        let mut link = simulate::bench(&entry.plan);
         link.run_until(link.now() + Span::from_millis(300));
         link
     }

@@ -203,9 +203,9 @@ impl Entry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::novobus::language::read::RingScenario;
+    use crate::buses::novobus::rig::parse;
     use crate::buses::novobus::simulate::bench;
-    use crate::buses::parse_rig as parse;
-    use crate::library::Entry;
     use crate::link::{DriveFault, Link as _, Moment, PlacedFault};
     use crate::scenario::source::Source;
 
@@ -225,8 +225,10 @@ mod tests {
         );
         let mut interlocks = Interlocks::of(&parse(&rig).expect("a rig")).expect("one of them");
         let ring = "title x\nring 2\ndrive 0..last model nd21\n> 80\n";
-        let plan = Entry::new(source(ring), None).expect("no mistakes").plan;
-        let mut link = bench(&plan.expect("novobus"));
+        let plan = RingScenario::new(source(ring), None)
+            .expect("no mistakes")
+            .plan;
+        let mut link = bench(&plan);
         assert_eq!(interlocks.look_at_all(&mut link), Ok(()));
         link.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
         assert_eq!(interlocks.look(link.now(), &mut link), Ok(()));

@@ -1,8 +1,8 @@
 //! Every built-in scenario that a rig of ports can play, on drives that are right and not as the model.
 
 use super::{judged_on, link_of};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::rig::run::Way;
-use crate::library::Entry;
 use crate::link::{Capability, LinkEvent, Recording};
 use crate::scenario::files::sources;
 use crate::scenario::run::lacks;
@@ -92,7 +92,7 @@ fn right_drives(share: usize) -> (usize, BTreeSet<&'static str>) {
     let sources = sources(&[]).expect("built-in scenarios");
     for (place, source) in sources.into_iter().enumerate() {
         let name = source.name.clone();
-        let Some(plan) = Entry::new(source, None).ok().and_then(|entry| entry.plan) else {
+        let Ok(RingScenario { plan, .. }) = RingScenario::new(source, None) else {
             continue;
         };
         let [size] = plan.rings[..] else { continue };

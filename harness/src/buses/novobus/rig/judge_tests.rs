@@ -5,12 +5,14 @@ mod right;
 
 use super::{AttemptFacts, judge, known};
 use crate::buses::novobus::language::plan::Plan;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::link::SimulatedLink;
-use crate::buses::novobus::rig::run::{Way, play_one, twin};
+use crate::buses::novobus::rig::parse;
+use crate::buses::novobus::rig::run::Way;
+use crate::buses::novobus::rig::run::play_one;
+use crate::buses::novobus::rig::run::twin;
 use crate::buses::novobus::simulate::bench;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
-use crate::buses::parse_rig as parse;
-use crate::library::Entry;
 use crate::link::{Link, LinkEvent, Octets, Recording};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
@@ -44,8 +46,8 @@ fn source(text: String) -> Source {
 }
 
 pub(super) fn plan(text: String) -> Plan {
-    let entry = Entry::new(source(text), None).expect("no mistakes");
-    entry.plan.expect("novobus")
+    let entry = RingScenario::new(source(text), None).expect("no mistakes");
+    entry.plan
 }
 
 /// A ring of three with these header lines.

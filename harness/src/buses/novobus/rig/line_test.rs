@@ -184,8 +184,8 @@ pub(super) fn pace_of(pass: &Pass, stated: Rate) -> RingPace {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::buses::novobus::language::read::RingScenario;
     use crate::buses::novobus::simulate;
-    use crate::library::Entry;
     use crate::scenario::source::Source;
 
     fn source(name: &str, text: String) -> Source {
@@ -195,8 +195,8 @@ pub(super) mod tests {
     /// A simulated ring of three drives at a rate.
     pub(in super::super) fn ring(line: &str) -> crate::buses::novobus::link::SimulatedLink {
         let text = format!("title t\nring 3\nline {line}\n> 80\n");
-        let entry = Entry::new(source("ring.scn", text), None).expect("a scenario");
-        simulate::bench(&entry.plan.expect("a plan"))
+        let entry = RingScenario::new(source("ring.scn", text), None).expect("a scenario");
+        simulate::bench(&entry.plan)
     }
 
     #[test]

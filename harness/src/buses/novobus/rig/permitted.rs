@@ -33,7 +33,7 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
 #[cfg(test)]
 mod tests {
     use super::limits;
-    use crate::buses::parse_rig as parse;
+    use crate::buses::novobus::rig::parse;
     use crate::scenario::source::Source;
 
     /// The guard judges bytes to all drives alike: by the lowest speed of the file, and without motion if one motor must not turn.

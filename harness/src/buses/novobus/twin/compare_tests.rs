@@ -16,10 +16,10 @@ fn what_changes_by_itself_is_not_compared() {
         name: "test".to_owned(),
         text: text.to_owned().into(),
     };
-    let plan = crate::library::Entry::new(source, None)
+    let plan = crate::buses::novobus::language::read::RingScenario::new(source, None)
         .expect("no mistakes")
         .plan;
-    let mut link = bench(&plan.expect("novobus"));
+    let mut link = bench(&plan);
     // 9.3, 10.2: nsoll of drive 0 becomes 0400.
     let turn = [0x8C, 0xFF, 0x63, 0x00, 0x04, 0x08, 0xFF, 0x6E];
     let cells = |link: &crate::buses::novobus::link::SimulatedLink| -> Vec<(u16, Option<u8>)> {

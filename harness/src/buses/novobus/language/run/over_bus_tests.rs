@@ -1,8 +1,8 @@
 //! Rings whose drives have missed their master, brought back.
 
 use super::*;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::simulate;
-use crate::library::Entry;
 use crate::scenario::source::Source;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 
@@ -10,8 +10,8 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 fn timed_out(drives: u8) -> impl Link {
     let text = format!("title t\nring {drives}\ndrive 0..last eeprom 47 = 80\n> 80\n");
     let source = Source::from_bytes("ring.scn".to_owned(), text.into_bytes()).expect("a text");
-    let entry = Entry::new(source, None).expect("a scenario");
-    let mut link = simulate::bench(&entry.plan.expect("a plan"));
+    let entry = RingScenario::new(source, None).expect("a scenario");
+    let mut link = simulate::bench(&entry.plan);
     link.run_until(link.now() + Span::from_millis(300));
     for sent in [&[SYNCO][..], &CHECK_SEQUENCE, &CHECK_SEQUENCE] {
         let left = link.send_octets(0, sent);

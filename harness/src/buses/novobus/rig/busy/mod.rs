@@ -6,10 +6,10 @@ mod qualified;
 use super::run::Run;
 use super::session::Session;
 use crate::buses::novobus::guard::safe_state::{SafeConfirmation, safe_state};
+use crate::buses::novobus::language::read::RingScenario;
+use crate::buses::novobus::rig::parse;
 use crate::buses::novobus::simulate::bench;
-use crate::buses::parse_rig as parse;
 use crate::guard::{OVERDUE, Standstill};
-use crate::library::Entry;
 use crate::link::Line as _;
 use crate::rig::{Rig, SessionError, UseOptions};
 use crate::scenario::files::sources;
@@ -19,12 +19,12 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use line::{BusyLine, Stalls};
 
-pub(super) fn entry(name: &str, text: String) -> Entry {
+pub(super) fn entry(name: &str, text: String) -> RingScenario {
     let source = Source {
         name: name.to_owned(),
         text: text.into(),
     };
-    Entry::new(source, None).expect("a scenario")
+    RingScenario::new(source, None).expect("a scenario")
 }
 
 /// The rig's file: a ring of three behind a port.
@@ -44,7 +44,7 @@ pub(super) fn rig(more: &str) -> Rig {
 /// Three right drives, set up by these header lines, behind a computer that stands still like this.
 pub(super) fn line(drives: &str, stalls: Stalls) -> BusyLine {
     let text = format!("title t\nring 3\ndrive 0..last model nd21\n{drives}\n> 80\n");
-    let plan = entry("ring.scn", text).plan.expect("a plan");
+    let plan = entry("ring.scn", text).plan;
     let mut ring = bench(&plan);
     ring.run_until(ring.now() + Span::from_millis(500));
     BusyLine::new(ring, stalls)
@@ -70,11 +70,11 @@ fn accused(drives: &str, (seed, one_in): (u64, u64), name: &str) -> Vec<String> 
     let mut accused = Vec::new();
     let mut played = 0;
     for source in sources(&[]).expect("the library") {
-        let entry = Entry::new(source, Some(3)).ok();
+        let entry = RingScenario::new(source, Some(3)).ok();
         let Some(entry) = entry.filter(|entry| entry.short_name().contains(name)) else {
             continue;
         };
-        let Some(plan) = &entry.plan else { continue };
+        let plan = &entry.plan;
         let found = match run.play(plan, None) {
             Ok(found) => found,
             // A line that is disturbed each time it is examined.
@@ -128,7 +128,7 @@ fn nothing_is_awaited_for_a_pause() {
         "pause.scn",
         "title t\nring 3\n> 80 81 81 80\n< 80 80\n".to_owned(),
     );
-    let played = run.play(entry.plan.as_ref().expect("a plan"), None);
+    let played = run.play(&entry.plan, None);
     let played = played.expect("a healthy ring");
     assert_eq!(played.outcome.verdict, Verdict::Passed);
     let took = run.session().link().now().since_start();
@@ -144,7 +144,7 @@ fn the_longest_run_ends_at_an_examination() {
     session.link().set_deadline(Some(std::time::Instant::now()));
     let mut run = Run::new(&mut session).expect("a run");
     let entry = entry("a.scn", "title t\nring 3\n> 80\n< 80\n".to_owned());
-    let played = run.play(entry.plan.as_ref().expect("a plan"), None);
+    let played = run.play(&entry.plan, None);
     let played = played.expect("an attempt");
     assert_eq!(played.outcome.verdict, Verdict::RigError);
     let found = played.outcome.finding.map(|found| found.message);

@@ -5,11 +5,11 @@ use super::{Run, rig, session};
 use crate::buses::novobus::cli::fuzz::scope;
 use crate::buses::novobus::explore::{Case, Finding, FuzzRun, FuzzSettings, Pool, Swarm};
 use crate::buses::novobus::explore::{OnRig, RingSetup};
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::qualify::{Qualification, QualificationFacts, QualifiedBench};
 use crate::buses::novobus::twin::Twin;
 use crate::explore::{Bounds, Progress, Watcher};
-use crate::library::Entry;
 use crate::rig::PlayedScenario;
 use crate::rig::segment::Qualified;
 use crate::scenario::problem::Problems;
@@ -36,8 +36,8 @@ impl<'r, 's> Watched<'r, 's> {
 impl QualifiedBench for Watched<'_, '_> {
     type Stop = String;
 
-    fn play(&mut self, entry: &Entry) -> Result<PlayedScenario, String> {
-        let plan = entry.plan.as_ref().expect("a plan");
+    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, String> {
+        let plan = &entry.plan;
         let played = self.run.play(plan, None);
         let played = played.map_err(|error| format!("{}: {error}", entry.short_name()))?;
         if played.outcome.verdict == Verdict::Failed {
@@ -67,7 +67,7 @@ impl QualifiedBench for Watched<'_, '_> {
         Ok(())
     }
 
-    fn show(&mut self, _: &Entry, _: &PlayedScenario) -> Result<(), String> {
+    fn show(&mut self, _: &RingScenario, _: &PlayedScenario) -> Result<(), String> {
         Ok(())
     }
 }

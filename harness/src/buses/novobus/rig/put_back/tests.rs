@@ -42,7 +42,7 @@ fn write(session: &mut Session, drive: u8, address: u16, data: u8) {
 fn play(session: &mut Session, text: &str) -> Verdict {
     let entry = entry("t.scn", text.to_owned());
     let mut run = Run::new(session).expect("a run");
-    let played = run.play(entry.plan.as_ref().expect("a plan"), None);
+    let played = run.play(&entry.plan, None);
     played.expect("a healthy ring").outcome.verdict
 }
 
@@ -155,8 +155,7 @@ fn what_a_scenario_changes_behind_an_error_is_put_back() {
         "recover\nwrite-io 1 = 01\nwrite-byte 0 scope_level = 44\n",
     ] {
         let entry = entry("t.scn", format!("title t\nring 3\n{text}"));
-        run.play(entry.plan.as_ref().expect("a plan"), None)
-            .expect("a healthy ring");
+        run.play(&entry.plan, None).expect("a healthy ring");
     }
     assert_eq!(session.end(false).remarks, [""; 0]);
     assert_eq!(all(&mut session), before);

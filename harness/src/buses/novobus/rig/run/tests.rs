@@ -1,7 +1,7 @@
 //! Which scenarios a rig does not play, and why.
 
 use super::*;
-use crate::library::Entry;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::link::Replay;
 use crate::scenario::source::Source;
 use harness_proto::line::Rate;
@@ -16,8 +16,8 @@ fn an_interposer_with_one_uart_takes_no_wrong_parity() {
     let skip = |fault: &str| {
         let text = format!("title t\nsource nd21 9.7\nring 3\n! {fault}\n> 80\n");
         let source = Source::from_bytes("t.scn".to_owned(), text.into_bytes());
-        let entry = Entry::new(source.expect("a text"), None).expect("a scenario");
-        let skip = entry.plan.and_then(|plan| not_played(&plan, &link, &rings));
+        let entry = RingScenario::new(source.expect("a text"), None).expect("a scenario");
+        let skip = not_played(&entry.plan, &link, &rings);
         skip.map(|skip| (skip.why.to_string(), skip.unlocks.into_iter().collect()))
     };
     let (why, unlocks): (String, Vec<_>) = skip("2->1: flip 0").expect("a reason");
@@ -41,9 +41,9 @@ fn what_needs_the_simulator_is_not_for_another_size() {
     let reason = |needs: &str| {
         let text = format!("title t\nsource nd21 9.1\nring 3\n{needs}\n> 80\n");
         let source = Source::from_bytes("t.scn".to_owned(), text.into_bytes());
-        let entry = Entry::new(source.expect("a text"), None).expect("a scenario");
+        let entry = RingScenario::new(source.expect("a text"), None).expect("a scenario");
         let rings = [RingSize::new(1).expect("a ring")];
-        let skip = entry.plan.and_then(|plan| not_played(&plan, &link, &rings));
+        let skip = not_played(&entry.plan, &link, &rings);
         let skip = skip.expect("a reason");
         (skip.why.group(), skip.unlocks.into_iter().collect())
     };

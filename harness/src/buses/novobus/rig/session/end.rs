@@ -5,7 +5,7 @@ use super::{Session, come_round};
 use crate::buses::novobus::gate::guard_rings;
 use crate::buses::novobus::guard::safe_state;
 use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::simulated;
+use crate::buses::novobus::simulate::warm;
 use crate::guard::Safe;
 use crate::link::{Line as _, Link as _};
 use crate::rig::{End, Ends, file, standing, state};
@@ -86,7 +86,7 @@ impl Session {
         if setup.without_deviations() == setup {
             return None;
         }
-        let ends = Ends::Simulated(simulated(&self.rig.plan().ok()?));
+        let ends = Ends::Simulated(Box::new(warm(&self.rig.plan().ok()?)));
         let mut fresh = guard_rings(ends, self.limits());
         let standing = standing(&self.rig.file.safe_state);
         let safe = Safe::from(safe_state(&mut fresh, &self.rings, &standing));

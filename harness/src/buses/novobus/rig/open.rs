@@ -1,15 +1,16 @@
 //! From a rig's file to its rings' ends: ports opened and locked, or simulated rings set up.
 
-use super::ends::Ends;
-use super::file::{Endpoint, Transport};
-use super::lock::{PortLock, PortLockError};
-use super::scan::{self, FoundPort, MatchError};
-use super::{Rig, SessionError};
-use crate::buses;
-use crate::buses::novobus::rig::sim::RigOfRings;
+use super::sim::RigOfRings;
+use crate::buses::novobus::simulate::warm;
+use crate::buses::novobus::stream::StreamLink;
 use crate::link::{InnerLink, InnerPorts};
 use crate::medium::ErrorMarks;
 use crate::port::{self, OpenError, PortSettings, Wire};
+use crate::rig::ends::Ends;
+use crate::rig::file::{Endpoint, Transport};
+use crate::rig::lock::{PortLock, PortLockError};
+use crate::rig::scan::{self, FoundPort, MatchError};
+use crate::rig::{Rig, SessionError};
 use crate::scenario::problem::Problems;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
@@ -97,7 +98,7 @@ pub(crate) fn stated_rate(rig: &Rig) -> Rate {
 pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
     if rig.is_simulated() {
         return Ok(Opened {
-            ends: Ends::Simulated(buses::simulated(&rig.plan()?)),
+            ends: Ends::Simulated(Box::new(warm(&rig.plan()?))),
             locks: Vec::new(),
         });
     }
@@ -139,9 +140,10 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     let tolerance = rig.rings().map(|(_, ring)| ring.time_tolerance.0).max();
     let tolerance = tolerance.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX));
     let tolerance = Span::from_nanos(tolerance);
-    let link = buses::over_ports(wires, inner, (rate, tolerance), interrupt);
+    let mut link = StreamLink::new(wires, inner, rate, interrupt);
+    link.set_time_tolerance(tolerance);
     Ok(Opened {
-        ends: Ends::Ports(link),
+        ends: Ends::Ports(Box::new(link)),
         locks,
     })
 }

@@ -1,9 +1,9 @@
 //! A rig in use as a line that a driver can own, with the rig itself kept for its end.
 
-use super::End;
 use crate::buses::novobus::rig::Session;
 use crate::link::{Lead, Line, Trouble};
 use crate::medium::{Heard, Medium, Out};
+use crate::rig::End;
 use harness_proto::line::Rate;
 use harness_proto::time::Instant;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
