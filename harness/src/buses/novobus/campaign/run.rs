@@ -3,15 +3,17 @@
 use super::fault::CaseFaults;
 use super::file::{CampaignFile, ExpectedCounts, read};
 use super::plan::{Shape, cases};
+use crate::bus::Bus;
 use crate::buses::novobus::campaign::by_driver::ByDriver;
 use crate::buses::novobus::campaign::by_manual::{ByManual, Said};
 use crate::buses::novobus::campaign::class::{CaseClass, CaseEvidence};
 use crate::buses::novobus::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::buses::novobus::campaign::sharing::Sharing;
+use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::{Setup, SetupKind};
 use crate::buses::novobus::simulate::bench;
-use crate::library::Entry;
 use crate::scenario::files::{LibraryError, sources};
+use crate::scenario::parse;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
 use std::collections::BTreeMap;
@@ -34,7 +36,7 @@ pub struct Campaign {
     /// What its file says.
     pub file: CampaignFile,
     /// The scenario whose conversation is disturbed.
-    pub entry: Entry,
+    pub entry: RingScenario,
     /// How many drives the ring has, and where telegrams begin.
     pub shape: Shape,
     /// The cases, in order.
@@ -121,7 +123,16 @@ impl Campaign {
                 "one scenario expected here",
             )));
         };
-        let entry = Entry::new(scenario, read.file.drives)?;
+        if parse::bus(&scenario) != Bus::DEFAULT {
+            let message = "its bus is not built yet";
+            return Err(mistake(read.wrong(
+                &["scenario"],
+                message,
+                "a scenario of a bus that is built is expected here",
+            )));
+        }
+        let entry = RingScenario::new(scenario, read.file.drives)?;
+        let plan = &entry.plan;
         let own = |problem| {
             let source = &entry.source;
             Box::new(Problems::new(
@@ -147,14 +158,6 @@ impl Campaign {
                 "a master by the manual expected in a campaign",
             )));
         }
-        let Some(plan) = &entry.plan else {
-            let message = "its bus is not built yet";
-            return Err(mistake(read.wrong(
-                &["scenario"],
-                message,
-                "a scenario of a bus that is built is expected here",
-            )));
-        };
         let start = {
             let mut link = bench(plan);
             link.stop_recording();
