@@ -56,7 +56,7 @@ fn shared(bencher: divan::Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = CAMPAIGNS[..2].iter())]
 fn ring(bencher: divan::Bencher<'_, '_>, name: &str) {
     let (campaign, cases) = load(name);
-    let mut start = bench(campaign.entry.plan.as_ref().expect("a plan"));
+    let mut start = bench(&campaign.entry.plan);
     start.stop_recording();
     let said: Vec<Vec<u8>> = cases
         .iter()
