@@ -4,7 +4,7 @@ pub(crate) mod calm;
 pub mod campaign;
 pub mod capture;
 pub(crate) mod choice;
-pub(crate) mod cli;
+pub mod cli;
 pub mod driver;
 pub mod drives;
 pub mod explore;
