@@ -6,7 +6,7 @@ mod interrupt_tests;
 #[cfg(test)]
 mod live_tests;
 pub use harness_nordac as nordac;
-pub mod novobus;
+pub use harness_novobus as novobus;
 mod sim;
 #[cfg(test)]
 mod toy;

@@ -146,7 +146,7 @@ const FIELDS: [&str; 8] = [
 fn dissected(name: &str, capture: &Capture) -> Option<Vec<String>> {
     let path = file(&format!("{name}.pcapng"));
     std::fs::write(&path, pcapng(capture)).expect("a file");
-    let script = root().join("harness/src/buses/novobus/report/novobus.lua");
+    let script = root().join("harness/novobus/src/report/novobus.lua");
     let script = format!("lua_script:{}", script.display());
     let path = path.to_str().expect("a plain path");
     let mut arguments = vec![

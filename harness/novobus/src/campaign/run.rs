@@ -1,0 +1,420 @@
+//! A campaign, read and played.
+
+use super::fault::CaseFaults;
+use super::file::{CampaignFile, ExpectedCounts, read};
+use super::plan::{Shape, cases};
+use crate::campaign::by_driver::ByDriver;
+use crate::campaign::by_manual::{ByManual, Said};
+use crate::campaign::class::{CaseClass, CaseEvidence};
+use crate::campaign::conversation::{MasterTalk, talk, telegrams};
+use crate::campaign::sharing::Sharing;
+use crate::language::read::RingScenario;
+use crate::language::syntax::{Setup, SetupKind};
+use crate::simulate::bench;
+use harness_bench::bus::Bus;
+use harness_bench::scenario::files::{LibraryError, sources};
+use harness_bench::scenario::parse;
+use harness_bench::scenario::problem::{Problem, Problems};
+use harness_bench::scenario::source::Source;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// How many cases a thread takes at once.
+const BATCH: usize = 32;
+
+/// A campaign that can be played.
+#[derive(Debug)]
+pub struct Campaign {
+    /// Its name, for messages: a path, or the name of a built-in one.
+    pub name: String,
+    /// The text of its file.
+    text: Arc<str>,
+    /// What its file says.
+    pub file: CampaignFile,
+    /// The scenario whose conversation is disturbed.
+    pub entry: RingScenario,
+    /// How many drives the ring has, and where telegrams begin.
+    pub shape: Shape,
+    /// The cases, in order.
+    pub cases: Vec<CaseFaults>,
+    played: Played,
+}
+
+/// What plays the campaign's conversation.
+#[derive(Debug)]
+enum Played {
+    ByManual(Box<ByManual>),
+    ByDriver(Box<ByDriver>),
+}
+
+/// The outcome of a case.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CaseOutcome {
+    /// The faults.
+    pub case: CaseFaults,
+    /// The class of the outcome.
+    pub class: CaseClass,
+    /// The evidence for this class.
+    pub evidence: CaseEvidence,
+}
+
+/// A case that fits no class: a defect of the bench.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{campaign}: the case {case} fits no class: {why}; please report it")]
+pub struct Contradiction {
+    /// Of which campaign.
+    pub campaign: String,
+    /// Which case.
+    pub case: String,
+    /// Why.
+    pub why: &'static str,
+}
+
+/// A campaign that has been played.
+#[derive(Clone, Debug)]
+pub struct PlayedCampaign {
+    /// The campaign's name.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// The name of its scenario.
+    pub scenario: String,
+    /// How many drives the ring has.
+    pub drives: u8,
+    /// How many bytes the conversation has.
+    pub bytes: u64,
+    /// Every case, in the order of the plan.
+    pub outcomes: Vec<CaseOutcome>,
+    /// The figures that the file pins.
+    pub expect: ExpectedCounts,
+}
+
+impl Campaign {
+    /// Reads a campaign and its scenario; `folder` is where a scenario's path is looked for first.
+    ///
+    /// # Errors
+    /// Mistakes in either, or a scenario that is not there.
+    pub fn load(source: &Source, folder: &Path) -> Result<Self, Box<Problems>> {
+        let read = read(source).map_err(Box::new)?;
+        let mistake = |problem: Problem| Box::new(read.problems(problem));
+        let own = folder.join(&read.file.scenario);
+        let path = if own.is_file() {
+            own
+        } else {
+            PathBuf::from(&read.file.scenario)
+        };
+        let missing = |error| match error {
+            LibraryError::Mistakes(problems) => problems,
+            error => {
+                let expected = "a built-in scenario, or a file, expected here";
+                mistake(read.wrong(&["scenario"], error.to_string(), expected))
+            }
+        };
+        let found = sources(std::slice::from_ref(&path)).map_err(missing)?;
+        let Ok([scenario]) = <[Source; 1]>::try_from(found) else {
+            let message = "a folder is no scenario";
+            return Err(mistake(read.wrong(
+                &["scenario"],
+                message,
+                "one scenario expected here",
+            )));
+        };
+        if parse::bus(&scenario) != Bus::DEFAULT {
+            let message = "its bus is not built yet";
+            return Err(mistake(read.wrong(
+                &["scenario"],
+                message,
+                "a scenario of a bus that is built is expected here",
+            )));
+        }
+        let entry = RingScenario::new(scenario, read.file.drives)?;
+        let plan = &entry.plan;
+        let own = |problem| {
+            let source = &entry.source;
+            Box::new(Problems::new(
+                &source.name,
+                source.text.clone(),
+                vec![problem],
+            ))
+        };
+        let deviates = |setup: &&Setup| matches!(setup.what, SetupKind::Deviates(_));
+        if let Some(setup) = entry.scenario.header.setups.iter().find(deviates) {
+            let message = "what a wrong drive does is no measure of the bus";
+            return Err(own(Problem::new(
+                setup.span,
+                message,
+                "drives by the manual expected in a campaign",
+            )));
+        }
+        if let Some(master) = &entry.scenario.header.master {
+            let message = "what a wrong master does is no measure of the bus";
+            return Err(own(Problem::new(
+                master.span,
+                message,
+                "a master by the manual expected in a campaign",
+            )));
+        }
+        let start = {
+            let mut link = bench(plan);
+            link.stop_recording();
+            link
+        };
+        let drives = plan.rings.first().map_or(0, |ring| ring.drives());
+        let (played, shape) = match talk(plan).map_err(own)? {
+            MasterTalk::Bytes(bytes) => {
+                let Some(by_manual) = ByManual::new(start, bytes) else {
+                    let message =
+                        "played twice, the conversation leaves other cells than played once";
+                    let expected =
+                        "a conversation whose telegrams can be repeated is expected there";
+                    return Err(mistake(read.wrong(&["scenario"], message, expected)));
+                };
+                let shape = by_manual.answers().shape.clone();
+                (Played::ByManual(Box::new(by_manual)), shape)
+            }
+            MasterTalk::Calls(calls) => {
+                let Some(by_driver) = ByDriver::new(start, calls) else {
+                    let message = "the driver does not get through it without a fault, or a call is more than one command";
+                    return Err(mistake(read.wrong(
+                        &["scenario"],
+                        message,
+                        "calls of one command each expected there",
+                    )));
+                };
+                let telegrams = telegrams(by_driver.sent());
+                (
+                    Played::ByDriver(Box::new(by_driver)),
+                    Shape { drives, telegrams },
+                )
+            }
+        };
+        read.fits(drives, shape.length()).map_err(mistake)?;
+        let cases = cases(&read.file, &shape).map_err(|many| {
+            mistake(read.wrong(
+                &["faults"],
+                many.to_string(),
+                "fewer, or `sample`, expected",
+            ))
+        })?;
+        Ok(Self {
+            name: source.name.clone(),
+            text: source.text.clone(),
+            file: read.file,
+            entry,
+            shape,
+            cases,
+            played,
+        })
+    }
+
+    /// The texts of its file and of its scenario.
+    #[must_use]
+    pub fn texts(&self) -> [&str; 2] {
+        [&self.text, &self.entry.source.text]
+    }
+
+    /// Whether the driver plays, and not a master by the manual alone.
+    #[must_use]
+    pub fn by_driver(&self) -> bool {
+        matches!(self.played, Played::ByDriver(_))
+    }
+
+    /// The driver, where it plays.
+    #[cfg(test)]
+    pub(crate) fn driver(&self) -> Option<&ByDriver> {
+        match &self.played {
+            Played::ByDriver(by_driver) => Some(by_driver),
+            Played::ByManual(_) => None,
+        }
+    }
+
+    /// Plays one case on a ring of its own.
+    ///
+    /// # Errors
+    /// It fits no class.
+    pub fn play(&self, case: &CaseFaults) -> Result<(CaseOutcome, Vec<Said>), Contradiction> {
+        let (evidence, said) = match &self.played {
+            Played::ByManual(by_manual) => by_manual.play(case),
+            Played::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
+        };
+        Ok((self.outcome(case, evidence)?, said))
+    }
+
+    /// The outcome of a case of which this was seen.
+    pub(super) fn outcome(
+        &self,
+        case: &CaseFaults,
+        evidence: CaseEvidence,
+    ) -> Result<CaseOutcome, Contradiction> {
+        let class = evidence.class(&case.links()).map_err(|why| Contradiction {
+            campaign: self.name.clone(),
+            case: case.name(self.shape.drives),
+            why,
+        })?;
+        Ok(CaseOutcome {
+            case: *case,
+            class,
+            evidence,
+        })
+    }
+
+    /// Plays cases one after another, which share what they have in common. The outcomes are those of [`Self::play`].
+    #[must_use]
+    pub fn player(&self) -> CasePlayer<'_> {
+        CasePlayer {
+            campaign: self,
+            sharing: self.sharing(),
+        }
+    }
+
+    /// What its cases share; `None` where they have to be played from the start.
+    pub(super) fn sharing(&self) -> Option<Sharing<'_>> {
+        match &self.played {
+            Played::ByManual(by_manual) => Sharing::new(by_manual),
+            Played::ByDriver(_) => None,
+        }
+    }
+
+    /// Plays every case on `threads` threads; `progress` is called with the number of cases done since its last call. The outcome
+    /// does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// The first case, in the order of the plan, that fits no class.
+    pub fn run(
+        &self,
+        threads: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<PlayedCampaign, Contradiction> {
+        let next = AtomicUsize::new(0);
+        let failed = AtomicBool::new(false);
+        let done = Mutex::new(Vec::with_capacity(self.cases.len() / BATCH + 1));
+        let work = || {
+            let mut player = self.player();
+            while !failed.load(Ordering::Relaxed) {
+                let first = next.fetch_add(BATCH, Ordering::Relaxed);
+                let Some(rest) = self.cases.get(first..).filter(|rest| !rest.is_empty()) else {
+                    return;
+                };
+                let batch = &rest[..BATCH.min(rest.len())];
+                let outcomes: Vec<_> = batch.iter().map(|case| player.play(case)).collect();
+                if outcomes.iter().any(Result::is_err) {
+                    failed.store(true, Ordering::Relaxed);
+                }
+                progress(outcomes.len() as u64);
+                let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+                done.push((first, outcomes));
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..threads.max(1) {
+                scope.spawn(work);
+            }
+            work();
+        });
+        let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+        done.sort_by_key(|(first, _)| *first);
+        let outcomes = done.into_iter().flat_map(|(_, outcomes)| outcomes);
+        Ok(PlayedCampaign {
+            name: self.name.clone(),
+            title: self.file.title.clone(),
+            scenario: self.entry.short_name().to_owned(),
+            drives: self.shape.drives,
+            bytes: self.shape.length(),
+            outcomes: outcomes.collect::<Result<_, _>>()?,
+            expect: self.file.expect,
+        })
+    }
+}
+
+/// Plays cases of a campaign one after another; see [`Campaign::player`].
+#[derive(Debug)]
+pub struct CasePlayer<'a> {
+    campaign: &'a Campaign,
+    /// `None` where cases have to be played from the start.
+    sharing: Option<Sharing<'a>>,
+}
+
+impl CasePlayer<'_> {
+    /// Whether cases share what they have in common.
+    #[must_use]
+    pub const fn shares(&self) -> bool {
+        self.sharing.is_some()
+    }
+
+    /// Plays one case.
+    ///
+    /// # Errors
+    /// It fits no class.
+    pub fn play(&mut self, case: &CaseFaults) -> Result<CaseOutcome, Contradiction> {
+        match self.sharing.as_mut().and_then(|own| own.play(case)) {
+            Some(evidence) => self.campaign.outcome(case, evidence.as_ref().clone()),
+            None => self.campaign.play(case).map(|(outcome, _)| outcome),
+        }
+    }
+}
+
+/// A pinned figure that was not met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Differs {
+    /// Of which class; `None` for all cases together.
+    pub class: Option<CaseClass>,
+    /// What the file says.
+    pub expected: u64,
+    /// What came out.
+    pub found: u64,
+}
+
+impl PlayedCampaign {
+    /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
+    #[must_use]
+    pub fn link(&self, place: usize) -> String {
+        harness_bench::link::link_name(0, self.drives, place)
+    }
+
+    /// How many cases there are of a class.
+    #[must_use]
+    pub fn count(&self, class: CaseClass) -> u64 {
+        let of_class = |outcome: &&CaseOutcome| outcome.class == class;
+        self.outcomes.iter().filter(of_class).count() as u64
+    }
+
+    /// The pinned figures that were not met: the number of cases first, then the classes in order of gravity.
+    #[must_use]
+    pub fn differs(&self) -> Vec<Differs> {
+        let all =
+            CaseClass::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));
+        let cases = (None, self.expect.cases, self.outcomes.len() as u64);
+        let pinned = std::iter::once(cases).chain(all);
+        let pinned = pinned.filter_map(|(class, expected, found)| {
+            let expected = expected.filter(|expected| *expected != found)?;
+            Some(Differs {
+                class,
+                expected,
+                found,
+            })
+        });
+        pinned.collect()
+    }
+
+    /// How many cases of each class there are at each link and byte, where a case with two faults counts at both:
+    /// the figures of a map with a row for a link and a column for a byte.
+    #[must_use]
+    pub fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
+        let mut map: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
+        for outcome in &self.outcomes {
+            let mut places: Vec<_> = outcome.case.faults().map(|f| (f.link, f.byte)).collect();
+            places.dedup();
+            for place in places {
+                *map.entry(place)
+                    .or_default()
+                    .entry(outcome.class)
+                    .or_default() += 1;
+            }
+        }
+        map
+    }
+}

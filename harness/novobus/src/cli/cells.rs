@@ -1,0 +1,54 @@
+//! `drivebench cells`: the drive's memory, cell by cell (ND21 14.2.1, 14.2.2).
+
+use harness_bench::command::args::CellsArguments;
+use harness_bench::command::exit::Exit;
+use harness_bench::command::output::Output;
+use harness_proto::nd21::cells::{Access, Cell, RAM};
+use harness_proto::nd21::eeprom::EEPROM;
+
+/// The printed names of the cells that can be read, first those of the RAM.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    let all = RAM.iter().chain(EEPROM);
+    let used = all.filter(|cell| cell.access != Access::Reserved);
+    used.map(|cell| cell.printed)
+}
+
+/// Shows the cells.
+pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let filter = arguments
+        .filter
+        .as_deref()
+        .unwrap_or_default()
+        .to_lowercase();
+    let (table, digits) = if arguments.eeprom {
+        (EEPROM, 2)
+    } else {
+        (RAM, 4)
+    };
+    let lines = table.iter().map(|cell| line(cell, digits));
+    let wanted: String = lines
+        .filter(|line| line.to_lowercase().contains(&filter))
+        .collect();
+    if wanted.is_empty() {
+        output.complain("no cell has this text in it; `drivebench cells` shows all of them");
+        return Ok(Exit::NothingSelected);
+    }
+    output.result(&output.fitted(&wanted))?;
+    Ok(Exit::Passed)
+}
+
+/// Address, size, access, name, unit, section, meaning; `R` and the mask of the bits that are read only.
+fn line(cell: &Cell, digits: usize) -> String {
+    let access = match (cell.access, cell.read_only_bits) {
+        (Access::Reserved, _) => "reserved".to_owned(),
+        (Access::Read, _) => "read".to_owned(),
+        (Access::Write, 0) => "write".to_owned(),
+        (Access::Write, mask) => format!("write R{mask:02X}"),
+    };
+    let unit = cell.scale.map_or("", |scale| scale.unit());
+    let line = format!(
+        "{:0digits$X} {:>3} {access:9} {:16} {unit:17} {:9} {}",
+        cell.address, cell.size, cell.printed, cell.section, cell.english
+    );
+    format!("{}\n", line.trim_end())
+}

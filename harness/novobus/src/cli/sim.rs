@@ -1,0 +1,132 @@
+//! `drivebench sim`: simulated rings for anyone's master.
+
+use super::rig;
+use crate::rig::sim::RigOfRings as _;
+use crate::serve::Server;
+use crate::simulate::bench;
+use harness_bench::command::exit::Exit;
+use harness_bench::command::failure::Failure;
+use harness_bench::command::output::Output;
+use harness_bench::command::rig_name::RigName;
+use harness_bench::command::sim::{SimArguments, SimSpeed};
+use harness_bench::rig::buses::RigBuses;
+use harness_bench::serve::{
+    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, serve,
+};
+
+/// The seats at inner links with their places, in the order of the command line: taps first.
+fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)>, Failure> {
+    let mut all: Vec<(Inner, ServedAt)> = Vec::new();
+    let taps = arguments
+        .tap
+        .iter()
+        .map(|place| (place, &[ClientRole::Tap][..]));
+    let cuts = arguments.cut.iter().map(|place| match place.places.len() {
+        1 => (place, &[ClientRole::Cut][..]),
+        _ => (place, &[ClientRole::Upstream, ClientRole::Downstream][..]),
+    });
+    for (given, roles) in taps.chain(cuts) {
+        let text = &given.text;
+        let refused = |why: &str| Failure::refused(format!("{text}: {why}"));
+        let drives = *sizes
+            .get(given.ring)
+            .ok_or_else(|| refused("the bench has one ring"))?;
+        let Some(from) = given.link.from.filter(|_| given.link.to.is_some()) else {
+            return Err(refused(
+                "the master's own links are the ring's port; a link between two drives expected",
+            ));
+        };
+        if !given.link.is_in(drives) {
+            return Err(refused(&format!(
+                "a ring of {drives} has no such link; bytes go from a drive to the next lower one"
+            )));
+        }
+        let link = usize::from(drives - from);
+        if all
+            .iter()
+            .any(|(other, _)| (other.ring, other.link) == (given.ring, link))
+        {
+            return Err(refused("another --tap or --cut uses this link already"));
+        }
+        if given.places.len() != roles.len() {
+            return Err(refused(
+                "one place expected for a tap, one or two for a cut",
+            ));
+        }
+        for (&role, place) in roles.iter().zip(&given.places) {
+            let ring = given.ring;
+            all.push((Inner { ring, link, role }, place.clone()));
+        }
+    }
+    Ok(all)
+}
+
+/// Where lines of control come from.
+fn control(arguments: &SimArguments) -> Option<ControlPlace> {
+    arguments.control.as_deref().map(|place| match place {
+        "-" => ControlPlace::Standard,
+        address => ControlPlace::Tcp(address.to_owned()),
+    })
+}
+
+/// Where `masters` are served: nowhere, if only a live page is asked for.
+pub fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
+    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
+    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
+    let only_page = arguments.tcp.is_empty() && arguments.pty.is_empty();
+    let nowhere = only_page.then(|| std::iter::repeat_n(ServedAt::Nowhere, masters));
+    tcp.chain(pty).chain(nowhere.into_iter().flatten())
+}
+
+/// What the arguments say of serving at these places.
+pub fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
+    ServeOptions {
+        places,
+        control: control(arguments),
+        page: arguments.web.clone(),
+        allow_remote: arguments.allow_remote,
+        once: arguments.once,
+        length: arguments.length,
+    }
+}
+
+/// Serves the rings of a simulated bench.
+pub fn rings(
+    arguments: &SimArguments,
+    buses: &'static RigBuses,
+    output: &mut Output,
+) -> Result<Result<ServeEnd, ServeError>, Failure> {
+    if !arguments.frames.places().is_empty() {
+        return Err(Failure::refused(
+            "--slcan, --slcan-pty and --socketcand serve a CAN bus; --bus unitek expected with them",
+        ));
+    }
+    if arguments.frames.slaves.is_some() {
+        return Err(Failure::refused(
+            "--slaves are those of a PROFIBUS segment; --bus nordac expected with it",
+        ));
+    }
+    let (plan, link) = match &arguments.rig.rig {
+        Some(RigName::Named(name)) => {
+            rig::without_setup(&arguments.rig)?;
+            let rig = rig::find_rig(name, buses, output).ok_or(Failure::Told(Exit::Usage))?;
+            let plan = rig.plan()?;
+            let mut link = bench(&plan);
+            link.stop_recording();
+            (plan, link)
+        }
+        sizes => rig::link(&arguments.rig, sizes.as_ref().and_then(RigName::sizes))?,
+    };
+    let pace = match arguments.pace {
+        SimSpeed::Line => Pace::Line,
+        SimSpeed::Free => Pace::Free,
+    };
+    let sizes: Vec<u8> = plan.rings.iter().map(|ring| ring.drives()).collect();
+    let inner = inner(arguments, &sizes)?;
+    let mut server = Server::new(plan, link, pace, arguments.marks);
+    inner.iter().for_each(|(inner, _)| server.add(*inner));
+    let inner = inner.into_iter().map(|(_, place)| place);
+    let places = places(arguments, sizes.len()).chain(inner);
+    let options = options(arguments, places.collect());
+    Ok(serve(server, &options, output))
+}

@@ -1,0 +1,166 @@
+//! The ring's conversations as the engine explores them.
+
+use super::case::{Act, Case};
+use super::confirm::judged_again;
+use super::confirm::on_ring;
+use super::finding::{is_bounded, scenario, sources};
+use super::generate::{CaseScope, Generator};
+use super::mutate::mutate;
+use super::on_sim::OnSim;
+use super::oracle::Difference;
+use super::page::page;
+use super::play::MasterView;
+use super::setup::RingSetup;
+use super::tour::tour;
+use super::{AttemptRecord, Spice};
+use crate::explore::{Finding, FuzzSettings, Pool, Rehearsal, Swarm};
+use harness_bench::counted::counted;
+use harness_bench::explore::{
+    Confirmation, Dice, Differing, ExploreError, FuzzCase, JudgedAgain, Target, played_again,
+};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+impl Differing for Difference {
+    fn is_like(&self, other: &Self) -> bool {
+        Difference::is_like(self, other)
+    }
+    fn key(&self) -> String {
+        Difference::key(self)
+    }
+    fn signature(&self) -> String {
+        Difference::signature(self)
+    }
+    fn about(&self) -> &str {
+        &self.about
+    }
+    fn place(&self) -> Option<usize> {
+        self.byte
+    }
+    fn is_time(&self) -> bool {
+        self.time
+    }
+}
+
+impl FuzzCase for Case {
+    type Scope = CaseScope;
+    type Setup = RingSetup;
+    type Spice = Spice;
+    type Seen = MasterView;
+    type Difference = Difference;
+    type Attempt = AttemptRecord;
+    type Act = Act;
+
+    fn swarm(seed: u64, round: u64, scope: &CaseScope) -> Swarm {
+        let needed = (&Spice::COMMANDS[..], Spice::ReadByte);
+        Swarm::drawn(seed, round, &scope.spices, needed)
+    }
+
+    fn tour(scope: &CaseScope, about: &FuzzSettings) -> Vec<Self> {
+        let rings = std::iter::once(&scope.first).chain(&scope.second);
+        let rings = rings.filter(|_| about.ports);
+        in_turns(rings.map(|ring| tour(scope, ring, about.seed)).collect())
+    }
+
+    fn made(
+        scope: &CaseScope,
+        swarm: &Swarm,
+        (tour, number): (&[Self], u64),
+        pool: &Pool,
+        dice: &mut Dice,
+    ) -> Self {
+        let ring = usize::from(scope.second.is_some() && dice.percent(50));
+        let own = scope.ring(ring);
+        let maker = Generator::new(scope, own, swarm, dice);
+        // Every third case is left to chance.
+        let of_tour = (number % 3 < 2).then_some(number / 3 * 2 + number % 3);
+        let of_tour = of_tour.and_then(|number| tour.get(usize::try_from(number).ok()?));
+        if let Some(case) = of_tour {
+            let mut case = case.clone();
+            maker.keep_in_step(&mut case);
+            return case;
+        }
+        let old = dice.percent(60).then(|| pool.pick(ring, dice)).flatten();
+        let other = pool.pick(ring, dice);
+        match old {
+            Some(old) => mutate(old, other, &maker, dice),
+            None => maker.case(dice),
+        }
+    }
+
+    fn is_of(&self, about: &FuzzSettings) -> bool {
+        let own = match self.ring() {
+            0 => Some(about.drives),
+            _ => about.second,
+        };
+        own == Some(self.drives)
+    }
+
+    fn lane(&self) -> usize {
+        self.ring()
+    }
+
+    fn text(finding: &Finding) -> Result<String, ExploreError> {
+        let title = format!("Found by fuzzing: {}", finding.difference.kind());
+        scenario(finding, &title, &sources(finding))
+    }
+
+    fn again(
+        finding: &Finding,
+        about: &FuzzSettings,
+        known: &BTreeMap<String, u8>,
+    ) -> Result<JudgedAgain, ExploreError> {
+        if about.ports {
+            return Ok(match judged_again(finding, about, known)? {
+                None => JudgedAgain::Unknown,
+                Some(own) if own == *finding => JudgedAgain::Same,
+                Some(own) => JudgedAgain::Differs(format!(
+                    "the file has \"{}\", its attempts give \"{}\"",
+                    told(finding),
+                    told(&own)
+                )),
+            });
+        }
+        let mut target = OnSim::new(finding.setup.clone());
+        played_again(finding, about, known, &mut target)
+    }
+
+    fn page(folder: &Path) -> Option<Result<String, ExploreError>> {
+        Some(page(folder))
+    }
+
+    fn is_sound(finding: &Finding) -> bool {
+        is_bounded(finding)
+    }
+
+    fn confirm(
+        confirmation: &mut Confirmation<'_>,
+        finding: &mut Finding,
+        rehearsal: &Rehearsal,
+        before: Option<&[Act]>,
+        target: &mut dyn Target<Case>,
+    ) -> Result<(), ExploreError> {
+        on_ring(confirmation, finding, rehearsal, before, target)
+    }
+}
+
+/// A finding in a line.
+fn told(finding: &Finding) -> String {
+    let Finding { seen_again, of, .. } = finding;
+    let sent = counted(finding.case.bytes().len(), "byte");
+    format!(
+        "{}; seen again {seen_again} of {of} times; {sent} sent",
+        finding.difference.about
+    )
+}
+
+/// Interleaves the cases of several tours.
+fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
+    let longest = tours.iter().map(Vec::len).max().unwrap_or(0);
+    let at = |index: usize| {
+        tours
+            .iter()
+            .filter_map(move |tour| tour.get(index).cloned())
+    };
+    (0..longest).flat_map(at).collect()
+}

@@ -1,0 +1,62 @@
+//! A scenario of rings, read and settled.
+
+use super::plan::Plan;
+use super::syntax::Scenario;
+use harness_bench::scenario::files;
+use harness_bench::scenario::parse::parse;
+use harness_bench::scenario::plan::plan;
+use harness_bench::scenario::problem::Problems;
+use harness_bench::scenario::source::Source;
+
+/// A scenario of rings, read and settled, and not yet played.
+#[derive(Clone, Debug)]
+pub struct RingScenario {
+    /// Its name and text.
+    pub source: Source,
+    /// What it says.
+    pub scenario: Scenario,
+    /// The same settled for rings of a given size.
+    pub plan: Plan,
+}
+
+impl RingScenario {
+    /// Reads and settles a scenario, for a ring of `size` where that is given.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
+        let scenario = parse(&source)?;
+        Self::settled(scenario, source, size)
+    }
+
+    /// Reads and settles a scenario, for a ring of this many drives where it is for several sizes and that is one of them.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
+        let scenario: Scenario = parse(&source)?;
+        let range = scenario.header.rings.first();
+        let fits = |drives: &u8| range.is_some_and(|own| own.contains(*drives));
+        let size = drives.filter(fits);
+        Self::settled(scenario, source, size)
+    }
+
+    fn settled(
+        scenario: Scenario,
+        source: Source,
+        size: Option<u8>,
+    ) -> Result<Self, Box<Problems>> {
+        let plan = plan(&scenario, &source, size)?;
+        Ok(Self {
+            source,
+            scenario,
+            plan,
+        })
+    }
+
+    /// The name without folders and ending.
+    #[must_use]
+    pub fn short_name(&self) -> &str {
+        files::last(&self.source.name)
+    }
+}

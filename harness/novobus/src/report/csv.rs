@@ -1,0 +1,116 @@
+//! A trace as comma-separated values: one row a byte, in order of time.
+//!
+//! | column | meaning |
+//! |---|---|
+//! | `ring` | 1 or 2 |
+//! | `t_ns` | when the byte's stop bit had passed, in nanoseconds since the start, cut off below |
+//! | `link` | `98->97` |
+//! | `n` | the byte's place on its link, counted from 1 |
+//! | `sent`, `received` | hexadecimal; empty for nothing |
+//! | `status` | `ok`, `parity`, `framing`, `break`, `overrun` or `dropped` |
+//! | `role` | what the byte is: `sync`, `address`, `data` ... |
+//! | `drive` | the number of the addressed drive |
+//! | `meaning` | the same in words |
+//! | `section` | the section of the rule in the ND21 manual |
+//! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
+
+use super::walk::{ByteSeen, Reader};
+use harness_bench::report::pcapng::name;
+use harness_bench::traffic::in_time;
+use harness_proto::novobus::error_mode::Marks;
+use harness_sim::novobus::mark::Mark as _;
+use harness_sim::record::LineByte;
+use harness_sim::record::{Remark, Trace};
+use std::fmt::Write as _;
+use std::io::Write;
+
+/// The first line.
+pub const HEADING: &str = "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
+
+/// Writes one or two rings of a run, one behind the other.
+///
+/// # Errors
+/// What the writer says.
+pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+    out.write_all(HEADING.as_bytes())?;
+    // A row is written at once: each of its fields would be a call.
+    let mut row = String::new();
+    for (ring, trace) in traces.iter().enumerate() {
+        let names: Vec<_> = trace.channels.iter().map(|link| name(ring, link)).collect();
+        let mut readers = Reader::all(trace);
+        for (place, index) in in_time(&trace.channels) {
+            let byte = &trace.channels[place].octets()[index];
+            let seen = readers[place].see(byte);
+            let hex = |byte: Option<u8>| byte.map_or_else(String::new, |b| format!("{b:02X}"));
+            let drive = seen.meaning.drive;
+            row.clear();
+            let _infallible = writeln!(
+                row,
+                "{},{},{},{},{},{},{},{},{},{},{},{}",
+                ring + 1,
+                byte.at.since_start().as_nanos(),
+                names[place],
+                index + 1,
+                hex(byte.sent),
+                hex(byte.received),
+                status(byte),
+                seen.meaning.role.name(),
+                drive.map_or_else(String::new, |drive| drive.to_string()),
+                quoted(&words(&seen, byte)),
+                seen.meaning.section(),
+                seen.mark.map_or_else(String::new, remark),
+            );
+            out.write_all(row.as_bytes())?;
+        }
+    }
+    out.flush()
+}
+
+/// What the receiver noticed, in a word.
+#[must_use]
+pub fn status(byte: &LineByte) -> &'static str {
+    match (byte.received, byte.error) {
+        (None, _) => "dropped",
+        (_, None) => "ok",
+        (_, Some(error)) => error.name(),
+    }
+}
+
+/// What a byte is, in words.
+pub(crate) fn words(seen: &ByteSeen<'_>, byte: &LineByte) -> String {
+    seen.meaning.words(byte.received)
+}
+
+/// What a drive remarked, in a word or two.
+pub(crate) fn remark(mark: &Remark) -> String {
+    const WORDS: [(Marks, &str); 5] = [
+        (Marks::DETECTED, "detected"),
+        (Marks::UPSTREAM, "upstream"),
+        (Marks::SEVENTEENTH, "seventeenth"),
+        (Marks::SEQUENCE, "sequence"),
+        (Marks::RECOVERED, "recovered"),
+    ];
+    let mut text = String::new();
+    for (own, word) in WORDS {
+        if mark.marks().contains(own) {
+            if !text.is_empty() {
+                text.push(' ');
+            }
+            text.push_str(word);
+            if let Some(cause) = mark.cause().filter(|_| own == Marks::DETECTED) {
+                text.push(' ');
+                text.push_str(cause.name());
+            }
+        }
+    }
+    text
+}
+
+/// RFC 4180: a field with a comma is quoted.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}

@@ -1,0 +1,227 @@
+//! What the manual leaves open, as an explanation of bytes that differ from the model with its defaults.
+//!
+//! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
+
+use super::judge::{AttemptFacts, known};
+use super::sim;
+use crate::choice::{Choice, SELF_TEST_TIME, of_drives, of_self_tests, of_the_bus};
+use crate::language::syntax::{DriveRange, Header};
+use crate::language::write::ring_prefix;
+use crate::rig::run::twin;
+use crate::twin::{Comparison, Conversation, Divergence, Done};
+use harness_bench::scenario::times::Duration;
+use harness_proto::time::Span;
+
+/// The largest ring of which single drives are tried.
+const SMALL: u8 = 16;
+
+/// Choices that explain every byte of an attempt.
+pub struct Explanation {
+    /// They, in words.
+    pub(crate) words: String,
+    /// What makes simulated drives behave so.
+    pub(crate) header: Header,
+    /// How the conversations compare with these drives'.
+    pub(crate) comparisons: Vec<Comparison>,
+    /// Whether the bytes that they explain come before the steps of the scenario: nothing that it asks for depends on the choices.
+    pub(crate) before_steps: bool,
+}
+
+/// The choices that explain every byte of an attempt; `None` where the model's defaults explain them as well, or where no choice does.
+pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
+    let real = facts.exactness.tolerance > Span::ZERO && !facts.exactness.knows_cells;
+    if !real {
+        return None;
+    }
+    let (mut first, monitored) = compare(&Header::default(), facts).err()?;
+    let mut open = choices(facts);
+    open.retain(|choice| choice.property != "time-out" || monitored);
+    let (mut header, mut chosen) = (Header::default(), Vec::new());
+    // Each choice explains more bytes than those before it.
+    loop {
+        let mut further = None;
+        for (choice, whose, more) in candidates(&open, &first, &header, facts) {
+            let all = header.and(&more);
+            match compare(&all, facts) {
+                // It moves the model's bytes so that they seem to be late, and explains nothing.
+                Ok(comparisons)
+                    if silence(&comparisons).is_some_and(|own| !own.is_behind(&first))
+                        || compared(&comparisons) < first.compared => {}
+                Ok(comparisons) => {
+                    chosen.push(format!("{choice}{whose}"));
+                    let has_steps = |own: &Conversation| own.has_steps();
+                    let last = first.conversation.min(facts.conversations.len());
+                    return Some(Explanation {
+                        words: chosen.join(" and "),
+                        header: all,
+                        comparisons,
+                        before_steps: !facts.conversations[..last].iter().any(has_steps),
+                    });
+                }
+                Err((place, _)) if further.is_none() && place.is_behind(&first) => {
+                    further = Some((place, format!("{choice}{whose}"), all, choice.property));
+                }
+                Err(_) => {}
+            }
+        }
+        let (place, words, all, property) = further?;
+        open.retain(|choice| choice.property != property);
+        chosen.push(words);
+        (first, header) = (place, all);
+    }
+}
+
+/// Where an attempt first differs from a model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct FirstDifference {
+    /// In which conversation, counted from 1; 0 where the choice makes no ring.
+    conversation: usize,
+    /// How; `None` where the choice makes no ring.
+    divergence: Option<Box<Divergence>>,
+    /// How many bytes were compared up to there. What ends its comparison before explains nothing (ND21 9.9).
+    compared: u64,
+}
+
+impl FirstDifference {
+    fn is_behind(&self, other: &Self) -> bool {
+        let byte = |own: &Self| own.divergence.as_ref().map(|own| own.byte);
+        let place = |own: &Self| (own.conversation, byte(own));
+        place(self) > place(other)
+    }
+}
+
+/// How many bytes were compared.
+fn compared(comparisons: &[Comparison]) -> u64 {
+    comparisons.iter().map(|own| own.compared).sum()
+}
+
+/// Where a silence of the bench has ended the comparison.
+fn silence(comparisons: &[Comparison]) -> Option<FirstDifference> {
+    let last = comparisons.last().filter(|own| own.silenced)?;
+    Some(FirstDifference {
+        conversation: comparisons.len(),
+        divergence: last.divergence.clone().map(Box::new),
+        compared: compared(comparisons),
+    })
+}
+
+/// What is tried behind `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
+fn candidates<'c>(
+    open: &'c [Choice],
+    first: &FirstDifference,
+    header: &Header,
+    facts: &AttemptFacts<'_>,
+) -> Vec<(&'c Choice, String, Header)> {
+    let rings = || facts.way.rings.iter().enumerate();
+    let every = |choice: &Choice| choice.in_all(facts.way.rings.len());
+    let mut all: Vec<_> = open
+        .iter()
+        .map(|choice| (choice, String::new(), every(choice)))
+        .collect();
+    for choice in open {
+        let whole = header.and(&every(choice));
+        let tells = match compare(&whole, facts) {
+            Ok(comparisons) => silence(&comparisons).is_some(),
+            Err((place, _)) => place != *first,
+        };
+        if !tells {
+            continue;
+        }
+        for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
+            let single = (0..size.drives()).map(|drive| {
+                let own = choice.in_some(DriveRange::one(ring, drive));
+                let words = format!(" in drive {}{drive}", ring_prefix(ring));
+                (choice, words, own.into_iter().collect())
+            });
+            all.extend(single);
+        }
+    }
+    all
+}
+
+/// The choices that the rig's file and its profile do not settle.
+fn choices(facts: &AttemptFacts<'_>) -> Vec<Choice> {
+    let profile = facts.rig.profile.iter().flat_map(|own| &own.lines);
+    let sim = facts.rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    let settings = sim::read(profile.chain(sim)).setups;
+    let is_settled = |property| settings.iter().any(|own| own.sets() == Some(property));
+    let settled = |choice: &Choice| {
+        is_settled(choice.property) || choice.with.is_some() && is_settled(SELF_TEST_TIME)
+    };
+    let self_tests = silent_for(facts.conversations).map(of_self_tests);
+    of_the_bus()
+        .chain(of_drives())
+        .chain(self_tests.into_iter().flatten())
+        .filter(|choice| !settled(choice))
+        .collect()
+}
+
+/// A pause of received bytes that is longer than any between two bytes of drives that answer.
+const PAUSE: Span = Span::from_millis(50);
+
+/// How long drives may have been silent behind their reset (ND21 10.5, 11.8), where the bench has sent bytes to which none came back: the
+/// middle between the longest time for which they certainly were and the shortest for which they can have been.
+fn silent_for(conversations: &[Conversation]) -> Option<Duration> {
+    let (mut least, mut most) = (Span::ZERO, None::<Span>);
+    for own in conversations {
+        for pair in own.received.windows(2) {
+            let [(ring, last, _), (next_ring, next, _)] = pair else {
+                continue;
+            };
+            if ring != next_ring || next.since(*last) < PAUSE {
+                continue;
+            }
+            let unanswered = own.done.iter().filter_map(|(to, done)| match done {
+                Done::Sent(at, _) if to == ring && at > last && *at + PAUSE < *next => Some(*at),
+                _ => None,
+            });
+            if let Some(unanswered) = unanswered.max() {
+                let most_here = next.since(*last);
+                least = least.max(unanswered.since(*last));
+                most = Some(most.map_or(most_here, |most| most.min(most_here)));
+            }
+        }
+    }
+    let most = most.filter(|most| *most > least)?;
+    let middle = (least.as_nanos() + most.as_nanos()) / 2;
+    let whole = middle / 1_000_000;
+    Some(match Span::from_millis(whole) > least {
+        true => Duration::millis(whole),
+        false => Duration::micros(middle / 1_000),
+    })
+}
+
+/// How an attempt compares with drives with this header that have just been switched on, up to a silence of the bench that may be the
+/// cause of a difference.
+///
+/// # Errors
+/// Where it first differs, and whether one of the drives monitors time-outs.
+fn compare(
+    header: &Header,
+    facts: &AttemptFacts<'_>,
+) -> Result<Vec<Comparison>, (FirstDifference, bool)> {
+    (facts.alive)();
+    let Ok(mut twin) = twin(facts.rig, &known(facts.rig).and(header)) else {
+        let nowhere = FirstDifference {
+            conversation: 0,
+            divergence: None,
+            compared: 0,
+        };
+        return Err((nowhere, false));
+    };
+    let comparisons = twin.follow_while_alike(facts.conversations, facts.exactness);
+    let conversation = comparisons.len();
+    // What differs behind a silence of the bench says nothing about a choice.
+    let last = comparisons.last().filter(|own| !own.silenced);
+    match last.and_then(|own| own.divergence.clone()).map(Box::new) {
+        None => Ok(comparisons),
+        divergence => Err((
+            FirstDifference {
+                conversation,
+                divergence,
+                compared: compared(&comparisons),
+            },
+            twin.monitors(),
+        )),
+    }
+}

@@ -1,0 +1,393 @@
+//! The twin and its input.
+
+use super::compare::Comparer;
+use super::comparison::{Comparison, Exactness};
+use super::known::Knowledge;
+use super::unasked::EARLIEST_TIME_OUT;
+use crate::link::BesideTheBus;
+use crate::link::SimulatedLink;
+use harness_bench::link::{Line, Link, LinkEvent, Moment, Octets, PlacedFault};
+use harness_proto::line::Received;
+use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+use std::collections::BTreeSet;
+
+/// How much longer than its conversation a twin in real time listens. Real clocks are late at times, and bytes of the ring may arrive a
+/// moment before those of its twin.
+const SLACK: Span = Span::from_millis(1);
+
+/// What the bench did to a ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// It sent a byte, whose start bit was due at this time.
+    Sent(Instant, u8),
+    /// It came to the step at this place of the scenario's text.
+    Step(usize),
+    /// It injected a fault, at this time or at the given moment.
+    Fault(Instant, PlacedFault, Moment),
+}
+
+/// One conversation as the master's end of the rings saw it. Times are the conversation's own.
+#[derive(Clone, Debug, Default)]
+pub struct Conversation {
+    /// What the bench did, each with its ring, in order.
+    pub done: Vec<(usize, Done)>,
+    /// Bytes received: ring, when, and the byte.
+    pub received: Vec<(usize, Instant, Received)>,
+    /// When the next conversation began, or when this one was over.
+    pub end: Instant,
+}
+
+impl Conversation {
+    /// The conversations of a record; `byte_time` is that of its line. What SYNCO and answers of a probe were is part of
+    /// the conversation, but a simulated link probes a copy of itself (`probes_a_copy`).
+    #[must_use]
+    pub fn all(events: &[LinkEvent], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
+        let mut all = Vec::new();
+        let mut open = Self::default();
+        for event in events {
+            match event {
+                LinkEvent::Begin(at) => {
+                    let end = open.end.max(*at);
+                    all.push(Self {
+                        end,
+                        ..std::mem::take(&mut open)
+                    });
+                }
+                LinkEvent::Step(place) => open.done.push((0, Done::Step(*place))),
+                LinkEvent::Sent(ring, end, sent) => {
+                    let bytes = sent.as_out().octets();
+                    let mut start = *end - byte_time * bytes.len() as u64;
+                    for byte in bytes {
+                        open.done.push((*ring, Done::Sent(start, *byte)));
+                        start += byte_time;
+                    }
+                    open.end = open.end.max(*end);
+                }
+                LinkEvent::Received(ring, at, heard) => {
+                    open.received
+                        .extend(heard.octet().map(|byte| (*ring, *at, byte)));
+                    open.end = open.end.max(*at);
+                }
+                LinkEvent::Fault(ring, at, fault, moment) => {
+                    open.done.push((*ring, Done::Fault(*at, *fault, *moment)));
+                }
+                LinkEvent::Probe(ring, at, sent, came) if !probes_a_copy => {
+                    let mut start = *at;
+                    for byte in sent {
+                        open.done.push((*ring, Done::Sent(start, *byte)));
+                        start += byte_time;
+                    }
+                    // Their times are lost: each as soon as it can have come.
+                    let received = came.iter().map(|byte| (*ring, start, *byte));
+                    open.received.extend(received);
+                }
+                LinkEvent::Look(look) => open.end = open.end.max(look.at),
+                LinkEvent::Probe(..) | LinkEvent::Tapped(..) | LinkEvent::Trouble(_) => {}
+            }
+        }
+        all.push(open);
+        all
+    }
+
+    /// The bytes sent into a ring, and whether they went round whole.
+    pub(crate) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
+        let mut damaged = BTreeSet::new();
+        let mut sent = Vec::new();
+        let own = self.done.iter().filter(|(at, _)| *at == ring);
+        for (_, done) in own {
+            let next = sent.len() as u64 + 1;
+            match done {
+                Done::Sent(_, byte) => sent.push(*byte),
+                Done::Fault(_, PlacedFault::Link(..), Moment::Byte(byte)) => {
+                    damaged.insert(*byte);
+                }
+                Done::Fault(..) => {
+                    damaged.insert(next);
+                }
+                Done::Step(_) => {}
+            }
+        }
+        let numbered = (1..).zip(sent);
+        numbered
+            .map(|(number, byte)| (byte, !damaged.contains(&number)))
+            .collect()
+    }
+
+    /// When each byte sent into a ring began.
+    pub(crate) fn sent_at(&self, ring: usize) -> Vec<Instant> {
+        let own = self.done.iter().filter(|(at, _)| *at == ring);
+        let starts = own.filter_map(|(_, done)| match done {
+            Done::Sent(at, _) => Some(*at),
+            _ => None,
+        });
+        starts.collect()
+    }
+
+    /// The step that was running when the `index`-th byte, counted from 0, was sent into a ring.
+    pub(crate) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
+        let mut step = None;
+        let mut sent = 0;
+        for (at, done) in &self.done {
+            match done {
+                Done::Step(place) if sent <= index => step = Some(*place),
+                Done::Sent(..) if *at == ring => sent += 1,
+                _ => {}
+            }
+        }
+        step
+    }
+
+    /// Whether it is that of a scenario, and not of what comes before or behind it.
+    #[must_use]
+    pub fn has_steps(&self) -> bool {
+        let step = |(_, done): &(usize, Done)| matches!(done, Done::Step(_));
+        self.done.iter().any(step)
+    }
+
+    /// Whether the bench sent something.
+    pub(crate) fn sends(&self) -> bool {
+        let sent = |(_, done): &(usize, Done)| matches!(done, Done::Sent(..));
+        self.done.iter().any(sent)
+    }
+
+    /// The bytes received from a ring.
+    pub(crate) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
+        let own = self.received.iter().filter(|(at, ..)| *at == ring);
+        own.map(|(_, at, byte)| (*at, *byte)).collect()
+    }
+}
+
+/// What a twin received from a ring in a conversation.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TwinBytes {
+    /// The bytes, and when each came.
+    pub(crate) bytes: Vec<(Instant, Received)>,
+    /// The place of the first one that a drive sent unasked (ND21 9.9).
+    pub(crate) unasked: Option<usize>,
+}
+
+impl TwinBytes {
+    /// Reads the bytes received from a ring of the link.
+    fn fetch(&mut self, link: &mut SimulatedLink, ring: usize) {
+        while let Some((at, byte, asked)) = link.receive_with_cause(ring) {
+            if !asked {
+                self.unasked.get_or_insert(self.bytes.len());
+            }
+            self.bytes.push((at, byte));
+        }
+    }
+}
+
+/// A simulated ring that gets the same bytes as a real one.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    link: SimulatedLink,
+    sizes: Vec<RingSize>,
+    knowledge: Knowledge,
+}
+
+impl Twin {
+    /// A twin with these rings, which have just been switched on.
+    #[must_use]
+    pub fn new(link: SimulatedLink, sizes: &[RingSize]) -> Self {
+        Self {
+            link,
+            sizes: sizes.to_vec(),
+            knowledge: Knowledge::default(),
+        }
+    }
+
+    /// The simulated ring of a twin to which nothing has been sent.
+    #[must_use]
+    pub fn into_link(self) -> SimulatedLink {
+        self.link
+    }
+
+    /// Plays a conversation and compares the bytes received with those of the twin.
+    pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
+        self.follow_rings(conversation, exactness, &BTreeSet::new())
+    }
+
+    /// The same, but some rings are not compared.
+    fn follow_rings(
+        &mut self,
+        conversation: &Conversation,
+        exactness: Exactness,
+        left_out: &BTreeSet<usize>,
+    ) -> Comparison {
+        let real_time = exactness.tolerance > Span::ZERO;
+        let slack = if real_time { SLACK } else { Span::ZERO };
+        let mut recording = self.recording();
+        let (mut received, monitored) = self.answer(conversation, slack);
+        if real_time {
+            self.add_later(conversation, exactness.tolerance, &mut received);
+        }
+        recording.extend(self.recording());
+        let fault = |(_, done): &(usize, Done)| matches!(done, Done::Fault(..));
+        self.knowledge.converse(conversation.done.iter().any(fault));
+        let mut comparer = Comparer {
+            exactness,
+            byte_time: self.link.byte_time(),
+            knowledge: &mut self.knowledge,
+            recording,
+            earliest_time_out: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
+            comparison: Comparison {
+                monitored,
+                left_out: !left_out.is_empty(),
+                ..Comparison::default()
+            },
+        };
+        let rings = self.sizes.iter().zip(&received).enumerate();
+        for (ring, (size, expected)) in rings.filter(|(ring, _)| !left_out.contains(ring)) {
+            comparer.ring(ring, *size, conversation, expected);
+        }
+        comparer.comparison
+    }
+
+    /// Drives whose oscilloscope is not stopped (ND21 14.10.6.5).
+    fn recording(&self) -> BTreeSet<(usize, u8)> {
+        self.drives(ram::SCOPE_STATUS, |status| {
+            status & scope_status::STOPPED == 0
+        })
+    }
+
+    /// Whether a drive monitors time-outs (ND21 14.10.2).
+    pub(crate) fn monitors(&self) -> bool {
+        let monitors = |flags: u8| flags & flags2::MONITORING != 0;
+        !self.drives(ram::FLAGS2, monitors).is_empty()
+    }
+
+    /// Drives with such a byte in a cell.
+    fn drives(&self, address: u16, such: impl Fn(u8) -> bool) -> BTreeSet<(usize, u8)> {
+        let rings = self.sizes.iter().enumerate();
+        let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
+        let holds =
+            |(ring, drive): &(usize, u8)| such(self.link.peek(*ring, *drive, address).unwrap_or(0));
+        drives.filter(holds).collect()
+    }
+
+    /// Plays conversations one after another. In real time no model knows the state of a ring after drives have sent unasked bytes (9.9),
+    /// because these race with the master's bytes. Unless a check sequence has ended the race, the ring is not compared any more after
+    /// that conversation, and the second value says that another twin is needed.
+    pub fn follow_all(
+        &mut self,
+        conversations: &[Conversation],
+        exactness: Exactness,
+    ) -> (Vec<Comparison>, bool) {
+        let mut comparisons: Vec<Comparison> = Vec::new();
+        let mut left_out = BTreeSet::new();
+        self.knowledge.begin();
+        for conversation in conversations {
+            if left_out.len() == self.sizes.len() {
+                break;
+            }
+            let comparison = self.follow_rings(conversation, exactness, &left_out);
+            left_out.extend(comparison.open_races());
+            comparisons.push(comparison);
+        }
+        let diverged = comparisons.iter().any(|c| c.divergence.is_some());
+        (comparisons, diverged || !left_out.is_empty())
+    }
+
+    /// The same up to the first conversation in which a byte differs.
+    pub fn follow_while_alike(
+        &mut self,
+        conversations: &[Conversation],
+        exactness: Exactness,
+    ) -> Vec<Comparison> {
+        let mut comparisons = Vec::new();
+        for conversation in conversations {
+            let comparison = self.follow(conversation, exactness);
+            let last = comparison.divergence.is_some() || comparison.open_races().next().is_some();
+            comparisons.push(comparison);
+            if last {
+                break;
+            }
+        }
+        comparisons
+    }
+
+    /// Plays a conversation and `slack` more, and returns what the twin received, ring by ring, and whether a drive has monitored
+    /// time-outs meanwhile.
+    fn answer(&mut self, conversation: &Conversation, slack: Span) -> (Vec<TwinBytes>, bool) {
+        self.link.begin();
+        let mut monitored = self.monitors();
+        let byte_time = self.link.byte_time();
+        let mut done = conversation.done.iter().peekable();
+        while let Some((ring, done_here)) = done.next() {
+            match done_here {
+                Done::Sent(at, byte) => {
+                    // Bytes without a gap go out together.
+                    let mut bytes = vec![*byte];
+                    let mut next = *at + byte_time;
+                    while let Some((_, Done::Sent(_, byte))) =
+                        done.next_if(|(own, done)| match done {
+                            Done::Sent(at, _) => own == ring && *at == next,
+                            _ => false,
+                        })
+                    {
+                        bytes.push(*byte);
+                        next += byte_time;
+                    }
+                    self.link.run_until(*at);
+                    monitored = monitored || self.monitors();
+                    self.link.send_octets(*ring, &bytes);
+                }
+                Done::Fault(at, fault, moment) => {
+                    if *moment == Moment::Now {
+                        self.link.run_until(*at);
+                    }
+                    // A byte that is due is on the wire before a fault that comes behind it.
+                    self.link.wait(self.link.now());
+                    self.link.inject(*ring, *fault, *moment);
+                }
+                Done::Step(_) => {}
+            }
+        }
+        self.link.run_until(conversation.end + slack);
+        let mut received = vec![TwinBytes::default(); self.sizes.len()];
+        for (ring, received) in received.iter_mut().enumerate() {
+            received.fetch(&mut self.link, ring);
+        }
+        (received, monitored || self.monitors())
+    }
+
+    /// Adds what the twin would receive until `tolerance` behind the end of a conversation, where more bytes came than it received itself:
+    /// a drive may be that much earlier than the model. The twin itself stays where it is.
+    fn add_later(&self, conversation: &Conversation, tolerance: Span, received: &mut [TwinBytes]) {
+        let more = |(ring, own): (usize, &TwinBytes)| {
+            conversation.received_in(ring).len() > own.bytes.len()
+        };
+        if !received.iter().enumerate().any(more) {
+            return;
+        }
+        let mut later = self.link.clone();
+        later.run_until(conversation.end + tolerance);
+        for (ring, received) in received.iter_mut().enumerate() {
+            received.fetch(&mut later, ring);
+        }
+    }
+
+    /// Lets time pass in which nothing is sent, until every drive has tested itself after its power-up (11.8).
+    pub fn rest_through_self_tests(&mut self) {
+        const STEP: Span = Span::from_millis(200);
+        const LONGEST: Span = Span::from_millis(61_000);
+        let end = self.link.now() + LONGEST;
+        loop {
+            let next = self.link.now() + STEP;
+            self.link.run_until(next);
+            if next >= end || !self.in_reset() {
+                return;
+            }
+        }
+    }
+
+    /// Whether a drive is in its reset mode (11.8).
+    fn in_reset(&self) -> bool {
+        let resets = |status: u8| status & status_bits::RESET != 0;
+        !self.drives(ram::STATUS, resets).is_empty()
+    }
+}
