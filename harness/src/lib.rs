@@ -31,6 +31,7 @@
 //! and may change with every version; `ARCHITECTURE.md` describes them, and `cargo doc --document-private-items` shows them.
 #![forbid(unsafe_code)]
 
+#[doc(inline)]
 pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
@@ -39,6 +40,7 @@ pub use harness_bench::{
     partition, port, qualify, regular, rig, scenario, serve, signals, top, traffic, trouble, web,
 };
 use harness_proto::counted;
+#[doc(inline)]
 pub use scenario::verdict::Verdict;
 
 mod command;

@@ -234,10 +234,10 @@ pub fn write(
     })
 }
 
-/// Writes a text like [`write`].
+/// Writes a text like [`write()`].
 ///
 /// # Errors
-/// As of [`write`].
+/// As of [`write()`].
 pub fn write_text(path: &Path, text: impl AsRef<[u8]>) -> io::Result<()> {
     write(path, |mut out| {
         out.write_all(text.as_ref())?;

@@ -77,7 +77,7 @@ pub struct SegmentServer {
 /// The slave without which a bench would have none.
 const USUAL: u8 = 8;
 
-/// The slaves of a header, and those with these addresses; by default that is [`USUAL`], if there is no header. The bus controls these: their interface
+/// The slaves of a header, and those with these addresses; by default that is `USUAL`, if there is no header. The bus controls these: their interface
 /// is 2 (1621), unless the header says another.
 ///
 /// # Errors

@@ -462,7 +462,7 @@ impl<A: Accounting> Pump<A> {
         now
     }
 
-    /// When the next byte is due for which the link must be awake: the answer announced by [`Line::attend`], or the last byte sent. `None`
+    /// When the next byte is due for which the link must be awake: the answer announced by `Line::attend`, or the last byte sent. `None`
     /// for a port behind an adapter, whose delivery times are unpredictable.
     pub fn awaited(&self, now: Instant) -> Option<Instant> {
         let out = |port: &&PortEnd<A>| port.accounting.is_owed() && port.wire.is_prompt();

@@ -1,6 +1,6 @@
 //! Simulated rings served to anyone's master, over a pseudo terminal or a socket, in real time.
 //!
-//! [`Server`] is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. Each bus has its own
+//! `Server` is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. Each bus has its own
 //! [`ServedBus`]. [`serve`] is the shell around it: one thread that waits for pseudo terminals, sockets, signals and lines of control.
 
 pub mod arrival;

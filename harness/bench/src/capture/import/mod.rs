@@ -1,4 +1,4 @@
-//! Files of other programs: one table of the formats that are read ([`FORMATS`]).
+//! Files of other programs: one table of the formats that are read (`FORMATS`).
 //!
 //! Each format says by the first bytes whether a file is of it, and reads it: into a capture, where the file says which links it
 //! is of, or into channels, of which the user says which links they are ([`NamedLink`]). Levels of a line are decoded by a receiver of
