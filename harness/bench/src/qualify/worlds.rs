@@ -1,0 +1,439 @@
+//! A set of worlds: what came over a bus is right if some right drive could have sent it just then.
+//!
+//! Each world is a right drive with values for what is not known: what the manual leaves open, and when each piece reached it. Its
+//! clock stands anywhere against that of the computer, so a world keeps an interval for the difference. Each piece that came removes the
+//! worlds that could not have sent it then. If none is left, no right drive has sent this.
+//!
+//! Worlds that do the same from now on are merged. There are at most [`MOST_WORLDS`]: where that is not enough, nothing is accused.
+
+use harness_proto::time::{Instant, Span};
+use std::collections::{BTreeMap, VecDeque};
+
+/// The most worlds at one time.
+pub const MOST_WORLDS: usize = 4_096;
+
+/// The most steps of all worlds together.
+const MOST_STEPS: usize = 1_000_000;
+
+/// The clock of a drive may be off by this part of a time: 2 % (UNITEK 5.2; our choice for other buses).
+const DRIFT: i64 = 50;
+
+/// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
+pub trait Model: Clone {
+    /// A frame or a telegram.
+    type Piece: Clone;
+
+    /// How long a scan lasts.
+    const SCAN: Span;
+
+    /// When it next does something by itself; `None` while it only waits for pieces.
+    fn due(&self) -> Option<Instant>;
+
+    /// Runs up to this time and including it.
+    fn advance(&mut self, to: Instant);
+
+    /// A piece reaches it. It has been run up to this time.
+    fn hear(&mut self, at: Instant, piece: &Self::Piece);
+
+    /// Takes the next piece that it sends now.
+    fn say(&mut self) -> Option<Self::Piece>;
+
+    /// Whether what it says can be what came: the same but for what means nothing, and within the band of what moves.
+    fn is(&self, said: &Self::Piece, came: &Self::Piece) -> bool;
+
+    /// A checksum of all that decides what it does from now on. Times in it count from the present.
+    fn state(&self) -> u64;
+}
+
+/// A piece and when it can have been on the bus, on the computer's clock.
+#[derive(Clone, Debug)]
+pub struct Timed<P> {
+    pub earliest: Instant,
+    pub latest: Instant,
+    pub piece: P,
+}
+
+/// What a set of worlds says of a conversation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Judged<P> {
+    /// A right drive could have sent this.
+    Right,
+    /// No right drive could: the place of the first piece that it would not have sent, which is behind the last one where a piece is
+    /// missing; and what the last world would have sent.
+    Wrong(usize, Option<P>),
+    /// There are more worlds than are kept.
+    TooMany,
+}
+
+/// A conversation with one drive, as the computer has seen it.
+#[derive(Clone, Debug)]
+pub struct Conversation<P> {
+    /// What was sent to it, in order.
+    pub sent: Vec<Timed<P>>,
+    /// What came from it, in order.
+    pub came: Vec<Timed<P>>,
+    /// Up to when all that came was read.
+    pub end: Instant,
+    /// How much later than a right drive says it a piece may be on the bus.
+    pub lag: Span,
+}
+
+/// One right drive.
+#[derive(Clone, Debug)]
+struct World<M: Model> {
+    model: M,
+    /// Its own clock.
+    at: i64,
+    /// How far the computer's clock is ahead of it.
+    ahead: (i64, i64),
+    /// How many of the pieces that were sent have reached it.
+    heard: usize,
+    /// What it has said that has not come so far, with the time on its own clock.
+    said: VecDeque<(i64, M::Piece)>,
+}
+
+/// Worlds that have heard the same number of pieces by the same time and are in the same state are one. The time of one that only waits
+/// does not count.
+type Key = (usize, i64, u64);
+
+impl<M: Model> World<M> {
+    fn key(&self) -> Key {
+        let at = if self.model.due().is_some() {
+            self.at
+        } else {
+            0
+        };
+        (self.heard, at, self.model.state())
+    }
+
+    /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
+    fn within(mut self, least: i64, most: i64) -> Option<Self> {
+        self.ahead = (self.ahead.0.max(least), self.ahead.1.min(most));
+        (self.ahead.0 <= self.ahead.1).then_some(self)
+    }
+
+    /// Takes another world in of the same key.
+    fn merge(&mut self, other: &Self) {
+        let moved = other.at - self.at;
+        self.ahead.0 = self.ahead.0.min(other.ahead.0 + moved);
+        self.ahead.1 = self.ahead.1.max(other.ahead.1 + moved);
+    }
+
+    fn listen(&mut self) {
+        while let Some(piece) = self.model.say() {
+            self.said.push_back((self.at, piece));
+        }
+    }
+
+    fn advance(&mut self, to: i64) {
+        let drift = (to - self.at) / DRIFT;
+        self.ahead = (self.ahead.0 - drift, self.ahead.1 + drift);
+        self.at = to;
+        self.model.advance(instant(to));
+        self.listen();
+    }
+}
+
+const fn units(at: Instant) -> i64 {
+    at.since_start().units().cast_signed()
+}
+
+fn instant(at: i64) -> Instant {
+    Instant::START + Span::from_units(at.unsigned_abs())
+}
+
+/// Worlds by what distinguishes them, the earliest first: what follows from one comes behind it.
+struct Worlds<M: Model>(BTreeMap<Key, World<M>>);
+
+impl<M: Model> Worlds<M> {
+    fn insert(&mut self, world: World<M>) {
+        match self.0.entry(world.key()) {
+            std::collections::btree_map::Entry::Vacant(place) => {
+                place.insert(world);
+            }
+            std::collections::btree_map::Entry::Occupied(mut own) => own.get_mut().merge(&world),
+        }
+    }
+}
+
+/// Whether one of these right drives, which have just been made and whose clocks begin with that of the conversation, could have sent
+/// what came.
+pub fn judge<M: Model>(drives: Vec<M>, talk: &Conversation<M::Piece>) -> Judged<M::Piece> {
+    // Drives of different kinds are never merged: each is judged by itself.
+    let mut first = None;
+    for drive in drives {
+        match judge_one(drive, talk) {
+            Judged::Right => return Judged::Right,
+            other => first = first.or(Some(other)),
+        }
+    }
+    first.unwrap_or(Judged::TooMany)
+}
+
+fn judge_one<M: Model>(model: M, talk: &Conversation<M::Piece>) -> Judged<M::Piece> {
+    let mut steps = 0;
+    let mut worlds = Worlds(BTreeMap::new());
+    worlds.insert(World {
+        model,
+        at: 0,
+        ahead: (0, 0),
+        heard: 0,
+        said: VecDeque::new(),
+    });
+    for place in 0..=talk.came.len() {
+        let mut explained = Worlds(BTreeMap::new());
+        let mut expected = None;
+        while let Some((_, world)) = worlds.0.pop_first() {
+            steps += 1;
+            if steps > MOST_STEPS || worlds.0.len() + explained.0.len() > MOST_WORLDS {
+                return Judged::TooMany;
+            }
+            match world.said.front() {
+                Some((_, piece)) => {
+                    let piece = piece.clone();
+                    match talk.comes(world, place) {
+                        Some(world) => explained.insert(world),
+                        None => expected = Some(piece),
+                    }
+                }
+                None => {
+                    for next in talk.next(world, place, &mut explained) {
+                        worlds.insert(next);
+                    }
+                }
+            }
+        }
+        if explained.0.is_empty() {
+            return Judged::Wrong(place, expected);
+        }
+        worlds = explained;
+    }
+    Judged::Right
+}
+
+impl<P: Clone> Conversation<P> {
+    /// A world that has said something, where that is what came at a place.
+    fn comes<M: Model<Piece = P>>(&self, mut world: World<M>, place: usize) -> Option<World<M>> {
+        let (at, said) = world.said.pop_front()?;
+        let (lag, scan) = (units_of(self.lag), units_of(M::SCAN));
+        let Some(came) = self.came.get(place) else {
+            // It may come later than the computer has listened.
+            return world.within(units(self.end) - lag - at, i64::MAX);
+        };
+        let fits = world.model.is(&said, &came.piece);
+        let (earliest, latest) = (units(came.earliest), units(came.latest));
+        let world = world.within(earliest - lag - scan - at, latest + scan - at);
+        world.filter(|_| fits)
+    }
+
+    /// What a world that has nothing to say can do next: hear what was sent at one time or another, or do its next step. At the end of
+    /// the conversation it may have done its last one.
+    fn next<M: Model<Piece = P>>(
+        &self,
+        world: World<M>,
+        place: usize,
+        ended: &mut Worlds<M>,
+    ) -> Vec<World<M>> {
+        let mut all = Vec::new();
+        let scan = units_of(M::SCAN);
+        let came = self.came.get(place);
+        let end = came.map_or(self.end, |own| own.latest);
+        let end = units(end) + scan;
+        let due = world.model.due().map(units);
+        let sent = self.sent.get(world.heard);
+        if let Some(sent) = sent {
+            let (earliest, latest) = (units(sent.earliest), units(sent.latest).min(end));
+            match due {
+                // How long it has waited makes no difference to it.
+                None => {
+                    let begun = earliest.max(world.at + world.ahead.0);
+                    let mut waited = world.clone();
+                    waited.ahead = (begun - world.at, latest + scan - world.at);
+                    all.extend(waited.within(i64::MIN, i64::MAX));
+                }
+                Some(due) => {
+                    let first = (earliest - scan - world.ahead.1 - world.at).max(0);
+                    let mut at = world.at + (first + scan - 1) / scan * scan;
+                    while at < due && at + world.ahead.0 <= latest + scan {
+                        let own = world.clone();
+                        if let Some(mut own) = own.within(earliest - scan - at, latest + scan - at)
+                        {
+                            own.advance(at);
+                            all.push(own);
+                        }
+                        at += scan;
+                    }
+                }
+            }
+            for own in &mut all {
+                own.model.hear(instant(own.at), &sent.piece);
+                own.heard += 1;
+                own.listen();
+            }
+        }
+        let unheard = sent.map_or(i64::MAX, |own| units(own.latest) + scan);
+        if came.is_none() && unheard.min(due.map_or(i64::MAX, |due| due + world.ahead.1)) >= end {
+            ended.insert(world.clone());
+        }
+        if let Some(due) = due
+            && let Some(mut own) = world.within(i64::MIN, unheard.min(end) - due)
+        {
+            own.advance(due);
+            all.push(own);
+        }
+        all
+    }
+}
+
+const fn units_of(span: Span) -> i64 {
+    span.units().cast_signed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that holds a number, which counts up each scan while it runs, and says it where it is asked.
+    #[derive(Clone, Debug, Default)]
+    struct Counter {
+        scans: u64,
+        runs: bool,
+        number: u8,
+        /// Says its number at 100 by itself.
+        alarm: bool,
+        /// At which numbers it was stopped, as a checksum.
+        stops: u64,
+        said: VecDeque<u8>,
+    }
+
+    /// 0 asks, 1 starts, 2 stops; a higher number is set.
+    impl Model for Counter {
+        type Piece = u8;
+        const SCAN: Span = Span::from_millis(1);
+
+        fn due(&self) -> Option<Instant> {
+            self.runs.then(|| ms(self.scans + 1))
+        }
+
+        fn advance(&mut self, to: Instant) {
+            let to = to.since_start().units() / Self::SCAN.units();
+            while self.scans < to {
+                self.scans += 1;
+                self.number = self.number.saturating_add(u8::from(self.runs));
+                if self.runs && self.alarm && self.number == 100 {
+                    self.said.push_back(self.number);
+                }
+            }
+        }
+
+        fn hear(&mut self, _: Instant, piece: &u8) {
+            match piece {
+                0 => self.said.push_back(self.number),
+                1 => self.runs = true,
+                2 => {
+                    self.runs = false;
+                    self.stops = self.stops.wrapping_mul(1_000_003) + u64::from(self.number);
+                }
+                other => self.number = *other,
+            }
+        }
+
+        fn say(&mut self) -> Option<u8> {
+            self.said.pop_front()
+        }
+
+        fn is(&self, said: &u8, came: &u8) -> bool {
+            said == came
+        }
+
+        fn state(&self) -> u64 {
+            self.stops << 9 ^ u64::from(self.number) << 1 | u64::from(self.runs)
+        }
+    }
+
+    fn ms(millis: u64) -> Instant {
+        Instant::START + Span::from_millis(millis)
+    }
+
+    /// What was sent can reach the drive up to 3 ms later, and what came was on the bus up to 1 ms before.
+    fn judged(alarm: bool, sent: &[(u64, u8)], came: &[(u64, u8)]) -> Judged<u8> {
+        let timed = |list: &[(u64, u8)], before, behind| -> Vec<_> {
+            let own = |(at, piece): &(u64, u8)| Timed {
+                earliest: ms(at - before),
+                latest: ms(at + behind),
+                piece: *piece,
+            };
+            list.iter().map(own).collect()
+        };
+        let drive = Counter {
+            alarm,
+            ..Counter::default()
+        };
+        let talk = Conversation {
+            sent: timed(sent, 0, 3),
+            came: timed(came, 1, 0),
+            end: ms(300),
+            lag: Span::from_millis(1),
+        };
+        judge(vec![drive], &talk)
+    }
+
+    /// What it holds does not depend on when it was set.
+    #[test]
+    fn a_value_is_compared_exactly_where_nothing_moves() {
+        assert_eq!(
+            judged(false, &[(10, 7), (20, 0)], &[(22, 7)]),
+            Judged::Right
+        );
+        let wrong = judged(false, &[(10, 7), (20, 0)], &[(22, 8)]);
+        assert_eq!(wrong, Judged::Wrong(0, Some(7)));
+    }
+
+    /// A value that moves is compared between the earliest and the latest start.
+    #[test]
+    fn a_value_that_moves_is_one_that_the_times_allow() {
+        let reads = |number| judged(false, &[(10, 1), (50, 0)], &[(51, number)]);
+        for number in [37, 40, 42] {
+            assert_eq!(reads(number), Judged::Right, "{number}");
+        }
+        for number in [25, 55] {
+            assert_ne!(reads(number), Judged::Right, "{number}");
+        }
+        // Two readings are those of one start.
+        let both = |second| {
+            judged(
+                false,
+                &[(10, 1), (50, 0), (60, 0)],
+                &[(51, 38), (61, second)],
+            )
+        };
+        assert_eq!(both(48), Judged::Right);
+        assert_ne!(both(38), Judged::Right);
+    }
+
+    /// What a drive says by itself must come, and what it does not say must not.
+    #[test]
+    fn what_comes_unasked_is_what_a_drive_says_by_itself() {
+        let asked = [(10, 1)];
+        assert_eq!(judged(true, &asked, &[(112, 100)]), Judged::Right);
+        assert_eq!(judged(true, &asked, &[]), Judged::Wrong(0, Some(100)));
+        assert_ne!(judged(true, &asked, &[(150, 100)]), Judged::Right);
+        assert_ne!(
+            judged(true, &asked, &[(112, 100), (113, 100)]),
+            Judged::Right
+        );
+        assert_eq!(judged(true, &[(10, 1), (60, 2)], &[]), Judged::Right);
+        assert_eq!(judged(true, &[], &[(10, 0)]), Judged::Wrong(0, None));
+    }
+
+    /// Where there are more worlds than are kept, nothing is accused.
+    #[test]
+    fn too_many_worlds_accuse_nothing() {
+        // Each start and each stop can be at four times, and the drive knows when it was stopped.
+        let sent: Vec<_> = (0..40)
+            .flat_map(|at| [(at * 7 + 1, 1), (at * 7 + 4, 2)])
+            .collect();
+        let talk = |number| judged(false, &sent, &[(290, number)]);
+        assert_eq!(talk(200), Judged::TooMany);
+    }
+}
