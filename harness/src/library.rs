@@ -1,6 +1,6 @@
 //! A scenario of any bus, read and settled.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::read::RingScenario;
 use crate::buses::novobus::language::syntax::Scenario;
@@ -20,11 +20,11 @@ pub struct Entry {
     pub name: String,
     /// Its text.
     pub source: Source,
-    /// What it says; of another bus than [`Bus::DEFAULT`] only what it says in the words of every bus.
+    /// What it says; of another bus than [`BusName::DEFAULT`] only what it says in the words of every bus.
     pub scenario: Scenario,
     /// The same settled for a bench of a given size; `None` for another bus.
     pub plan: Option<Plan>,
-    /// The same of another bus; `None` for [`Bus::DEFAULT`], and for a bus that is not built.
+    /// The same of another bus; `None` for [`BusName::DEFAULT`], and for a bus that is not built.
     pub other: Option<Arc<dyn Settled>>,
 }
 
@@ -35,14 +35,14 @@ impl Entry {
     /// Its mistakes.
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
         let bus = parse::bus(&source);
-        if bus != Bus::DEFAULT {
+        if bus != BusName::DEFAULT {
             let found = settle(bus, &source, size)?;
             return Ok(Self::of_other(source, found));
         }
         Ok(RingScenario::new(source, size)?.into())
     }
 
-    /// A scenario of another bus than [`Bus::DEFAULT`], read and settled.
+    /// A scenario of another bus than [`BusName::DEFAULT`], read and settled.
     pub(crate) fn of_other(source: Source, found: (Scenario, Arc<dyn Settled>)) -> Self {
         let (scenario, other) = found;
         Self {
@@ -59,7 +59,7 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
-        if parse::bus(&source) != Bus::DEFAULT {
+        if parse::bus(&source) != BusName::DEFAULT {
             return Self::new(source, None);
         }
         Ok(RingScenario::fitting(source, drives)?.into())

@@ -2,7 +2,7 @@
 
 /// The buses of the product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Bus {
+pub enum BusName {
     /// The ND21's ring.
     Novobus,
     /// UNITEK DS/BAMOCAR on CAN.
@@ -11,7 +11,7 @@ pub enum Bus {
     Nordac,
 }
 
-impl Bus {
+impl BusName {
     /// The names in a scenario.
     pub const NAMES: [(&'static str, Self); 3] = [
         ("novobus", Self::Novobus),

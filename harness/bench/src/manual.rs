@@ -1,13 +1,13 @@
 //! The manuals' tables and examples, which scenario pins each, and the errata ledgers.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use serde::Deserialize;
 
 /// The manual of a bus.
 #[derive(Clone, Copy, Debug)]
 pub struct Manual {
     /// The bus.
-    pub bus: Bus,
+    pub bus: BusName,
     /// What it is called.
     pub title: &'static str,
     /// The document in a `source` line.

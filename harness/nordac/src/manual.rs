@@ -1,12 +1,12 @@
 //! The manual of PROFIBUS DP for NORDAC *vector*.
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 
 /// The manual of PROFIBUS DP for NORDAC *vector*.
 pub const MANUAL: Manual = Manual {
-    bus: Bus::Nordac,
+    bus: BusName::Nordac,
     title: "NORDAC vector PROFIBUS DP manual",
     document: "nordac",
     tables: include_str!("../../../corpora/manual/nordac-tables.toml"),

@@ -1,13 +1,13 @@
 //! The ND21 User Manual.
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;
 
 /// The ND21 User Manual 1/96.
 pub const MANUAL: Manual = Manual {
-    bus: Bus::Novobus,
+    bus: BusName::Novobus,
     title: "ND21 User Manual 1/96",
     document: "nd21",
     tables: include_str!("../../../corpora/manual/nd21-tables.toml"),

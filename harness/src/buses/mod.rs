@@ -22,7 +22,7 @@ pub(crate) use unitek::dbc::dbc;
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, twin};
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::campaign::line::LineCampaign;
 use crate::capture::live::LiveText;
 use crate::capture::{Carries, JudgedFrames, RecordedPlace, ends};
@@ -62,7 +62,7 @@ use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// The manuals of the buses; that of [`Bus::DEFAULT`] first.
+/// The manuals of the buses; that of [`BusName::DEFAULT`] first.
 pub const MANUALS: [Manual; 3] = [
     novobus::manual::MANUAL,
     unitek::manual::MANUAL,
@@ -257,11 +257,11 @@ pub(crate) fn counted_pieces(traces: &[Trace]) -> (usize, &'static str) {
 }
 
 /// The dissector of a bus for Wireshark.
-pub(crate) fn dissector(bus: Bus) -> String {
+pub(crate) fn dissector(bus: BusName) -> String {
     match bus {
-        Bus::Novobus => novobus::report::DISSECTOR.to_owned(),
-        Bus::Unitek => unitek::dissector::dissector(),
-        Bus::Nordac => nordac::dissector::dissector(),
+        BusName::Novobus => novobus::report::DISSECTOR.to_owned(),
+        BusName::Unitek => unitek::dissector::dissector(),
+        BusName::Nordac => nordac::dissector::dissector(),
     }
 }
 
@@ -278,11 +278,11 @@ pub(crate) fn write_shared(
 }
 
 /// The built-in scenario that shows a bus at work.
-pub(crate) const fn example(bus: Bus) -> &'static str {
+pub(crate) const fn example(bus: BusName) -> &'static str {
     match bus {
-        Bus::Novobus => "9.8-check-sequence",
-        Bus::Unitek => "unitek-ex-11-speed-routine",
-        Bus::Nordac => "nordac-3.3-start-up",
+        BusName::Novobus => "9.8-check-sequence",
+        BusName::Unitek => "unitek-ex-11-speed-routine",
+        BusName::Nordac => "nordac-3.3-start-up",
     }
 }
 
@@ -354,7 +354,7 @@ pub(crate) fn check_rig(
 }
 
 /// How drives of a shared line are explored; `None` for rings.
-pub(crate) fn line_fuzz(bus: Bus) -> Option<&'static LineFuzz> {
+pub(crate) fn line_fuzz(bus: BusName) -> Option<&'static LineFuzz> {
     let own = PORT_COMMANDS.iter().find(|own| own.bus.bus() == bus)?;
     Some(&own.fuzz)
 }
@@ -386,17 +386,17 @@ fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit
 /// # Errors
 /// The header has mistakes, or the bus carries no frames.
 fn serve_frames(
-    bus: Bus,
+    bus: BusName,
     (drives, header): (Option<u8>, Option<&Source>),
     options: &ServeOptions<FramePlace>,
     host: &mut dyn ServeHost,
 ) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
-        Bus::Unitek => {
+        BusName::Unitek => {
             let plan = unitek::serve::bench(drives, header)?;
             Ok(unitek::serve::serve(plan, options, host))
         }
-        Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
+        BusName::Novobus | BusName::Nordac => Ok(Err(ServeError::Medium)),
     }
 }
 
@@ -405,19 +405,19 @@ fn serve_frames(
 /// # Errors
 /// The header has mistakes, or the bus has no such line.
 fn serve_octets(
-    bus: Bus,
+    bus: BusName,
     (slaves, header): (Option<&[u8]>, Option<&Source>),
     marks: ErrorMarks,
     options: &ServeOptions<ServedAt>,
     host: &mut dyn ServeHost,
 ) -> Result<Result<ServeEnd, ServeError>, Problems> {
     match bus {
-        Bus::Nordac => {
+        BusName::Nordac => {
             let plan = nordac::serve::bench(slaves, header)?;
             let server = nordac::serve::SegmentServer::new(plan, options.places.len(), marks);
             Ok(serve(server, options, host))
         }
-        Bus::Novobus | Bus::Unitek => Ok(Err(ServeError::Medium)),
+        BusName::Novobus | BusName::Unitek => Ok(Err(ServeError::Medium)),
     }
 }
 
@@ -425,9 +425,9 @@ fn serve_octets(
 macro_rules! languages {
     ($($bus:ident => $language:ty),+ $(,)?) => {
         /// Reads and settles a scenario in the words of its bus.
-        pub(crate) fn settle(bus: Bus, source: &Source, size: Option<u8>) -> Found {
+        pub(crate) fn settle(bus: BusName, source: &Source, size: Option<u8>) -> Found {
             match bus {
-                $(Bus::$bus => settled::settle::<$language, _>(source, size),)+
+                $(BusName::$bus => settled::settle::<$language, _>(source, size),)+
             }
         }
     };

@@ -2,7 +2,7 @@
 
 use super::novobus::cli::sim::{options, places, rings};
 use super::{RIG_BUSES, serve_frames, serve_octets};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
@@ -22,7 +22,7 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
         ));
     }
     let end = match arguments.frames.bus {
-        Bus::Novobus => rings(arguments, &RIG_BUSES, output)?,
+        BusName::Novobus => rings(arguments, &RIG_BUSES, output)?,
         bus if bus.shares_octets() => octets(bus, arguments, output)?,
         bus => frames(bus, arguments, output)?,
     };
@@ -38,7 +38,7 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
 }
 
 /// Options that a bus does not have, and what it has instead.
-fn refuse(bus: Bus, given: &[(&str, bool)], expected: &str) -> Result<(), Failure> {
+fn refuse(bus: BusName, given: &[(&str, bool)], expected: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(Failure::refused(format!(
             "{option} is not for the bus {}; {expected} expected",
@@ -56,7 +56,7 @@ fn header(arguments: &SimArguments) -> Result<Option<Source>, Failure> {
 
 /// Serves the drives of a shared line of octets: every place is a master's.
 fn octets(
-    bus: Bus,
+    bus: BusName,
     arguments: &SimArguments,
     output: &mut Output,
 ) -> Result<Result<ServeEnd, ServeError>, Failure> {
@@ -84,7 +84,7 @@ fn octets(
 
 /// Serves the drives of a bus of frames.
 fn frames(
-    bus: Bus,
+    bus: BusName,
     arguments: &SimArguments,
     output: &mut Output,
 ) -> Result<Result<ServeEnd, ServeError>, Failure> {

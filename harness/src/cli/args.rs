@@ -8,7 +8,7 @@ use super::merge::MergeArguments;
 use super::plot::PlotArguments;
 use super::rig::RigCommand;
 use super::shell::ShellArguments;
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::capture::{NamedLink, UartFormat};
 use crate::command::args::{
     CellsArguments, ColourWhen, DeviationsArguments, ShowProgress, TableFormat, duration,
@@ -98,8 +98,8 @@ pub enum ProgramCommand {
     /// Print the Wireshark dissector for `trace --format pcapng`.
     Dissector {
         /// The bus.
-        #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-        bus: Bus,
+        #[arg(long, value_enum, default_value_t = BusName::DEFAULT)]
+        bus: BusName,
     },
     /// Print a DBC file of UNITEK drives on CAN, for tools that decode frames by one.
     ///

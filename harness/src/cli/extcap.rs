@@ -5,7 +5,7 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::RIG_BUSES;
 use crate::buses::example;
 use crate::capture::{LiveRecorder, Tape};
@@ -127,16 +127,16 @@ fn field(text: &str) -> String {
 }
 
 /// The interface of a simulated bench.
-fn simulated_interface(bus: Bus) -> String {
-    match bus == Bus::DEFAULT {
+fn simulated_interface(bus: BusName) -> String {
+    match bus == BusName::DEFAULT {
         true => SIMULATED.to_owned(),
         false => format!("{SIMULATED}-{}", bus.name()),
     }
 }
 
 /// The bus of a simulated interface.
-fn simulated_bus(interface: &str) -> Option<Bus> {
-    let mut all = Bus::NAMES.into_iter().map(|(_, bus)| bus);
+fn simulated_bus(interface: &str) -> Option<BusName> {
+    let mut all = BusName::NAMES.into_iter().map(|(_, bus)| bus);
     all.find(|bus| simulated_interface(*bus) == interface)
 }
 
@@ -144,7 +144,7 @@ fn simulated_bus(interface: &str) -> Option<Bus> {
 fn interfaces() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let mut text = format!("extcap {{version={version}}}{{display=drivebench}}\n");
-    for (name, bus) in Bus::NAMES {
+    for (name, bus) in BusName::NAMES {
         let value = simulated_interface(bus);
         let what = match bus.has_rings() {
             true => "simulated ring".to_owned(),
@@ -177,7 +177,7 @@ fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
     let rig = rig.and_then(|name| find(name, &find::folder(), &RIG_BUSES).ok());
     let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
-    let frames = adapter || simulated_bus(interface).is_some_and(Bus::carries_frames);
+    let frames = adapter || simulated_bus(interface).is_some_and(BusName::carries_frames);
     let (number, name, display) = match frames {
         true => (pcapng_frames::LINK_TYPE, "CAN_SOCKETCAN", "CAN frames"),
         false => (LINK_TYPE, "RTAC_SERIAL", "Serial lines"),
@@ -230,7 +230,7 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
 
 /// What a simulated bench carries.
 fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, String> {
-    let bus = simulated_bus(interface).unwrap_or(Bus::DEFAULT);
+    let bus = simulated_bus(interface).unwrap_or(BusName::DEFAULT);
     let scenario = arguments.scenario.clone();
     let scenario = scenario.unwrap_or_else(|| PathBuf::from(example(bus)));
     let name = scenario.display();

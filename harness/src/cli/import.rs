@@ -2,7 +2,7 @@
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::novobus::capture::diff::{ComparedRun, diff as compare};
 use crate::buses::novobus::capture::judge::{Judged, judge};
 use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
@@ -33,7 +33,7 @@ use std::time::Duration;
 const NO_TIMES: Span = Span::from_millis(86_400_000);
 
 /// Prints the dissector.
-pub(crate) fn dissector(bus: Bus, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn dissector(bus: BusName, output: &mut Output) -> std::io::Result<Exit> {
     output.result(&buses::dissector(bus))?;
     Ok(Exit::Passed)
 }

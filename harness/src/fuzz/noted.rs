@@ -1,7 +1,7 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
 use super::text::{rig as rig_body, scenario as scenario_body};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::novobus::capture::scenario as sketch;
 use crate::buses::novobus::language::syntax::Scenario;
 use crate::capture::{self, CaptureError};
@@ -40,7 +40,7 @@ pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
             notes.note(|| Feature::new("", "a statement", said));
         }
     }
-    if scenario.bus == Bus::Novobus {
+    if scenario.bus == BusName::Novobus {
         for size in SIZES {
             if let Err(found) = plan(&scenario, &source, size) {
                 problems(notes, "a mistake for a size of ring", &found);

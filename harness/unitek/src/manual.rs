@@ -1,12 +1,12 @@
 //! The UNITEK DS CAN-BUS manual.
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 
 /// The UNITEK DS CAN-BUS manual.
 pub const MANUAL: Manual = Manual {
-    bus: Bus::Unitek,
+    bus: BusName::Unitek,
     title: "UNITEK DS CAN-BUS manual",
     document: "unitek",
     tables: include_str!("../../../corpora/manual/unitek-tables.toml"),

@@ -1,6 +1,6 @@
 //! Options that several commands have.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::file::values::{Time, ValueError};
 use clap::{Args, ValueEnum};
 use std::time::Duration;
@@ -14,8 +14,8 @@ pub struct CellsArguments {
     #[arg(long)]
     pub eeprom: bool,
     /// The bus: novobus for the cells of an ND21, unitek for the registers of a UNITEK drive.
-    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-    pub bus: Bus,
+    #[arg(long, value_enum, default_value_t = BusName::DEFAULT)]
+    pub bus: BusName,
 }
 
 /// For `deviations`.
@@ -24,8 +24,8 @@ pub struct DeviationsArguments {
     /// Only deviations with this text in their name, section or description.
     pub filter: Option<String>,
     /// The bus: novobus for ND21 drives, unitek for UNITEK drives.
-    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-    pub bus: Bus,
+    #[arg(long, value_enum, default_value_t = BusName::DEFAULT)]
+    pub bus: BusName,
     /// Output format.
     #[arg(long, value_enum, default_value_t = TableFormat::Table)]
     pub format: TableFormat,

@@ -1,6 +1,6 @@
 //! Where `sim` serves drives on a bus of frames, and the drives of a shared line.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::serve::ServedAt;
 use crate::serve::frames::{FramePlace, Protocol};
 use clap::Args;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Args)]
 pub struct FrameArguments {
     /// The bus and its drives.
-    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
-    pub bus: Bus,
+    #[arg(long, value_enum, default_value_t = BusName::DEFAULT)]
+    pub bus: BusName,
     /// How many drives are on the CAN bus: nodes 1 to N, beside those of --setup. By default node 1, if --setup has none.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(1..=127))]
     pub drives: Option<u8>,

@@ -2,7 +2,7 @@
 
 use super::files::{read_text, write_whole};
 use super::{ExploreError, FuzzCase};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -115,10 +115,10 @@ fn json_of(path: &Path) -> PathBuf {
 
 /// The bus of a finding, by its name; that of rings says none.
 #[must_use]
-pub fn bus_of(path: &Path) -> Option<Bus> {
+pub fn bus_of(path: &Path) -> Option<BusName> {
     let text = read_text(&json_of(path)).ok()?;
     let finding: serde_json::Value = serde_json::from_str(&text).ok()?;
     let name = finding.get("setup")?.get("bus")?.as_str()?;
-    let known = Bus::NAMES.iter().find(|(own, _)| *own == name);
+    let known = BusName::NAMES.iter().find(|(own, _)| *own == name);
     known.map(|(_, bus)| *bus)
 }

@@ -1,6 +1,6 @@
 //! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;
@@ -25,10 +25,10 @@ impl PortBus {
 
     /// The bus of its scenarios.
     #[must_use]
-    pub const fn bus(self) -> Bus {
+    pub const fn bus(self) -> BusName {
         match self {
-            Self::Unitek => Bus::Unitek,
-            Self::Nordac => Bus::Nordac,
+            Self::Unitek => BusName::Unitek,
+            Self::Nordac => BusName::Nordac,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::problem::{Problems, nearest};
 use super::source::{Source, SourceError};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::regular;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
@@ -138,8 +138,10 @@ fn built_in() -> Result<Vec<Source>, LibraryError> {
 /// What built-in scenarios are sorted by: the bus of their folder, in the order of the table of buses, then their names.
 fn in_order(name: &str) -> (usize, Vec<(u64, &str)>) {
     let folder = name.split('/').next();
-    let bus = Bus::NAMES.iter().position(|(own, _)| Some(*own) == folder);
-    (bus.unwrap_or(Bus::NAMES.len()), natural(bare(name)))
+    let bus = BusName::NAMES
+        .iter()
+        .position(|(own, _)| Some(*own) == folder);
+    (bus.unwrap_or(BusName::NAMES.len()), natural(bare(name)))
 }
 
 /// The remedy for a name that is part of the names of built-in scenarios, or of none.
@@ -224,7 +226,7 @@ mod tests {
             .map(|own| own.name.split('/').next().unwrap_or_default());
         let mut folders: Vec<_> = folders.collect();
         folders.dedup();
-        assert_eq!(folders, Bus::NAMES.map(|(name, _)| name));
+        assert_eq!(folders, BusName::NAMES.map(|(name, _)| name));
         let bus = |own: &&Source| own.name.starts_with(folders[0]);
         let names: Vec<_> = sources
             .iter()

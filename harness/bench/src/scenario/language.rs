@@ -12,7 +12,7 @@ use super::run::player::{MAX_ROUND, Runner};
 use super::run::record::CellRecord;
 use super::scanner::Scanner;
 use super::syntax::Scenario;
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::link::{Capability, Link, LinkFault};
 use crate::traffic::SegmentReport;
 use harness_proto::time::{Instant, Span};
@@ -32,7 +32,7 @@ pub enum Opening<'w> {
 /// The words of a bus: how they are read, settled and written.
 pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// The bus.
-    const BUS: Bus;
+    const BUS: BusName;
     /// Its name in a `bus` line.
     const NAME: &'static str = Self::BUS.name();
     /// Whether a message that no line asks for is a failure also without a `strict` line.

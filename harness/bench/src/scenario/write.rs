@@ -4,7 +4,7 @@
 //! this file and to the buses' `write`.
 
 use super::syntax::{Action, Scenario, Step, When};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::scenario::language::Language;
 use std::fmt::Write as _;
 use std::marker::PhantomData;
@@ -58,7 +58,7 @@ impl<L: Language> Text<L> {
         for source in &scenario.sources {
             self.word("source", &source.text);
         }
-        if L::NAME != Bus::DEFAULT.name() {
+        if L::NAME != BusName::DEFAULT.name() {
             self.word("bus", L::NAME);
         }
         let (words, devices) = L::write_header(&scenario.header);

@@ -1,7 +1,7 @@
 //! What stands in a campaign file of this bus (`corpora/campaigns/nordac/*.toml`).
 
 use super::CLASSES;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::file::values::Time;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::parameter::ParameterRef;
@@ -141,7 +141,7 @@ fn span(time: Time) -> Span {
 pub(super) fn is_of_this_bus(text: &str) -> bool {
     let table: Result<toml::Table, _> = toml::from_str(text);
     table.is_ok_and(|table| {
-        table.get("bus").and_then(|bus| bus.as_str()) == Some(Bus::Nordac.name())
+        table.get("bus").and_then(|bus| bus.as_str()) == Some(BusName::Nordac.name())
     })
 }
 

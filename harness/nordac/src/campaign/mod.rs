@@ -12,7 +12,7 @@ mod tests;
 pub use converse::{Conversation, SlaveState, StepEnd};
 pub use file::{CampaignStep, TelegramCampaignFile};
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};
@@ -307,7 +307,7 @@ impl LineCampaign for TelegramCampaign {
         };
         PlayedLine {
             name: self.name.trim_end_matches(".toml").to_owned(),
-            bus: Bus::Nordac.name(),
+            bus: BusName::Nordac.name(),
             title: self.file.title.clone(),
             units: "telegrams",
             count: self.telegrams(),

@@ -12,7 +12,7 @@ use crate::manual::MANUAL;
 use crate::rig::rate;
 use crate::serve;
 use crate::simulate::Setup;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::capture::runs::HeardTelegram;
 use harness_bench::explore::line::{ActBounds, LineBus};
 use harness_bench::explore::pool::hash;
@@ -60,7 +60,7 @@ impl Differing for TelegramDifference {
 }
 
 impl LineBus for Nordac {
-    const BUS: Bus = Bus::Nordac;
+    const BUS: BusName = BusName::Nordac;
     const MANUAL: Manual = MANUAL;
     const USUAL_SECTION: &'static str = "3.1";
     const DRIVES: &'static str = "NORDAC inverters";

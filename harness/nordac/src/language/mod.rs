@@ -14,7 +14,7 @@ use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, TelegramStep};
 use crate::report::TelegramReport;
 use crate::simulate;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::link::Link;
 use harness_bench::scenario::language::{Language, Opening};
 use harness_bench::scenario::plan::{Plan, PlannedStep};
@@ -32,7 +32,7 @@ use harness_proto::time::{Instant, Span};
 pub struct Nordac;
 
 impl Language for Nordac {
-    const BUS: Bus = Bus::Nordac;
+    const BUS: BusName = BusName::Nordac;
     const STRICT: bool = true;
     /// A reply that a fault holds back may be 10 s late.
     const ROUND: Span = Span::from_millis(11_000);

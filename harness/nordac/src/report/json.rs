@@ -14,7 +14,7 @@
 //! | `error` | `null`, `"parity"`, `"framing"`, `"break"`, `"overrun"` or `"dropped"` |
 //! | `bytes` of a telegram | its octets as they arrived |
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::capture::runs::{octets, said};
 use harness_sim::record::Trace;
 use serde::{Serialize, Serializer};
@@ -60,7 +60,7 @@ fn sender<S: Serializer>(from: &Option<u8>, serializer: S) -> Result<S::Ok, S::E
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(bus: Bus, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let bytes = traces
         .iter()
         .flat_map(octets)

@@ -13,7 +13,7 @@ mod words;
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::capture::runs::said;
 use harness_bench::html::Html;
 use harness_bench::traffic::{SegmentReport, SharedForm, drawn, no_form};
@@ -43,7 +43,7 @@ impl SegmentReport for TelegramReport {
 
     fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
         match form {
-            SharedForm::Json => json::write(Bus::Nordac, traces, out),
+            SharedForm::Json => json::write(BusName::Nordac, traces, out),
             SharedForm::Csv => csv::write(traces, out),
             SharedForm::Pcapng => pcapng::write(traces, out),
             SharedForm::Candump => Err(no_form(self.carries(), form)),

@@ -7,7 +7,7 @@ use super::session::{Inverters, patience_of};
 use super::{Session, limits, rate, setup, slaves};
 use crate::simulate::Bench;
 use crate::stream::TOLERANCE;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::link::{Capability, Link, LinkEvent, Replay};
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;
@@ -22,7 +22,7 @@ use harness_proto::time::Span;
 use std::sync::Arc;
 
 impl PortPlayer for Player {
-    const BUS: Bus = Bus::Nordac;
+    const BUS: BusName = BusName::Nordac;
     const ANEW: bool = true;
     type Drives = Inverters;
     type Own = Own;

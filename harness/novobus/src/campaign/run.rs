@@ -11,7 +11,7 @@ use crate::campaign::sharing::Sharing;
 use crate::language::read::RingScenario;
 use crate::language::syntax::{Setup, SetupKind};
 use crate::simulate::bench;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::scenario::files::{LibraryError, sources};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::problem::{Problem, Problems};
@@ -123,7 +123,7 @@ impl Campaign {
                 "one scenario expected here",
             )));
         };
-        if parse::bus(&scenario) != Bus::DEFAULT {
+        if parse::bus(&scenario) != BusName::DEFAULT {
             let message = "its bus is not built yet";
             return Err(mistake(read.wrong(
                 &["scenario"],

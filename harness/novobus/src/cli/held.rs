@@ -9,7 +9,7 @@ use crate::link::BesideTheBus;
 use crate::rig::shared::Shared;
 use crate::rig::sim::RigOfRings;
 use crate::rig::{Run, Session};
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
@@ -167,7 +167,7 @@ impl HeldBench for HeldRings {
 
     fn play(&mut self, source: &Source) -> Result<PlayedScenario, Failure> {
         let size = self.plan.rings.first().map(|ring| ring.drives());
-        if parse::bus(source) != Bus::DEFAULT {
+        if parse::bus(source) != BusName::DEFAULT {
             return Err(Failure::refused(format!(
                 "{}: the scenario is for another bus",
                 files::last(&source.name)

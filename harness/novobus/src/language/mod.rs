@@ -17,7 +17,7 @@ use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
 use crate::language::plan::PlannedStep;
 use crate::simulate;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::link::{Link, LinkFault, Octets as _};
 use harness_bench::scenario::language::{Language, Opening};
 use harness_bench::scenario::pattern::{self, Expected, Pattern};
@@ -35,7 +35,7 @@ use harness_proto::time::Instant;
 pub struct Novobus;
 
 impl Language for Novobus {
-    const BUS: Bus = Bus::Novobus;
+    const BUS: BusName = BusName::Novobus;
     const STRICT: bool = false;
     const SOURCE: &'static str = "nd21 9.7";
     const EXAMPLE: &'static str = "`> 80`: the master sends SYNCO";

@@ -3,7 +3,7 @@
 use super::bench::Bench;
 use super::report::ValveReport;
 use super::valve::Said;
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::link::{Capability, Link};
 use crate::medium::Out;
 use crate::scenario::expression::Scope;
@@ -137,7 +137,7 @@ impl Settle<Valves> for Planner {
 
 impl Language for Valves {
     // A bus of the product has its own line in `buses/mod.rs`.
-    const BUS: Bus = Bus::DEFAULT;
+    const BUS: BusName = BusName::DEFAULT;
     const NAME: &'static str = "valves";
     const STRICT: bool = true;
     const SOURCE: &'static str = "valves 2.1";

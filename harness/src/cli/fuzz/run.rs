@@ -1,6 +1,6 @@
 //! `drivebench fuzz run`.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::novobus::cli::fuzz::{on_ports, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
     Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, RingSetup, planted_setup,
@@ -38,7 +38,7 @@ pub(super) fn planted(text: &str) -> Result<Planted, String> {
 
 /// The deviations of drives of all buses.
 fn deviation_names() -> Vec<&'static str> {
-    let buses = Bus::NAMES.iter().map(|(_, bus)| *bus);
+    let buses = BusName::NAMES.iter().map(|(_, bus)| *bus);
     let rows = buses.flat_map(|bus| deviations(bus).into_iter().next().unwrap_or_default());
     rows.map(|row| row.name).collect()
 }

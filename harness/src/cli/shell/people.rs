@@ -416,7 +416,7 @@ impl<P: ExternalPrinter> Write for AbovePrompt<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::Bus;
+    use crate::bus::BusName;
 
     fn line(text: &str) -> String {
         match read_line(text) {
@@ -478,7 +478,7 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         // The first bus behind the default one.
-        let other = format!("sim:{}:1", Bus::NAMES[1].0);
+        let other = format!("sim:{}:1", BusName::NAMES[1].0);
         assert_eq!(offered("sim:3", "pos"), ["position"]);
         assert_eq!(offered("sim:3", "read 0 nsollr"), ["nsollrampe"]);
         assert_eq!(offered(&other, "read 1 SPEED_ACTUAL_"), ["SPEED_ACTUAL_"]);

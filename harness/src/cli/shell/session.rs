@@ -6,7 +6,7 @@ use super::inbox::{LineWriter, RequestReader, SessionItem};
 use super::people::{self, Turn};
 use super::people_output;
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::help::command;
@@ -94,7 +94,7 @@ pub(super) struct HeldSession {
     /// The rig as it was named.
     pub(super) name: String,
     pub(super) rig: Rig,
-    pub(super) bus: Bus,
+    pub(super) bus: BusName,
     pub(super) bench: Box<dyn HeldBench>,
     pub(super) out: LineWriter,
     pub(super) motion: bool,

@@ -10,7 +10,7 @@ pub mod file;
 pub use converse::{Conversation, JobEnd};
 pub use file::{CampaignStep, FrameCampaignFile};
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};
@@ -306,7 +306,7 @@ impl LineCampaign for FrameCampaign {
         };
         PlayedLine {
             name: self.name.trim_end_matches(".toml").to_owned(),
-            bus: Bus::Unitek.name(),
+            bus: BusName::Unitek.name(),
             title: self.file.title.clone(),
             units: "frames",
             count: self.frames(),

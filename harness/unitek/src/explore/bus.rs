@@ -12,7 +12,7 @@ use crate::manual::MANUAL;
 use crate::rig::axes;
 use crate::serve;
 use crate::simulate::Setup;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::explore::line::{ActBounds, LineBus};
 use harness_bench::explore::pool::hash;
 use harness_bench::explore::{Dice, Differing};
@@ -60,7 +60,7 @@ impl Differing for FrameDifference {
 }
 
 impl LineBus for Unitek {
-    const BUS: Bus = Bus::Unitek;
+    const BUS: BusName = BusName::Unitek;
     const MANUAL: Manual = MANUAL;
     const USUAL_SECTION: &'static str = "5.2";
     const DRIVES: &'static str = "UNITEK drives";

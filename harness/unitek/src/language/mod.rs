@@ -15,7 +15,7 @@ use self::plan::{Act, Planner, WantedFrame};
 use self::syntax::{FrameStep, Header, Message};
 use crate::report::FrameReport;
 use crate::simulate;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::link::Link;
 use harness_bench::medium::Out;
 use harness_bench::scenario::language::{Language, Opening};
@@ -34,7 +34,7 @@ use harness_proto::time::{Instant, Span};
 pub struct Unitek;
 
 impl Language for Unitek {
-    const BUS: Bus = Bus::Unitek;
+    const BUS: BusName = BusName::Unitek;
     const STRICT: bool = true;
     /// Replies may be 10 s late (`reply-delay`).
     const ROUND: Span = Span::from_millis(11_000);

@@ -375,7 +375,7 @@ fn damaged_scenarios() {
             }
         }
         let source = source(&text);
-        if harness_bench::scenario::parse::bus(&source) != harness_bench::bus::Bus::Unitek {
+        if harness_bench::scenario::parse::bus(&source) != harness_bench::bus::BusName::Unitek {
             continue;
         }
         if let Ok(scenario) = parse::<Unitek>(&source) {

@@ -14,7 +14,7 @@
 //! | `from` | `"master"` or the drive's number |
 //! | `fault` | `null`, `"lost"`, or the error that ended the frame: `"error-frame"`, `"no-acknowledge"`, `"bus-off"` |
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use serde::{Serialize, Serializer};
 use std::io::Write;
@@ -59,7 +59,7 @@ fn frames(traces: &[Trace]) -> impl Iterator<Item = &LineFrame> {
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(bus: Bus, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let frames = frames(traces).map(|own| FrameObject {
         t_ns: own.at.since_start().as_nanos(),
         id: own.frame.id().number(),

@@ -8,7 +8,7 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng_frames;
 use harness_bench::traffic::{SegmentReport, SharedForm, drawn};
@@ -44,7 +44,7 @@ impl SegmentReport for FrameReport {
 
     fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
         match form {
-            SharedForm::Json => json::write(Bus::Unitek, traces, out),
+            SharedForm::Json => json::write(BusName::Unitek, traces, out),
             SharedForm::Candump => json::candump(traces, out),
             SharedForm::Csv => csv::write(traces, out),
             SharedForm::Pcapng => pcapng_frames::write(traces, out),

@@ -7,7 +7,7 @@ use super::session::UnitekDrives;
 use super::set_back::set_back;
 use super::{Session, axes, limits, rate};
 use crate::simulate::Bench;
-use harness_bench::bus::Bus;
+use harness_bench::bus::BusName;
 use harness_bench::link::frames::SLACK;
 use harness_bench::link::{Link, LinkEvent, Replay};
 use harness_bench::rig::Rig;
@@ -31,7 +31,7 @@ const EEPROM_REST: Span = Span::from_millis(60_000);
 const NAP: Span = Span::from_millis(50);
 
 impl PortPlayer for Player {
-    const BUS: Bus = Bus::Unitek;
+    const BUS: BusName = BusName::Unitek;
     const ANEW: bool = false;
     type Drives = UnitekDrives;
     type Own = Own;

@@ -23,7 +23,7 @@ pub use rig::{LineRig, OnAdapter, SessionOf};
 pub use setup::{LineSetup, PlantedDrive};
 pub use talk::{ActBounds, LineAct, LineSeen, LineTalk, Seen};
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::explore::{Dice, Differing, Spiced};
 use crate::manual::Manual;
 use crate::rig::Rig;
@@ -36,7 +36,7 @@ use std::fmt::Debug;
 /// A bus whose drives share one line, as fuzz runs explore it.
 pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     /// The bus.
-    const BUS: Bus;
+    const BUS: BusName;
     /// Its manual.
     const MANUAL: Manual;
     /// The section whose table the scenario of a finding covers where the section of the finding has none.

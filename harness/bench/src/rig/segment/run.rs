@@ -2,7 +2,7 @@
 
 use super::observed::Beats;
 use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// What playing scenarios on a rig asks of the bus of its drives: a player of attempts, on a rig or on a record.
 pub trait PortPlayer: Sized {
     /// The bus of its scenarios.
-    const BUS: Bus;
+    const BUS: BusName;
 
     /// Whether simulated drives are restarted for each attempt: no scenario sees what another one has left.
     const ANEW: bool;

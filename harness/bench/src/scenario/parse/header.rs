@@ -2,7 +2,7 @@
 
 use super::step;
 use super::words::named;
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::link::Capability;
 use crate::scenario::language::Language;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};
@@ -34,15 +34,15 @@ pub fn parse<L: Language>(source: &Source) -> Result<Scenario<L>, Problems> {
     read(source, Part::Whole)
 }
 
-/// The bus that a `bus` line names; a bus that no line names or that is not known counts as [`Bus::DEFAULT`].
-pub fn bus(source: &Source) -> Bus {
+/// The bus that a `bus` line names; a bus that no line names or that is not known counts as [`BusName::DEFAULT`].
+pub fn bus(source: &Source) -> BusName {
     let named = source.text.lines().find_map(|line| {
         let mut words = line.split(['#']).next()?.split_whitespace();
         let is_bus = words.next() == Some("bus");
         words.next().filter(|_| is_bus)
     });
-    let known = Bus::NAMES.iter().find(|(name, _)| Some(*name) == named);
-    known.map_or(Bus::DEFAULT, |(_, bus)| *bus)
+    let known = BusName::NAMES.iter().find(|(name, _)| Some(*name) == named);
+    known.map_or(BusName::DEFAULT, |(_, bus)| *bus)
 }
 
 /// Reads one line as a step, whatever stands before it.
@@ -89,7 +89,7 @@ pub fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<L>, Pro
 struct Reader<L: Language> {
     title: Option<String>,
     sources: Vec<Citation>,
-    bus: Option<Spanned<Bus>>,
+    bus: Option<Spanned<BusName>>,
     header: L::Header,
     needs: Vec<Capability>,
     strict: bool,
@@ -153,7 +153,7 @@ impl<L: Language> Reader<L> {
                 let here = scanner.here();
                 let value = match scanner.eat_word(L::NAME) {
                     true => L::BUS,
-                    false => named(scanner, &Bus::NAMES, "a bus")?,
+                    false => named(scanner, &BusName::NAMES, "a bus")?,
                 };
                 let span = scanner.since(here);
                 scanner.expect_end()?;
@@ -184,7 +184,7 @@ impl<L: Language> Reader<L> {
         if let (Part::Header, Some(other)) = (part, other) {
             self.problems.push(for_another_bus(other, L::BUS));
         }
-        let bus = self.bus.map_or(Bus::DEFAULT, |own| own.value);
+        let bus = self.bus.map_or(BusName::DEFAULT, |own| own.value);
         if part == Part::Whole && self.problems.is_empty() {
             let no_step = self.steps.is_empty().then(|| no_step(L::EXAMPLE));
             self.problems
@@ -229,7 +229,7 @@ fn no_header_line<L: Language>(step: &Step<L>) -> Problem {
     Problem::new(step.span, what, expected)
 }
 
-fn for_another_bus(named: &Spanned<Bus>, own: Bus) -> Problem {
+fn for_another_bus(named: &Spanned<BusName>, own: BusName) -> Problem {
     let what = format!("these drives are on the bus `{}`", own.name());
     let expected = format!("no `bus` line, or `bus {}`, expected here", own.name());
     Problem::new(named.span, what, expected)

@@ -1,6 +1,6 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::link::{Capability, Link, is_wrong_parity};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
@@ -35,7 +35,7 @@ pub enum Why {
     /// The rig's drives are not those that it is for: what differs, in a sentence.
     OtherDrives(String),
     /// The bench knows no such bus.
-    NoBus(Bus),
+    NoBus(BusName),
     /// The rig has no such bus.
     NotOnRig,
     /// The run ended before it.
@@ -68,13 +68,13 @@ pub enum Unlock {
     /// No rig: simulated drives of which no record must show everything.
     NoRig,
     /// A rig with this bus.
-    Bus(Bus),
+    Bus(BusName),
 }
 
 impl Skip {
     /// A scenario for another bus than the rig's.
     #[must_use]
-    pub fn not_on_rig(bus: Bus) -> Self {
+    pub fn not_on_rig(bus: BusName) -> Self {
         Self {
             why: Why::NotOnRig,
             unlocks: [Unlock::Bus(bus)].into(),
@@ -83,7 +83,7 @@ impl Skip {
 
     /// A scenario for a bus that the bench does not know.
     #[must_use]
-    pub fn no_bus(bus: Bus) -> Self {
+    pub fn no_bus(bus: BusName) -> Self {
         Why::NoBus(bus).into()
     }
 
@@ -314,8 +314,8 @@ impl fmt::Display for Unlock {
     }
 }
 
-fn name(bus: Bus) -> &'static str {
-    let own = Bus::NAMES.iter().find(|(_, known)| *known == bus);
+fn name(bus: BusName) -> &'static str {
+    let own = BusName::NAMES.iter().find(|(_, known)| *known == bus);
     own.map_or("", |(name, _)| name)
 }
 

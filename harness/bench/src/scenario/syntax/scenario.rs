@@ -1,6 +1,6 @@
 //! The scenario, its header and its steps.
 
-use crate::bus::Bus;
+use crate::bus::BusName;
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::language::Language;
@@ -15,7 +15,7 @@ pub struct Scenario<L: Language> {
     /// The tables of which manuals it pins.
     pub sources: Vec<Citation>,
     /// Which bus.
-    pub bus: Bus,
+    pub bus: BusName,
     /// The header lines of the bus.
     pub header: L::Header,
     /// What it says that it needs of a rig.
