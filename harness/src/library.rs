@@ -1,15 +1,15 @@
 //! A scenario of any bus, read and settled.
 
 use crate::bus::BusName;
+use crate::buses::named;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::read::RingScenario;
-use crate::buses::novobus::language::syntax::Scenario;
-use crate::buses::settle;
 use crate::scenario::files;
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
+use crate::scenario::syntax::ScenarioHead;
 use crate::traffic::SegmentReport;
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ pub struct Entry {
     pub name: String,
     /// Its text.
     pub source: Source,
-    /// What it says; of another bus than [`BusName::DEFAULT`] only what it says in the words of every bus.
-    pub scenario: Scenario,
+    /// What it says in the words of every bus.
+    pub scenario: ScenarioHead,
     /// The same settled for a bench of a given size; `None` for another bus.
     pub plan: Option<Plan>,
     /// The same of another bus; `None` for [`BusName::DEFAULT`], and for a bus that is not built.
@@ -36,14 +36,14 @@ impl Entry {
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
         let bus = parse::bus(&source);
         if bus != BusName::DEFAULT {
-            let found = settle(bus, &source, size)?;
+            let found = (named(bus).settle)(&source, size)?;
             return Ok(Self::of_other(source, found));
         }
         Ok(RingScenario::new(source, size)?.into())
     }
 
     /// A scenario of another bus than [`BusName::DEFAULT`], read and settled.
-    pub(crate) fn of_other(source: Source, found: (Scenario, Arc<dyn Settled>)) -> Self {
+    pub(crate) fn of_other(source: Source, found: (ScenarioHead, Arc<dyn Settled>)) -> Self {
         let (scenario, other) = found;
         Self {
             name: source.name.clone(),
@@ -111,7 +111,7 @@ impl From<RingScenario> for Entry {
         Self {
             name: own.source.name.clone(),
             source: own.source,
-            scenario: own.scenario,
+            scenario: own.scenario.head(),
             plan: Some(own.plan),
             other: None,
         }
@@ -129,12 +129,13 @@ mod tests {
         let (mut ends, mut wrong) = (0, Vec::new());
         for source in sources(&[]).expect("the built-in ones") {
             let name = source.name.clone();
-            let entry = Entry::new(source, None).expect("a scenario");
-            let Some(own) = entry.scenario.header.rings.first() else {
+            if parse::bus(&source) != BusName::DEFAULT {
                 continue;
-            };
+            }
+            let read = RingScenario::new(source, None).expect("a scenario");
+            let own = &read.scenario.header.rings[0];
             for size in [own.smallest, own.largest] {
-                if let Err(problems) = Entry::new(entry.source.clone(), Some(size)) {
+                if let Err(problems) = Entry::new(read.source.clone(), Some(size)) {
                     wrong.push(format!("{name} on a ring of {size}: {problems}"));
                 }
                 ends += usize::from(own.smallest != own.largest);

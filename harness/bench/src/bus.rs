@@ -1,6 +1,30 @@
-//! Which bus: its name, and what kind of line it has.
+//! What the program asks of a bus. The crate of a bus exports one [`Bus`].
 
-/// The buses of the product.
+use crate::campaign::line::LineCampaign;
+use crate::capture::live::LiveText;
+use crate::capture::{Carries, JudgedFrames, RecordedPlace};
+use crate::command::args::CellsArguments;
+use crate::command::deviations::DeviationRow;
+use crate::command::exit::Exit;
+use crate::command::failure::Failure;
+use crate::command::output::Output;
+use crate::command::port_row::PortCommands;
+use crate::command::sim::SimArguments;
+use crate::manual::Manual;
+use crate::rig::buses::{PortRow, RigBuses};
+use crate::scenario::problem::Problems;
+use crate::scenario::settled::Settled;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::ScenarioHead;
+use crate::serve::{ServeEnd, ServeError};
+use crate::traffic::SegmentReport;
+use harness_proto::time::Span;
+use harness_sim::fuzz::{FuzzTarget, Noting};
+use harness_sim::record::Trace;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Which bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum BusName {
     /// The ND21's ring.
@@ -31,19 +55,60 @@ impl BusName {
             Self::Nordac => "nordac",
         }
     }
+}
 
-    /// Whether its drives stand in rings, whose number of drives a scenario takes from its bench.
-    pub const fn has_rings(self) -> bool {
-        matches!(self, Self::Novobus)
-    }
+/// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
+pub type Found = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
 
-    /// Whether it carries frames.
-    pub const fn carries_frames(self) -> bool {
-        matches!(self, Self::Unitek)
-    }
+/// How serving ended.
+pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
 
-    /// Whether its stations share a line of octets.
-    pub const fn shares_octets(self) -> bool {
-        matches!(self, Self::Nordac)
-    }
+/// A campaign that was found and read; or what is wrong with it, with file, place and remedy.
+pub type ReadCampaign = Result<Box<dyn LineCampaign>, String>;
+
+/// A bus.
+pub struct Bus {
+    pub name: BusName,
+    pub manual: Manual,
+    /// What its channels carry.
+    pub carries: Carries,
+    /// The built-in scenario that shows it at work.
+    pub example: &'static str,
+    /// Reads and settles a scenario, for a ring of that many drives where the number is given.
+    pub settle: fn(&Source, Option<u8>) -> Found,
+    /// The names of what its drives hold, for completions.
+    pub cell_names: fn() -> Vec<String>,
+    /// Lists what its drives hold.
+    pub cells: fn(&CellsArguments, &mut Output) -> std::io::Result<Exit>,
+    /// The deviations of its drives, and those of its master.
+    pub deviations: fn() -> [Vec<DeviationRow>; 2],
+    /// Its dissector for Wireshark.
+    pub dissector: fn() -> String,
+    /// Serves simulated drives.
+    pub sim: fn(&SimArguments, &'static RigBuses, &mut Output) -> Served,
+    /// Text of what a place of a capture carries, while it arrives; with the number of drives where it is known.
+    pub live: fn(&RecordedPlace, Option<u8>) -> Box<dyn LiveText>,
+    /// Targets whose inputs are bytes or frames of the bus, and what their inputs reach.
+    pub fuzz: (&'static [FuzzTarget], &'static [Noting]),
+    /// What it has where its stations share one line; `None` for rings.
+    pub shared: Option<SharedLine>,
+}
+
+/// What the program asks of a bus whose stations share one line.
+pub struct SharedLine {
+    /// What the files of rigs ask.
+    pub port: &'static PortRow,
+    /// What the commands on rigs ask.
+    pub commands: PortCommands,
+    pub report: &'static dyn SegmentReport,
+    /// The file that describes this many drives to other tools.
+    pub description: fn(u16) -> String,
+    /// A scenario that replays a capture: its traces, title and the drives' header; or what is missing, in a sentence.
+    pub replayed: fn(&[Trace], &str, Option<&Source>) -> Result<String, String>,
+    /// Judges a capture by the drives' header: the drives that are named, or all; times may be off by as much. Or what is missing.
+    pub judged: fn(&[Trace], Option<&Source>, (&[u8], Span)) -> Result<JudgedFrames, String>,
+    /// The names of the built-in campaigns, in order.
+    pub campaigns: fn() -> Vec<String>,
+    /// Reads a campaign: a file that names the bus, or a built-in one by its name. `None` where it is neither.
+    pub campaign: fn(&Path) -> Option<ReadCampaign>,
 }

@@ -1,7 +1,7 @@
 //! How a bus whose stations share one line shows what was carried. A ring has tables and pictures of its own.
 
 use crate::html::Html;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, Trace};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -26,6 +26,27 @@ pub enum SharedForm {
 pub trait SegmentReport: Debug + Sync {
     /// What the bus carries, such as `frames of CAN`.
     fn carries(&self) -> &'static str;
+
+    /// How many pieces there are, and what one is called. By default frames are counted.
+    fn counted(&self, traces: &[Trace]) -> (usize, &'static str) {
+        let channels = traces.iter().flat_map(|trace| &trace.channels);
+        (
+            channels.map(|channel| channel.frames().len()).sum(),
+            "frame",
+        )
+    }
+
+    /// Compares two runs piece by piece: whether they are the same within the tolerance of times, and how they differ. `None` for a bus whose
+    /// runs are compared frame by frame.
+    fn difference(
+        &self,
+        sides: [&[Trace]; 2],
+        tolerance: Span,
+        names: [&str; 2],
+    ) -> Option<(bool, String)> {
+        let _not_compared = (sides, tolerance, names);
+        None
+    }
 
     /// A line of heads, and a row a frame or telegram: the rows that are wanted, counted from 0, and of them `at_most`.
     fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String;

@@ -60,7 +60,18 @@ pub fn scenario(traces: &[Trace], title: &str, setup: Option<&Source>) -> Result
 
 /// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history. `named` are the slaves that are
 /// judged, where the user names some, and times may be off by `tolerance`.
-pub fn judged(traces: &[Trace], (named, tolerance): (&[u8], Span)) -> JudgedFrames {
+pub fn judged(
+    traces: &[Trace],
+    setup: Option<&Source>,
+    (named, tolerance): (&[u8], Span),
+) -> Result<JudgedFrames, String> {
+    if setup.is_some() {
+        return Err(
+            "--setup changes nothing where telegrams are judged: a slave is accused only of what no right slave does, whatever its settings; \
+             leave it out"
+                .to_owned(),
+        );
+    }
     let mut all = JudgedFrames {
         verdict: Verdict::Passed,
         compared: 0,
@@ -90,7 +101,7 @@ pub fn judged(traces: &[Trace], (named, tolerance): (&[u8], Span)) -> JudgedFram
         (true, _) if in_doubt => Verdict::Inconclusive,
         (true, _) => Verdict::Passed,
     };
-    all
+    Ok(all)
 }
 
 /// The slaves that sent, and the PPO type that the last Chk_Cfg to them named.

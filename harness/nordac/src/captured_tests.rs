@@ -157,7 +157,8 @@ pub(super) fn refused(file: &[u8], links: &[&str], words: &str) {
 
 /// The verdict, how many replies were compared, and of how many; with what there is to say about it.
 pub(super) fn judged(imported: &Imported, named: &[u8]) -> ((Verdict, usize, usize), JudgedFrames) {
-    let judged = capture::judged(&imported.capture.traces, (named, Span::ZERO));
+    let judged =
+        capture::judged(&imported.capture.traces, None, (named, Span::ZERO)).expect("no setup");
     let (verdict, _) = imported.settle(judged.verdict);
     let count = (verdict, judged.compared, judged.replies);
     (count, judged)

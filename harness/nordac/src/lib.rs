@@ -27,8 +27,42 @@ pub mod simulate;
 pub mod stream;
 pub mod value;
 
+use harness_bench::bus::{Bus, BusName, SharedLine};
+use harness_bench::campaign::line::LineCampaign;
+use harness_bench::capture::Carries;
+use harness_bench::scenario::settled;
+use harness_sim::nordac::fuzz;
+
 /// The GSD file: the unit master file of the manual.
-pub const GSD: &str = include_str!("nordac.gsd");
+const GSD: &str = include_str!("nordac.gsd");
+
+/// NORDAC *vector* on PROFIBUS DP.
+pub static BUS: Bus = Bus {
+    name: BusName::Nordac,
+    manual: manual::MANUAL,
+    carries: Carries::Line,
+    example: "nordac-3.3-start-up",
+    settle: settled::settle::<language::Nordac>,
+    cell_names: || cli::cells::names().collect(),
+    cells: cli::cells::cells,
+    deviations: deviations::rows,
+    dissector: dissector::dissector,
+    sim: |arguments, _, output| cli::sim::sim(arguments, output),
+    live: |_, _| Box::<report::live::TelegramText>::default(),
+    fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
+    shared: Some(SharedLine {
+        port: &rig::PORT,
+        commands: rig::COMMANDS,
+        report: &report::TelegramReport,
+        description: |_| GSD.to_owned(),
+        replayed: capture::scenario,
+        judged: capture::judged,
+        campaigns: campaign::names,
+        campaign: |name| {
+            Some(campaign::find(name)?.map(|own| -> Box<dyn LineCampaign> { Box::new(own) }))
+        },
+    }),
+};
 
 /// The buses of a rig's file in tests.
 #[cfg(test)]

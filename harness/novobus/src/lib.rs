@@ -24,3 +24,30 @@ pub mod simulate;
 pub mod stream;
 pub mod top;
 pub mod twin;
+
+use harness_bench::bus::{Bus, BusName};
+use harness_bench::capture::{Carries, ends};
+use harness_bench::scenario::settled;
+use harness_proto::line::Rate;
+use harness_sim::novobus::fuzz;
+
+/// NOVOBUS.
+pub static BUS: Bus = Bus {
+    name: BusName::Novobus,
+    manual: manual::MANUAL,
+    carries: Carries::Link,
+    example: "9.8-check-sequence",
+    settle: settled::settle::<language::Novobus>,
+    cell_names: || cli::cells::names().map(str::to_owned).collect(),
+    cells: cli::cells::cells,
+    deviations: cli::deviations::rows,
+    dissector: || report::DISSECTOR.to_owned(),
+    sim: cli::sim::rings,
+    live: |place, drives| {
+        let (_, from, to) = ends(&place.name).unwrap_or_default();
+        let rate = Rate::from_bits_per_second(place.bits_per_second).unwrap_or_default();
+        Box::new(report::live::LinkText::new(from, to, rate, drives))
+    },
+    fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
+    shared: None,
+};

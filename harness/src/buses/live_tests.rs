@@ -2,7 +2,7 @@
 
 use super::novobus::capture::judge::judge;
 use super::novobus::capture::scenario::JudgeOptions;
-use super::{judge_shared, live_text};
+use super::{carrier, carrying};
 use crate::capture::live::{LiveLine, seconds};
 use crate::capture::senders::TelegramCutter;
 use crate::capture::{Capture, Carries, LiveRecorder, Piece, RecordedPlace, Tape, read};
@@ -53,7 +53,7 @@ const SILENT: u64 = 10_000_000_000;
 
 /// The lines of pieces, each with the time of what it is of.
 fn lines(place: &RecordedPlace, drives: Option<u8>, pieces: &[Piece]) -> String {
-    let mut text = live_text(place, drives);
+    let mut text = (carrier(place.carries).live)(place, drives);
     let mut lines: Vec<LiveLine> = pieces.iter().flat_map(|own| text.piece(own)).collect();
     lines.extend(std::iter::from_fn(|| text.idle(SILENT)));
     let line = |(nanos, words): LiveLine| format!("{} {words}\n", seconds(nanos));
@@ -223,9 +223,9 @@ fn verdict(capture: &Capture) -> Option<Verdict> {
         setup: None,
         tolerance: Span::from_millis(10),
     };
-    match Carries::of(&capture.traces) {
-        Carries::Link => judge(capture, &options).ok().map(|own| own.verdict),
-        Carries::Line | Carries::Frames => judge_shared(&capture.traces, None, (&[], Span::ZERO))
+    match carrying(Carries::of(&capture.traces)) {
+        None => judge(capture, &options).ok().map(|own| own.verdict),
+        Some(line) => (line.judged)(&capture.traces, None, (&[], Span::ZERO))
             .ok()
             .map(|own| own.verdict),
     }

@@ -1,125 +1,90 @@
-//! The buses: one folder each. Only this file names them all.
+//! The buses: a crate each. Only this room names them all.
 
-mod contents;
 #[cfg(test)]
 mod interrupt_tests;
 #[cfg(test)]
 mod live_tests;
-pub use harness_nordac as nordac;
-pub use harness_novobus as novobus;
-mod sim;
 #[cfg(test)]
 mod toy;
+pub use harness_nordac as nordac;
+pub use harness_novobus as novobus;
 pub use harness_unitek as unitek;
 
 pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
 
-pub(crate) use contents::{cell_names, cells, deviations};
-pub(crate) use nordac::GSD;
-pub(crate) use unitek::dbc::dbc;
-
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, twin};
 
-use crate::bus::BusName;
-use crate::campaign::line::LineCampaign;
-use crate::capture::live::LiveText;
-use crate::capture::{Carries, JudgedFrames, RecordedPlace, ends};
+use crate::bus::{Bus, BusName, SharedLine};
+use crate::capture::Carries;
 use crate::command::args::ListFormat;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
-use crate::command::fuzz::{LineFuzz, verify};
+use crate::command::fuzz::LineFuzz;
 use crate::command::held::HeldBench;
 use crate::command::output::Output;
-use crate::command::port_row::PortCommands;
 use crate::command::rig_failure::{self, exit_of};
 use crate::command::rig_name::RigName;
-use crate::evidence::Signer;
-use crate::explore::read_as;
-use crate::manual::Manual;
-use crate::medium::ErrorMarks;
+use crate::command::sim::SimArguments;
 use crate::rig::buses::RigBuses;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
 use crate::scenario::problem::Problems;
-use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
-use crate::serve::frames::FramePlace;
-use crate::serve::{ServeEnd, ServeError, ServeHost, ServeOptions, ServedAt, serve};
+use crate::serve::{ServeEnd, ServeError};
 use crate::traffic::SegmentReport;
 pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
-use harness_proto::line::Rate;
-use harness_proto::time::Span;
-use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::Trace;
-use novobus::language::syntax::Scenario;
 use std::io::Write;
-use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
-use std::sync::Arc;
 
-/// The manuals of the buses; that of [`BusName::DEFAULT`] first.
-pub const MANUALS: [Manual; 3] = [
-    novobus::manual::MANUAL,
-    unitek::manual::MANUAL,
-    nordac::manual::MANUAL,
-];
+/// The buses; that of [`BusName::DEFAULT`] first.
+pub static BUSES: [&Bus; 3] = [&novobus::BUS, &unitek::BUS, &nordac::BUS];
 
-/// The names of the built-in campaigns on buses whose stations share one line, in order.
-pub(crate) fn line_campaigns() -> Vec<String> {
-    [nordac::campaign::names(), unitek::campaign::names()].concat()
+/// The bus of this name.
+pub fn named(name: BusName) -> &'static Bus {
+    BUSES[name as usize]
 }
 
-/// Finds and reads a campaign on such a bus: a file that names the bus, or a built-in one by its name. `None` where it is neither.
-///
-/// # Errors
-/// What is wrong with it, with file, place and remedy.
-pub(crate) fn line_campaign(name: &Path) -> Option<Result<Box<dyn LineCampaign>, String>> {
-    fn boxed<C: LineCampaign + 'static>(
-        own: Result<C, String>,
-    ) -> Result<Box<dyn LineCampaign>, String> {
-        own.map(|own| -> Box<dyn LineCampaign> { Box::new(own) })
-    }
-    let unitek = || unitek::campaign::find(name).map(boxed);
-    nordac::campaign::find(name).map(boxed).or_else(unitek)
+/// The buses whose stations share one line.
+pub(crate) fn shared_lines() -> impl Iterator<Item = &'static SharedLine> {
+    BUSES.iter().filter_map(|bus| bus.shared.as_ref())
 }
 
-/// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
-type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
-
-/// The fuzz targets of the buses.
-pub(crate) fn fuzz_targets() -> impl Iterator<Item = FuzzTarget> {
-    let rings = harness_sim::novobus::fuzz::TARGETS.into_iter();
-    rings
-        .chain(harness_sim::unitek::fuzz::TARGETS)
-        .chain(harness_sim::nordac::fuzz::TARGETS)
+/// The bus whose channels carry this.
+pub(crate) fn carrier(carries: Carries) -> &'static Bus {
+    let found = BUSES.iter().find(|bus| bus.carries == carries);
+    found.unwrap_or(&BUSES[0])
 }
 
-/// What the inputs of those reach.
-pub(crate) fn fuzz_noting() -> impl Iterator<Item = Noting> {
-    let rings = harness_sim::novobus::fuzz::NOTING.into_iter();
-    rings
-        .chain(harness_sim::unitek::fuzz::NOTING)
-        .chain(harness_sim::nordac::fuzz::NOTING)
+/// The same where it is a line that stations share; `None` for links of a ring.
+pub(crate) fn carrying(carries: Carries) -> Option<&'static SharedLine> {
+    carrier(carries).shared.as_ref()
+}
+
+/// The line at the port of a rig; `None` for rings.
+fn line_of(rig: &Rig) -> Option<&'static SharedLine> {
+    let bus = rig.port()?.bus;
+    shared_lines().find(|line| line.port.bus == bus)
+}
+
+/// The bus of a rig.
+pub(crate) fn bus_of(rig: &Rig) -> &'static Bus {
+    named(rig.port().map_or(BusName::DEFAULT, |port| port.bus.bus()))
 }
 
 /// The buses, as the files of rigs know them.
 pub static RIG_BUSES: RigBuses = RigBuses {
     rings: novobus::rig::RINGS,
-    ports: [&unitek::rig::PORT, &nordac::rig::PORT],
+    ports: [line(&unitek::BUS).port, line(&nordac::BUS).port],
 };
 
-/// Commands on rigs with ports.
-static PORT_COMMANDS: [PortCommands; 2] = [unitek::rig::COMMANDS, nordac::rig::COMMANDS];
-
-/// What serves the port of a rig; `None` for rings.
-fn commands_of(rig: &Rig) -> Option<&'static PortCommands> {
-    let bus = rig.port()?.bus;
-    PORT_COMMANDS.iter().find(|own| own.bus == bus)
+const fn line(bus: &'static Bus) -> &'static SharedLine {
+    bus.shared.as_ref().expect("a shared line")
 }
 
 /// Finds and reads a rig; see [`find::find`].
@@ -148,8 +113,8 @@ pub(crate) fn find_any_rig(name: &str, output: &mut Output) -> Option<Rig> {
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
 pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError> {
-    match commands_of(rig) {
-        Some(own) => (own.run)(rig, options),
+    match line_of(rig) {
+        Some(line) => (line.commands.run)(rig, options),
         None => Err(SessionError::Drives {
             rig: rig.id().to_owned(),
             why: "it has no [port.1]".to_owned(),
@@ -164,17 +129,13 @@ pub(crate) fn judge_of(
     allow_motion: bool,
     qualifies: bool,
 ) -> Option<Box<dyn SegmentJudge>> {
-    let own = commands_of(rig)?;
-    Some((own.judge)(rig, allow_motion, qualifies))
+    let line = line_of(rig)?;
+    Some((line.commands.judge)(rig, allow_motion, qualifies))
 }
 
-/// How traces of a shared line are shown, by what the channels carried; `None` for a ring.
+/// How traces of a shared line are shown; `None` for a ring.
 pub(crate) fn report_of(traces: &[Trace]) -> Option<&'static dyn SegmentReport> {
-    match Carries::of(traces) {
-        Carries::Frames => Some(&unitek::report::FrameReport),
-        Carries::Line => Some(&nordac::report::TelegramReport),
-        Carries::Link => None,
-    }
+    Some(carrying(Carries::of(traces))?.report)
 }
 
 /// What these are traces of.
@@ -182,93 +143,10 @@ pub(crate) fn carried(traces: &[Trace]) -> &'static str {
     report_of(traces).map_or("bytes of a ring", SegmentReport::carries)
 }
 
-/// Text of what a place of a capture carries, while it arrives. Of a link of a ring, its rate, and the number of drives where it is known.
-pub(crate) fn live_text(place: &RecordedPlace, drives: Option<u8>) -> Box<dyn LiveText> {
-    match (place.carries, ends(&place.name)) {
-        (Carries::Link, Some((_, from, to))) => {
-            let rate = Rate::from_bits_per_second(place.bits_per_second).unwrap_or_default();
-            Box::new(novobus::report::live::LinkText::new(from, to, rate, drives))
-        }
-        (Carries::Link | Carries::Line, _) => Box::<nordac::report::live::TelegramText>::default(),
-        (Carries::Frames, _) => Box::new(unitek::report::table::FrameText),
-    }
-}
-
-/// The frames or telegrams of a shared line, a row each: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a
-/// ring, which has tables of its own.
-pub(crate) fn rows(
-    trace: &Trace,
-    wanted: Option<Range<usize>>,
-    at_most: Option<usize>,
-) -> Option<String> {
-    let report = report_of(std::slice::from_ref(trace))?;
-    Some(report.rows(trace, wanted, at_most))
-}
-
-/// A scenario that replays a capture of a shared line; `setup` describes the drives. `None` for a ring.
+/// Writes traces of a shared line.
 ///
 /// # Errors
-/// It does not say enough of the drives, in a sentence.
-pub(crate) fn shared_scenario(
-    traces: &[Trace],
-    title: &str,
-    setup: Option<&Source>,
-) -> Option<Result<String, String>> {
-    match Carries::of(traces) {
-        Carries::Frames => Some(unitek::capture::scenario(traces, title, setup)),
-        Carries::Line => Some(nordac::capture::scenario(traces, title, setup)),
-        Carries::Link => None,
-    }
-}
-
-/// Judges a capture of a shared line; `setup` describes the drives, `named` are those that are judged, where the user names some, and
-/// times may be off by `tolerance`.
-///
-/// # Errors
-/// It does not say enough of the drives, in a sentence.
-pub(crate) fn judge_shared(
-    traces: &[Trace],
-    setup: Option<&Source>,
-    (named, tolerance): (&[u8], Span),
-) -> Result<JudgedFrames, String> {
-    match Carries::of(traces) {
-        Carries::Line if setup.is_some() => Err(
-            "--setup changes nothing where telegrams are judged: a slave is accused only of what no right slave does, whatever its settings; \
-             leave it out"
-                .to_owned(),
-        ),
-        Carries::Line => Ok(nordac::capture::judged(traces, (named, tolerance))),
-        _ => unitek::capture::judged(traces, setup, (named, tolerance)),
-    }
-}
-
-/// How many frames or telegrams a capture of a shared line has, and what they are called.
-pub(crate) fn counted_pieces(traces: &[Trace]) -> (usize, &'static str) {
-    match Carries::of(traces) {
-        Carries::Line => (nordac::report::count(traces), "telegram"),
-        _ => {
-            let channels = traces.iter().flat_map(|trace| &trace.channels);
-            (
-                channels.map(|channel| channel.frames().len()).sum(),
-                "frame",
-            )
-        }
-    }
-}
-
-/// The dissector of a bus for Wireshark.
-pub(crate) fn dissector(bus: BusName) -> String {
-    match bus {
-        BusName::Novobus => novobus::report::DISSECTOR.to_owned(),
-        BusName::Unitek => unitek::dissector::dissector(),
-        BusName::Nordac => nordac::dissector::dissector(),
-    }
-}
-
-/// Writes traces of a shared line. Only frames have a log of candump.
-///
-/// # Errors
-/// Those of `out`.
+/// Those of `out`, and [`std::io::ErrorKind::Unsupported`] for a form that the bus does not have.
 pub(crate) fn write_shared(
     traces: &[Trace],
     form: SharedForm,
@@ -277,31 +155,10 @@ pub(crate) fn write_shared(
     report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
-/// The built-in scenario that shows a bus at work.
-pub(crate) const fn example(bus: BusName) -> &'static str {
-    match bus {
-        BusName::Novobus => "9.8-check-sequence",
-        BusName::Unitek => "unitek-ex-11-speed-routine",
-        BusName::Nordac => "nordac-3.3-start-up",
-    }
-}
-
-/// Compares the telegrams of two runs, and says whether they are the same, and how they differ; `None` unless both are octets of a shared
-/// line. Times may differ by `tolerance`.
-pub(crate) fn telegram_difference(
-    [left, right]: [&[Trace]; 2],
-    tolerance: Span,
-    names: [&str; 2],
-) -> Option<(bool, String)> {
-    let telegrams = [left, right].map(|own| Carries::of(own) == Carries::Line);
-    let found = nordac::report::diff::difference(left, right, tolerance);
-    (telegrams == [true; 2]).then(|| (found.is_none(), found.show(names)))
-}
-
 /// Runs a command on drives, in the words of the bus of its bench.
 pub(crate) fn drive(mut command: DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
     if let DriveCommand::Sim(arguments) = &command {
-        return told(sim::sim(arguments, output), output);
+        return told(sim(arguments, output), output);
     }
     let Some(RigName::Named(name)) = command.rig().and_then(|own| own.rig.as_ref()) else {
         return novobus::cli::drive(&command, output);
@@ -309,13 +166,13 @@ pub(crate) fn drive(mut command: DriveCommand, output: &mut Output) -> std::io::
     let Some(rig) = find_any_rig(name, output) else {
         return Ok(Exit::Usage);
     };
-    let Some(own) = commands_of(&rig) else {
+    let Some(line) = line_of(&rig) else {
         if let Some(arguments) = command.rig_mut() {
             arguments.found = Some(Rc::new(rig));
         }
         return novobus::cli::drive(&command, output);
     };
-    let end = (own.command)(&rig, &command, output);
+    let end = (line.commands.command)(&rig, &command, output);
     told(end, output)
 }
 
@@ -328,9 +185,9 @@ pub(crate) fn hold(
     options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
-    match commands_of(rig) {
+    match line_of(rig) {
         None => novobus::cli::held::hold(rig, options, output),
-        Some(own) => (own.hold)(rig, options)
+        Some(line) => (line.commands.hold)(rig, options)
             .map_err(|error| Failure::Said(exit_of(&error), error.to_string())),
     }
 }
@@ -344,10 +201,10 @@ pub(crate) fn check_rig(
         return Ok(Exit::Usage);
     };
     let for_tools = arguments.format == ListFormat::Json;
-    match commands_of(&rig) {
+    match line_of(&rig) {
         None => novobus::cli::rig_check::check(&rig, arguments, output),
-        Some(own) => {
-            let end = (own.check)(&rig, &arguments.options(), for_tools, output);
+        Some(line) => {
+            let end = (line.commands.check)(&rig, &arguments.options(), for_tools, output);
             told(end, output)
         }
     }
@@ -355,21 +212,30 @@ pub(crate) fn check_rig(
 
 /// How drives of a shared line are explored; `None` for rings.
 pub(crate) fn line_fuzz(bus: BusName) -> Option<&'static LineFuzz> {
-    let own = PORT_COMMANDS.iter().find(|own| own.bus.bus() == bus)?;
-    Some(&own.fuzz)
+    Some(&named(bus).shared.as_ref()?.commands.fuzz)
 }
 
-/// Judges the findings of a run on drives of a shared line again; `None` if the folder has no such run.
-pub(crate) fn verify_shared(
-    folder: &Path,
-    signer: Option<Signer<'_>>,
-    output: &mut Output,
-) -> Option<std::io::Result<Exit>> {
-    if let Ok((kept, _)) = read_as::<unitek::explore::FrameTalk>(folder) {
-        return Some(verify(folder, &kept, signer, output));
+/// Serves simulated drives.
+fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let only_page = arguments.tcp.is_empty()
+        && arguments.pty.is_empty()
+        && arguments.frames.places().is_empty();
+    if arguments.once && only_page {
+        return Err(Failure::refused(
+            "--once ends when the last client has gone, and a page alone has no clients: --tcp, --pty or another place expected, or --for",
+        ));
     }
-    let (kept, _) = read_as::<nordac::explore::TelegramTalk>(folder).ok()?;
-    Some(verify(folder, &kept, signer, output))
+    let bus = named(arguments.frames.bus);
+    let end = (bus.sim)(arguments, &RIG_BUSES, output)?;
+    let end = end.map_err(|error| match error {
+        ServeError::Output(error) => Failure::Output(error),
+        ServeError::Wait(_) => Failure::Said(Exit::RigError, error.to_string()),
+        error => Failure::refused(error.to_string()),
+    })?;
+    Ok(match end {
+        ServeEnd::Interrupted => Exit::Interrupted,
+        ServeEnd::TimeOver | ServeEnd::ClientsGone => Exit::Passed,
+    })
 }
 
 /// Reports the error of a command.
@@ -379,62 +245,4 @@ fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit
         Err(Failure::Output(error)) => Err(error),
         Err(failure) => Ok(failure.tell(output)),
     }
-}
-
-/// Serves simulated drives of a bus of frames: as many, with what a header says of them.
-///
-/// # Errors
-/// The header has mistakes, or the bus carries no frames.
-fn serve_frames(
-    bus: BusName,
-    (drives, header): (Option<u8>, Option<&Source>),
-    options: &ServeOptions<FramePlace>,
-    host: &mut dyn ServeHost,
-) -> Result<Result<ServeEnd, ServeError>, Problems> {
-    match bus {
-        BusName::Unitek => {
-            let plan = unitek::serve::bench(drives, header)?;
-            Ok(unitek::serve::serve(plan, options, host))
-        }
-        BusName::Novobus | BusName::Nordac => Ok(Err(ServeError::Medium)),
-    }
-}
-
-/// Serves simulated drives of a shared line of octets, those with these addresses and those of a header, to a master at each place of the options.
-///
-/// # Errors
-/// The header has mistakes, or the bus has no such line.
-fn serve_octets(
-    bus: BusName,
-    (slaves, header): (Option<&[u8]>, Option<&Source>),
-    marks: ErrorMarks,
-    options: &ServeOptions<ServedAt>,
-    host: &mut dyn ServeHost,
-) -> Result<Result<ServeEnd, ServeError>, Problems> {
-    match bus {
-        BusName::Nordac => {
-            let plan = nordac::serve::bench(slaves, header)?;
-            let server = nordac::serve::SegmentServer::new(plan, options.places.len(), marks);
-            Ok(serve(server, options, host))
-        }
-        BusName::Novobus | BusName::Unitek => Ok(Err(ServeError::Medium)),
-    }
-}
-
-/// Makes the languages of buses known: a line a bus.
-macro_rules! languages {
-    ($($bus:ident => $language:ty),+ $(,)?) => {
-        /// Reads and settles a scenario in the words of its bus.
-        pub(crate) fn settle(bus: BusName, source: &Source, size: Option<u8>) -> Found {
-            match bus {
-                $(BusName::$bus => settled::settle::<$language, _>(source, size),)+
-            }
-        }
-    };
-}
-
-languages! {
-    Novobus => novobus::language::Novobus,
-    Unitek => unitek::language::Unitek,
-    Nordac => nordac::language::Nordac,
 }

@@ -7,7 +7,7 @@ use crate::buses::novobus::campaign::part::{CampaignCounts, CountsFile, WholeCam
 use crate::buses::novobus::campaign::replay::scenario;
 use crate::buses::novobus::campaign::report::{json, line as case_line, table};
 use crate::buses::novobus::campaign::{Campaign, CaseFaults, Contradiction, PlayedCampaign};
-use crate::buses::{line_campaign, line_campaigns};
+use crate::buses::shared_lines;
 use crate::campaign::line::{self, LineCampaign, PlayedLine};
 use crate::command::args::TableFormat;
 use crate::command::exit::Exit;
@@ -139,7 +139,8 @@ impl Wholes {
 /// Finds the named campaigns, or all built-in ones. The exit code where one cannot be played, which has been reported.
 fn find_all(named: &[PathBuf], output: &mut Output) -> Result<FoundCampaigns, Exit> {
     let built_in = || {
-        let on_lines = line_campaigns().into_iter().map(PathBuf::from);
+        let on_lines = shared_lines().flat_map(|line| (line.campaigns)());
+        let on_lines = on_lines.map(PathBuf::from);
         names()
             .into_iter()
             .map(PathBuf::from)
@@ -152,7 +153,7 @@ fn find_all(named: &[PathBuf], output: &mut Output) -> Result<FoundCampaigns, Ex
     };
     let mut found = FoundCampaigns::default();
     for name in &wanted {
-        match line_campaign(name) {
+        match shared_lines().find_map(|line| (line.campaign)(name)) {
             Some(Ok(campaign)) => {
                 found.on_lines.push(campaign);
                 continue;

@@ -27,10 +27,6 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
         match Entry::new(source, arguments.ring) {
             Ok(entry) => {
                 let settled = entry.settled();
-                let steps = match entry.scenario.steps.len() {
-                    0 => settled.map_or(0, Settled::steps),
-                    written => written,
-                };
                 let needs = settled.map_or(&[][..], Settled::needs).iter();
                 let needs: Vec<_> = needs.map(|need| need.name()).collect();
                 let needs = match needs.is_empty() {
@@ -39,7 +35,7 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
                 };
                 output.result(&format!(
                     "{name}: no mistakes, {}{needs}\n",
-                    counted(steps, "step")
+                    counted(entry.scenario.steps, "step")
                 ))?;
             }
             Err(problems) => {

@@ -4,7 +4,7 @@
 use super::args::Shell;
 use super::help::command;
 use crate::buses::novobus::campaign::find as campaigns;
-use crate::buses::{cell_names, commands::deviations};
+use crate::buses::{self, BUSES, commands::deviations, find_rig_in};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::rig::find;
@@ -167,6 +167,13 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
             "SCENARIO" | "CAMPAIGN" | "RIG" | "FILE" | "FOLDER" | "FINDING" | "KEY" | "A" | "B"
         ),
     }
+}
+
+/// The names of what drives hold: of the drives of a rig, or of the default bus where there is no such rig.
+fn cell_names(rig: Option<&str>) -> Vec<String> {
+    let found = rig.and_then(|name| find_rig_in(name, &find::folder()).ok());
+    let bus = found.as_ref().map_or(BUSES[0], buses::bus_of);
+    (bus.cell_names)()
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
 
+use crate::buses::named;
 use crate::command::args::{DeviationsArguments, TableFormat};
 use crate::command::deviations::DeviationRow;
 use crate::command::exit::Exit;
@@ -27,7 +28,7 @@ pub(crate) fn deviations(
         let mut texts = texts.iter();
         texts.any(|text| text.to_lowercase().contains(&filter))
     };
-    let mut rows = crate::buses::deviations(arguments.bus);
+    let mut rows = (named(arguments.bus).deviations)();
     rows.iter_mut().for_each(|rows| rows.retain(holds));
     let [rows, masters] = rows;
     if rows.is_empty() && masters.is_empty() {

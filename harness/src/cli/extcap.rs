@@ -5,9 +5,10 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use crate::bus::BusName;
+use crate::bus::{Bus, BusName};
+use crate::buses::BUSES;
 use crate::buses::RIG_BUSES;
-use crate::buses::example;
+use crate::capture::Carries;
 use crate::capture::{LiveRecorder, Tape};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -135,20 +136,20 @@ fn simulated_interface(bus: BusName) -> String {
 }
 
 /// The bus of a simulated interface.
-fn simulated_bus(interface: &str) -> Option<BusName> {
-    let mut all = BusName::NAMES.into_iter().map(|(_, bus)| bus);
-    all.find(|bus| simulated_interface(*bus) == interface)
+fn simulated_bus(interface: &str) -> Option<&'static Bus> {
+    let mut all = BUSES.iter().copied();
+    all.find(|bus| simulated_interface(bus.name) == interface)
 }
 
 /// The interfaces: a simulated bench a bus, and each rig with taps. A rig's file with mistakes is left out; `drivebench rig list` shows them.
 fn interfaces() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let mut text = format!("extcap {{version={version}}}{{display=drivebench}}\n");
-    for (name, bus) in BusName::NAMES {
-        let value = simulated_interface(bus);
-        let what = match bus.has_rings() {
-            true => "simulated ring".to_owned(),
-            false => format!("simulated {name}"),
+    for bus in BUSES {
+        let value = simulated_interface(bus.name);
+        let what = match bus.shared {
+            None => "simulated ring".to_owned(),
+            Some(_) => format!("simulated {}", bus.name.name()),
         };
         // Writing to a String cannot fail.
         let _infallible = writeln!(
@@ -177,7 +178,8 @@ fn link_types(interface: &str) -> String {
     let rig = interface.strip_prefix(RIG);
     let rig = rig.and_then(|name| find(name, &find::folder(), &RIG_BUSES).ok());
     let adapter = rig.is_some_and(|own| own.port().is_some_and(|own| own.can_adapter().is_some()));
-    let frames = adapter || simulated_bus(interface).is_some_and(BusName::carries_frames);
+    let frames =
+        adapter || simulated_bus(interface).is_some_and(|bus| bus.carries == Carries::Frames);
     let (number, name, display) = match frames {
         true => (pcapng_frames::LINK_TYPE, "CAN_SOCKETCAN", "CAN frames"),
         false => (LINK_TYPE, "RTAC_SERIAL", "Serial lines"),
@@ -191,10 +193,10 @@ fn config(interface: &str) -> String {
         return String::new();
     };
     let rig = "arg {number=0}{call=--rig}{display=Rig}{type=string}{default=sim:3}{tooltip=sim:N is a ring of N drives}\n";
-    let rig = if bus.has_rings() { rig } else { "" };
+    let rig = if bus.shared.is_none() { rig } else { "" };
     format!(
         "{rig}arg {{number=1}}{{call=--scenario}}{{display=Scenario}}{{type=string}}{{default={}}}{{tooltip=drivebench list names them}}\n",
-        example(bus)
+        bus.example
     )
 }
 
@@ -230,27 +232,28 @@ fn capture(interface: &str, arguments: &ExtcapArguments, output: &mut Output) ->
 
 /// What a simulated bench carries.
 fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, String> {
-    let bus = simulated_bus(interface).unwrap_or(BusName::DEFAULT);
+    let bus = simulated_bus(interface).unwrap_or(BUSES[0]);
     let scenario = arguments.scenario.clone();
-    let scenario = scenario.unwrap_or_else(|| PathBuf::from(example(bus)));
+    let scenario = scenario.unwrap_or_else(|| PathBuf::from(bus.example));
     let name = scenario.display();
     let found = sources(std::slice::from_ref(&scenario)).map_err(|error| error.to_string())?;
     let [source] =
         <[_; 1]>::try_from(found).map_err(|_| format!("{name}: one scenario is expected"))?;
     let drives = match &arguments.rig {
-        Some(rig) if !bus.has_rings() => {
+        Some(rig) if bus.shared.is_some() => {
             return Err(format!(
                 "--rig {rig}: a scenario of {} says which drives it has; leave --rig out",
-                bus.name()
+                bus.name.name()
             ));
         }
         rig => bus
-            .has_rings()
+            .shared
+            .is_none()
             .then(|| ring(rig.as_deref().unwrap_or(RING))),
     };
     let drives = drives.transpose()?;
     let entry = Entry::fitting(source, drives).map_err(|problems| problems.to_string())?;
-    if entry.scenario.bus != bus {
+    if entry.scenario.bus != bus.name {
         return Err(format!(
             "{name}: it is a scenario of {}; the interface of that bus is {}",
             entry.scenario.bus.name(),

@@ -2,11 +2,11 @@
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::bus::BusName;
+use crate::bus::{BusName, SharedLine};
 use crate::buses::novobus::capture::diff::{ComparedRun, diff as compare};
 use crate::buses::novobus::capture::judge::{Judged, judge};
 use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
-use crate::buses::{self, telegram_difference};
+use crate::buses::{carried, carrying, named, report_of};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, CaptureError, Carries, Imported, JudgedFrames, ReadSettings, is_capture, read_files,
@@ -22,7 +22,7 @@ use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -34,19 +34,18 @@ const NO_TIMES: Span = Span::from_millis(86_400_000);
 
 /// Prints the dissector.
 pub(crate) fn dissector(bus: BusName, output: &mut Output) -> std::io::Result<Exit> {
-    output.result(&buses::dissector(bus))?;
+    output.result(&(named(bus).dissector)())?;
     Ok(Exit::Passed)
 }
 
-/// Prints a DBC file of this number of drives on CAN.
-pub(crate) fn dbc(drives: u16, output: &mut Output) -> std::io::Result<Exit> {
-    output.result(&crate::buses::dbc(drives))?;
-    Ok(Exit::Passed)
-}
-
-/// Prints the GSD file of slaves on PROFIBUS DP.
-pub(crate) fn gsd(output: &mut Output) -> std::io::Result<Exit> {
-    output.result(crate::buses::GSD)?;
+/// Prints the file that describes this number of drives: a DBC of frames on CAN, the GSD of slaves on PROFIBUS DP.
+pub(crate) fn description(
+    (carries, drives): (Carries, u16),
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    if let Some(line) = carrying(carries) {
+        output.result(&(line.description)(drives))?;
+    }
     Ok(Exit::Passed)
 }
 
@@ -89,8 +88,9 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     if is_silent(capture) && !arguments.scenario {
         return nothing(&title, output);
     }
-    if Carries::of(&capture.traces) != Carries::Link {
-        return of_shared_line(&imported, &title, setup.as_ref(), arguments, output);
+    if let Some(line) = carrying(Carries::of(&capture.traces)) {
+        let setup = setup.as_ref();
+        return of_shared_line(line, (&imported, &title, setup), arguments, output);
     }
     if !arguments.judge.is_empty() {
         output.complain("`--judge` names slaves or drives of a line that they share; of a ring all drives are judged");
@@ -178,16 +178,15 @@ fn settled(verdict: Verdict, imported: &Imported, output: &mut Output) -> Verdic
 /// Reports what came of judging a shared line.
 fn told(
     judged: &JudgedFrames,
-    capture: &Capture,
+    ((count, what), end): ((usize, &str), Instant),
     title: &str,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let (count, what) = buses::counted_pieces(&capture.traces);
     output.result(&format!(
         "{} {title}: {} in {}, {} of {} compared\n",
         output.verdict(judged.verdict).trim_end_matches(' '),
         counted(count, what),
-        capture.end(),
+        end,
         judged.compared,
         counted(judged.replies, "reply"),
     ))?;
@@ -202,9 +201,8 @@ fn told(
 
 /// Judges what a shared line carried, or makes a scenario of it.
 fn of_shared_line(
-    imported: &Imported,
-    title: &str,
-    setup: Option<&Source>,
+    line: &SharedLine,
+    (imported, title, setup): (&Imported, &str, Option<&Source>),
     arguments: &ImportArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -216,11 +214,16 @@ fn of_shared_line(
             (true, None) => Span::ZERO,
             (true, given) => span(given),
         };
-        return match buses::judge_shared(&capture.traces, setup, (&arguments.judge, tolerance)) {
+        return match (line.judged)(&capture.traces, setup, (&arguments.judge, tolerance)) {
             Ok(judged) => {
                 let verdict = settled(judged.verdict, imported, output);
                 let judged = JudgedFrames { verdict, ..judged };
-                told(&judged, capture, title, output)
+                told(
+                    &judged,
+                    (line.report.counted(&capture.traces), capture.end()),
+                    title,
+                    output,
+                )
             }
             Err(error) => {
                 output.complain(&format!("{path}: {error}"));
@@ -240,13 +243,12 @@ fn of_shared_line(
         ));
         return Ok(Exit::Usage);
     }
-    match buses::shared_scenario(&capture.traces, title, setup) {
-        Some(Ok(text)) => write_scenario(&text, arguments, output),
-        Some(Err(error)) => {
+    match (line.replayed)(&capture.traces, title, setup) {
+        Ok(text) => write_scenario(&text, arguments, output),
+        Err(error) => {
             output.complain(&format!("{path}: {error}"));
             Ok(Exit::Usage)
         }
-        None => Ok(Exit::Usage),
     }
 }
 
@@ -373,16 +375,18 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     let names = [title(&arguments.left), title(&arguments.right)];
     let traces = [&left.traces[..], &right.traces[..]];
     let shown = [&names[0][..], &names[1]];
-    if let Some((same, text)) = telegram_difference(traces, span(arguments.tolerance), shown) {
-        output.result(&text)?;
-        return Ok(if same { Exit::Passed } else { Exit::Failed });
-    }
-    let [one, other] = traces.map(buses::carried);
+    let [one, other] = traces.map(carried);
     if one != other {
         output.complain(&format!(
             "one side has {one} and the other {other}; two of one kind expected"
         ));
         return Ok(Exit::Usage);
+    }
+    let tolerance = span(arguments.tolerance);
+    let compared = report_of(traces[0]).and_then(|own| own.difference(traces, tolerance, shown));
+    if let Some((same, text)) = compared {
+        output.result(&text)?;
+        return Ok(if same { Exit::Passed } else { Exit::Failed });
     }
     if Carries::of(&left.traces) == Carries::Frames {
         let summary = frame_diff(&left, &right, span(arguments.tolerance));

@@ -27,16 +27,10 @@ pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Resul
             .iter()
             .map(|s| s.text.as_str())
             .collect();
-        let rings: Vec<_> = entry
-            .scenario
-            .header
-            .rings
-            .iter()
-            .map(|ring| ring.sizes())
-            .collect();
+        let rings = entry.scenario.rings.join(", ");
         let bench = match rings.is_empty() {
             true => format!("{} {}", entry.scenario.bus.name(), entry.drives()),
-            false => format!("ring {}", rings.join(", ")),
+            false => format!("ring {rings}"),
         };
         // Writing to a String cannot fail.
         let _infallible = writeln!(

@@ -2,7 +2,7 @@
 
 use super::args::{ManualArguments, Selection};
 use super::run::select;
-use crate::buses::MANUALS;
+use crate::buses::BUSES;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::library::Entry;
@@ -25,7 +25,7 @@ pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::i
         .to_lowercase();
     let wanted = |text: &str| text.to_lowercase().contains(&filter);
     let mut parts = Vec::new();
-    for manual in &MANUALS {
+    for manual in BUSES.iter().map(|bus| &bus.manual) {
         let (tables, errata) = match (manual.tables(), manual.errata()) {
             (Ok(tables), Ok(errata)) => (tables, errata),
             (Err(error), _) | (_, Err(error)) => {

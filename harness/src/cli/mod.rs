@@ -32,7 +32,9 @@ mod tally;
 mod trace;
 mod verify;
 
-pub use crate::command::exit::Exit;
+pub use crate::buses::named;
+use crate::capture::Carries;
+use crate::command::exit::Exit;
 pub use args::Arguments;
 pub use promote::played;
 
@@ -86,10 +88,10 @@ fn dispatch(command: ProgramCommand, output: &mut Output) -> std::io::Result<Exi
         ProgramCommand::Plot(arguments) => plot::plot(&arguments, output),
         ProgramCommand::Diff(arguments) => import::diff(&arguments, output),
         ProgramCommand::Dissector { bus } => import::dissector(bus, output),
-        ProgramCommand::Dbc { drives } => import::dbc(drives, output),
-        ProgramCommand::Gsd => import::gsd(output),
+        ProgramCommand::Dbc { drives } => import::description((Carries::Frames, drives), output),
+        ProgramCommand::Gsd => import::description((Carries::Line, 1), output),
         ProgramCommand::Manual(arguments) => manual::manual(&arguments, output),
-        ProgramCommand::Cells(arguments) => crate::buses::cells(&arguments, output),
+        ProgramCommand::Cells(arguments) => (named(arguments.bus).cells)(&arguments, output),
         ProgramCommand::Qualify(arguments) => qualify::qualify(&arguments, output),
         ProgramCommand::Verify(arguments) => verify::verify(&arguments, output),
         ProgramCommand::Merge(arguments) => merge::merge(&arguments, output),

@@ -5,10 +5,9 @@ use super::junit::Cases;
 use super::run_rig::{PlayOrder, reports, state_size, work};
 use super::run_segment;
 use super::tally::{EarlierVerdicts, Tally};
-use crate::bus::BusName;
-use crate::buses::find_any_rig;
 use crate::buses::novobus::report::plot::plot;
 use crate::buses::novobus::rig::sim::RigOfRings;
+use crate::buses::{bus_of, find_any_rig};
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -88,7 +87,7 @@ fn may_match(source: &Source, filter: &str) -> bool {
 
 /// The scenarios for the bus of a rig; says how many others were selected.
 pub(crate) fn of_rig(mut entries: Vec<Entry>, rig: &Rig, output: &mut Output) -> Vec<Entry> {
-    let bus = rig.port().map_or(BusName::DEFAULT, |port| port.bus.bus());
+    let bus = bus_of(rig).name;
     let all = entries.len();
     entries.retain(|entry| entry.scenario.bus == bus);
     let left_out = all - entries.len();

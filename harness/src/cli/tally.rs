@@ -200,7 +200,7 @@ pub(crate) fn counts(verdicts: &[Verdict]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::MANUALS;
+    use crate::buses::BUSES;
     use crate::link::Capability;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
@@ -214,7 +214,7 @@ mod tests {
 
     fn note(tally: &mut Tally, outcomes: &[Outcome]) {
         let source = |n: usize| {
-            let document = MANUALS[0].document;
+            let document = BUSES[0].manual.document;
             let text = format!("title t\nsource {document} 9.{n}\nring 1\n> 80\n");
             Source::from_bytes("t.scn".to_owned(), text.into_bytes()).expect("a text")
         };

@@ -7,7 +7,7 @@ use crate::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
 use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
 use crate::buses::novobus::report::vcd::{self, Signals};
 use crate::buses::novobus::report::{csv, json};
-use crate::buses::{SharedForm, rows, write_shared};
+use crate::buses::{SharedForm, report_of, write_shared};
 use crate::capture::Carries;
 use crate::capture::runs::bits_per_second;
 use crate::command::exit::Exit;
@@ -190,7 +190,9 @@ fn of_shared_line(
         TraceFormat::Pcapng => write_shared(traces, SharedForm::Pcapng, out),
         _ => {
             for trace in traces {
-                let text = rows(trace, wanted.clone(), None).unwrap_or_default();
+                let report = report_of(std::slice::from_ref(trace));
+                let text = report.map(|own| own.rows(trace, wanted.clone(), None));
+                let text = text.unwrap_or_default();
                 out.write_all(text.as_bytes())?;
             }
             out.flush()

@@ -2,7 +2,7 @@
 
 use super::args::VerifyArguments;
 use crate::buses::novobus::explore::Case;
-use crate::buses::verify_shared;
+use crate::buses::shared_lines;
 use crate::command::exit::Exit;
 use crate::command::fuzz;
 use crate::command::output::Output;
@@ -21,8 +21,10 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
     if let Ok((kept, _)) = read_as::<Case>(&arguments.folder) {
         return fuzz::verify(&arguments.folder, &kept, signer, output);
     }
-    if let Some(exit) = verify_shared(&arguments.folder, signer, output) {
-        return exit;
+    for line in shared_lines() {
+        if let Some(exit) = (line.commands.fuzz.verify)(&arguments.folder, signer, output) {
+            return exit;
+        }
     }
     let judged = match is_merged {
         true => verify_merged(&arguments.folder, signer).map(|(verified, _)| verified),

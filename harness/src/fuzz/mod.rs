@@ -12,7 +12,7 @@ mod text;
 
 pub use text::{rig, scenario};
 
-use crate::buses;
+use crate::buses::BUSES;
 use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
 
 /// The targets whose bodies need the whole bench.
@@ -25,7 +25,8 @@ pub const BENCH_TARGETS: [FuzzTarget; 4] = [
 
 /// Every target.
 pub fn targets() -> impl Iterator<Item = FuzzTarget> {
-    buses::fuzz_targets().chain(BENCH_TARGETS)
+    let of_buses = BUSES.iter().flat_map(|bus| bus.fuzz.0).copied();
+    of_buses.chain(BENCH_TARGETS)
 }
 
 /// What the inputs of those reach.
@@ -48,5 +49,6 @@ const fn text(name: &'static str, body: Body, ending: &'static str) -> Noting {
 
 /// Every target with what its inputs reach.
 pub fn noting() -> impl Iterator<Item = Noting> {
-    buses::fuzz_noting().chain(BENCH_NOTING)
+    let of_buses = BUSES.iter().flat_map(|bus| bus.fuzz.1).copied();
+    of_buses.chain(BENCH_NOTING)
 }

@@ -6,6 +6,7 @@
 
 use crate::blind::Blind;
 use harness::buses::novobus::language::plan::Plan;
+use harness::buses::novobus::language::read::RingScenario;
 use harness::buses::novobus::qualify::deviating_masters;
 use harness::buses::novobus::rig::OnRings as _;
 use harness::buses::novobus::rig::{Run, Session};
@@ -71,7 +72,8 @@ impl Candidate {
         let text = entry.source.text.to_string();
         let at = text.find("\nring ")? + 1;
         let at = at + text[at..].find('\n')? + 1;
-        let rings = &entry.scenario.header.rings;
+        let read = RingScenario::new(entry.source.clone(), None).ok()?;
+        let rings = &read.scenario.header.rings;
         let mut candidate = Self {
             name: entry.short_name().to_owned(),
             text,

@@ -2,10 +2,13 @@
 
 use super::drive::RigArguments;
 use super::frames::FrameArguments;
+use crate::bus::BusName;
+use crate::command::failure::Failure;
 use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;
 use crate::scenario::argument::duration;
-use crate::serve::ServedAt;
+use crate::scenario::source::Source;
+use crate::serve::{ControlPlace, ServeOptions, ServedAt};
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
 use std::path::PathBuf;
@@ -100,6 +103,52 @@ pub struct SimArguments {
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
+}
+
+/// Where lines of control come from.
+fn control(arguments: &SimArguments) -> Option<ControlPlace> {
+    arguments.control.as_deref().map(|place| match place {
+        "-" => ControlPlace::Standard,
+        address => ControlPlace::Tcp(address.to_owned()),
+    })
+}
+
+/// Where `masters` are served: nowhere, if only a live page is asked for.
+pub fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
+    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
+    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
+    let only_page = arguments.tcp.is_empty() && arguments.pty.is_empty();
+    let nowhere = only_page.then(|| std::iter::repeat_n(ServedAt::Nowhere, masters));
+    tcp.chain(pty).chain(nowhere.into_iter().flatten())
+}
+
+/// What the arguments say of serving at these places.
+pub fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
+    ServeOptions {
+        places,
+        control: control(arguments),
+        page: arguments.web.clone(),
+        allow_remote: arguments.allow_remote,
+        once: arguments.once,
+        length: arguments.length,
+    }
+}
+
+/// Options that a bus does not have, and what it has instead.
+pub fn refuse(bus: BusName, given: &[(&str, bool)], expected: &str) -> Result<(), Failure> {
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => Err(Failure::refused(format!(
+            "{option} is not for the bus {}; {expected} expected",
+            bus.name()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The header of `--setup`.
+pub fn header(arguments: &SimArguments) -> Result<Option<Source>, Failure> {
+    let header = arguments.rig.setup.as_deref().map(Source::read).transpose();
+    header.map_err(|error| Failure::File(error.into()))
 }
 
 /// How fast time passes in a served ring.

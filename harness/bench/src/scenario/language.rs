@@ -133,6 +133,12 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         format!("{}:{link}", port + 1)
     }
 
+    /// The numbers of drives for which a header is written, such as `1..250`, a ring each.
+    fn rings(header: &Self::Header) -> Vec<String> {
+        let _no_rings = header;
+        Vec::new()
+    }
+
     /// How many drives the bench has; `3+1` where it has two buses.
     fn size(plan: &Plan<Self>) -> String;
 

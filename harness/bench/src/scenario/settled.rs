@@ -7,7 +7,7 @@ use super::problem::Problems;
 use super::run::player::play_until;
 use super::run::{AtMismatch, Outcome};
 use super::source::Source;
-use super::syntax::Scenario;
+use super::syntax::{Scenario, ScenarioHead};
 use crate::link::{Capability, Link};
 use crate::traffic::SegmentReport;
 use std::fmt::Debug;
@@ -84,15 +84,15 @@ impl<L: Language> Settled for Plan<L> {
     }
 }
 
-/// Reads and settles a scenario in the words of a bus. What it says in the words of every bus comes back as well, as a scenario of `C`.
+/// Reads and settles a scenario in the words of a bus.
 ///
 /// # Errors
 /// Its mistakes.
-pub fn settle<L: Language, C: Language>(
+pub fn settle<L: Language>(
     source: &Source,
     size: Option<u8>,
-) -> Result<(Scenario<C>, Arc<dyn Settled>), Problems> {
+) -> Result<(ScenarioHead, Arc<dyn Settled>), Problems> {
     let scenario: Scenario<L> = parse(source)?;
     let plan = plan(&scenario, source, size)?;
-    Ok((scenario.in_common(), Arc::new(plan)))
+    Ok((scenario.head(), Arc::new(plan)))
 }

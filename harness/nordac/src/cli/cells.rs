@@ -1,13 +1,19 @@
 //! `drivebench cells --bus nordac`: the parameters of the inverter (NORDAC 4.1.3, 5).
 
 use crate::value::ReplyWord;
+use harness_bench::command::args::CellsArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::output::Output;
 use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::{PARAMETERS, Parameter};
 
-/// Shows the parameters that have `filter` in their number, name, unit or section.
-pub fn cells(filter: &str, output: &mut Output) -> std::io::Result<Exit> {
+/// Shows the parameters that have the filter in their number, name, unit or section.
+pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+    if arguments.eeprom {
+        output.complain("--eeprom is for the bus novobus; a NORDAC inverter keeps every parameter that can be written in its EEPROM");
+        return Ok(Exit::Usage);
+    }
+    let filter = arguments.filter.as_deref().unwrap_or_default();
     let filter = filter.to_lowercase();
     let lines = PARAMETERS.iter().map(line);
     let wanted: String = lines

@@ -8,6 +8,7 @@ mod held;
 mod info;
 mod params;
 mod read;
+pub(crate) mod sim;
 mod watch;
 mod write;
 

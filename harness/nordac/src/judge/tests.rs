@@ -48,7 +48,7 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
     let mut text = source.text.to_string();
     text.insert_str(end.expect("a slave"), lines);
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
-    let found = settle::<Nordac, Nordac>(&source, None);
+    let found = settle::<Nordac>(&source, None);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);

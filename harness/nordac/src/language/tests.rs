@@ -1,7 +1,10 @@
 //! The language of this bus: reading, writing, mistakes and verdicts.
 
 use super::Nordac;
-use harness_bench::scenario::parse::parse;
+use harness_bench::bus::BusName;
+use harness_bench::fuzz::written;
+use harness_bench::scenario::files::sources;
+use harness_bench::scenario::parse::{bus, parse};
 use harness_bench::scenario::settled::settle;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
@@ -19,7 +22,7 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let found = settle::<Nordac, Nordac>(&source(&format!("{HEADER}{lines}")), None);
+    let found = settle::<Nordac>(&source(&format!("{HEADER}{lines}")), None);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
@@ -40,7 +43,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = settle::<Nordac, Nordac>(&source, None).expect_err(lines);
+    let found = settle::<Nordac>(&source, None).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);
@@ -325,4 +328,15 @@ fn deviations() {
     assert!(help.contains("no-off2"), "{help}");
     let (place, ..) = mistake("slave 8\n> E5\nmaster deviates master-gaps\n");
     assert_eq!(place, "master");
+}
+
+/// `parse(write(x)) == x`.
+#[test]
+fn every_built_in_scenario_comes_back() {
+    let mut all = sources(&[]).expect("the library");
+    all.retain(|source| bus(source) == BusName::Nordac);
+    assert!(all.len() > 100, "{}", all.len());
+    for source in all {
+        written(&parse::<Nordac>(&source).expect("a scenario"));
+    }
 }

@@ -17,6 +17,7 @@ use harness_bench::bus::BusName;
 use harness_bench::capture::runs::said;
 use harness_bench::html::Html;
 use harness_bench::traffic::{SegmentReport, SharedForm, drawn, no_form};
+use harness_proto::time::Span;
 use harness_sim::record::Trace;
 use std::io::{Error, Write};
 use std::ops::Range;
@@ -28,6 +29,21 @@ pub struct TelegramReport;
 impl SegmentReport for TelegramReport {
     fn carries(&self) -> &'static str {
         "telegrams of PROFIBUS"
+    }
+
+    fn counted(&self, traces: &[Trace]) -> (usize, &'static str) {
+        let telegrams = traces.iter().map(|trace| said(trace).len());
+        (telegrams.sum(), "telegram")
+    }
+
+    fn difference(
+        &self,
+        [left, right]: [&[Trace]; 2],
+        tolerance: Span,
+        names: [&str; 2],
+    ) -> Option<(bool, String)> {
+        let found = diff::difference(left, right, tolerance);
+        Some((found.is_none(), found.show(names)))
     }
 
     fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
@@ -49,9 +65,4 @@ impl SegmentReport for TelegramReport {
             SharedForm::Candump => Err(no_form(self.carries(), form)),
         }
     }
-}
-
-/// How many telegrams these traces have.
-pub fn count(traces: &[Trace]) -> usize {
-    traces.iter().map(|trace| said(trace).len()).sum()
 }

@@ -4,15 +4,14 @@ use super::rig;
 use crate::rig::sim::RigOfRings as _;
 use crate::serve::Server;
 use crate::simulate::bench;
+use harness_bench::bus::Served;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
 use harness_bench::command::rig_name::RigName;
-use harness_bench::command::sim::{SimArguments, SimSpeed};
+use harness_bench::command::sim::{SimArguments, SimSpeed, options, places};
 use harness_bench::rig::buses::RigBuses;
-use harness_bench::serve::{
-    ClientRole, ControlPlace, Inner, Pace, ServeEnd, ServeError, ServeOptions, ServedAt, serve,
-};
+use harness_bench::serve::{ClientRole, Inner, Pace, ServedAt, serve};
 
 /// The seats at inner links with their places, in the order of the command line: taps first.
 fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)>, Failure> {
@@ -61,41 +60,12 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
     Ok(all)
 }
 
-/// Where lines of control come from.
-fn control(arguments: &SimArguments) -> Option<ControlPlace> {
-    arguments.control.as_deref().map(|place| match place {
-        "-" => ControlPlace::Standard,
-        address => ControlPlace::Tcp(address.to_owned()),
-    })
-}
-
-/// Where `masters` are served: nowhere, if only a live page is asked for.
-pub fn places(arguments: &SimArguments, masters: usize) -> impl Iterator<Item = ServedAt> {
-    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
-    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
-    let only_page = arguments.tcp.is_empty() && arguments.pty.is_empty();
-    let nowhere = only_page.then(|| std::iter::repeat_n(ServedAt::Nowhere, masters));
-    tcp.chain(pty).chain(nowhere.into_iter().flatten())
-}
-
-/// What the arguments say of serving at these places.
-pub fn options<P>(arguments: &SimArguments, places: Vec<P>) -> ServeOptions<P> {
-    ServeOptions {
-        places,
-        control: control(arguments),
-        page: arguments.web.clone(),
-        allow_remote: arguments.allow_remote,
-        once: arguments.once,
-        length: arguments.length,
-    }
-}
-
 /// Serves the rings of a simulated bench.
-pub fn rings(
+pub(crate) fn rings(
     arguments: &SimArguments,
     buses: &'static RigBuses,
     output: &mut Output,
-) -> Result<Result<ServeEnd, ServeError>, Failure> {
+) -> Served {
     if !arguments.frames.places().is_empty() {
         return Err(Failure::refused(
             "--slcan, --slcan-pty and --socketcand serve a CAN bus; --bus unitek expected with them",

@@ -109,6 +109,10 @@ impl Language for Novobus {
         plan.link_name(ring, link)
     }
 
+    fn rings(header: &Self::Header) -> Vec<String> {
+        header.rings.iter().map(|ring| ring.sizes()).collect()
+    }
+
     fn size(plan: &Plan<Self>) -> String {
         let drives = plan.rings.iter().map(|ring| ring.drives().to_string());
         drives.collect::<Vec<_>>().join("+")

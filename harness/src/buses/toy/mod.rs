@@ -40,7 +40,7 @@ fn source(text: &str) -> Source {
 /// Plays it as `run` does.
 fn played(text: &str) -> (Entry, Outcome, Vec<Trace>) {
     let source = source(&format!("{HEADER}{text}"));
-    let found = settle::<Valves, _>(&source, None).expect("a scenario");
+    let found = settle::<Valves>(&source, None).expect("a scenario");
     let entry = Entry::of_other(source, found);
     let played = play_entry(&entry, AtMismatch::GoOn);
     (entry, played.outcome, played.traces)
@@ -133,7 +133,7 @@ fn what_is_written_is_read_again() {
 fn its_mistakes_have_their_places_and_suggestions() {
     let mistake = |steps: &str| {
         let source = source(&format!("{HEADER}valve 1\n\n{steps}\n"));
-        let found = settle::<Valves, Valves>(&source, None).expect_err("a mistake");
+        let found = settle::<Valves>(&source, None).expect_err("a mistake");
         let first = found.all()[0].clone();
         let place = source.text[first.span.start..first.span.end].to_owned();
         (place, first.help.unwrap_or_default())

@@ -2,7 +2,7 @@
 
 use super::CaptureArguments;
 use super::place::{TapAt, TapPort};
-use crate::buses::live_text;
+use crate::buses::carrier;
 use crate::capture::live::LiveText;
 use crate::capture::senders::TelegramCutter;
 use crate::capture::{AWAY, Piece, RecordedPlace};
@@ -146,7 +146,7 @@ impl Tap {
         let ear = settings.open(at)?;
         let mut own = Self {
             at: at.clone(),
-            text: live_text(&place, drives),
+            text: (carrier(place.carries).live)(&place, drives),
             place,
             listening: None,
             ear,

@@ -1,12 +1,11 @@
 //! `drivebench fuzz run`.
 
-use crate::bus::BusName;
 use crate::buses::novobus::cli::fuzz::{on_ports, scope, simulated, sizes};
 use crate::buses::novobus::explore::{
     Case, CaseScope, FuzzSettings, KeptRun, OnRig, OnSim, RingSetup, planted_setup,
 };
 use crate::buses::novobus::rig::sim;
-use crate::buses::{deviations, find_any_rig, line_fuzz};
+use crate::buses::{BUSES, find_any_rig, line_fuzz};
 use crate::command::exit::Exit;
 use crate::command::fuzz::run::{
     CASES, FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore, planted as read_planted,
@@ -38,8 +37,10 @@ pub(super) fn planted(text: &str) -> Result<Planted, String> {
 
 /// The deviations of drives of all buses.
 fn deviation_names() -> Vec<&'static str> {
-    let buses = BusName::NAMES.iter().map(|(_, bus)| *bus);
-    let rows = buses.flat_map(|bus| deviations(bus).into_iter().next().unwrap_or_default());
+    let rows = BUSES.iter().flat_map(|bus| {
+        let [drives, _masters] = (bus.deviations)();
+        drives
+    });
     rows.map(|row| row.name).collect()
 }
 

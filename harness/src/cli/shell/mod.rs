@@ -10,7 +10,7 @@ mod session;
 
 pub(crate) use request::schema;
 
-use crate::bus::BusName;
+use crate::buses::bus_of;
 use crate::buses::find_any_rig;
 use crate::buses::hold;
 use crate::command::args::{ColourWhen, ShowProgress, duration};
@@ -185,7 +185,7 @@ fn serve(
         Err(failure) => return failure.tell(told),
     };
     let opened = !inbox.done();
-    let bus = rig.port().map_or(BusName::DEFAULT, |port| port.bus.bus());
+    let bus = bus_of(&rig).name;
     let ready = SessionEvent::Ready {
         bus: bus.name(),
         drives: bench.drives(),

@@ -48,7 +48,7 @@ fn stimuli_are_header_lines_and_steps() {
     }
     // In the header they happen before anything is sent, and are no step.
     let lines = nd21("drive 0 input GPIN3 high\ndrive 1 power off\n> 80*3\n? received 0 bytes");
-    assert_eq!(entry(&lines).expect("no mistake").scenario.steps.len(), 2);
+    assert_eq!(entry(&lines).expect("no mistake").scenario.steps, 2);
     passes(&lines);
     passes(&nd21(
         "> 80\n< 80\ndrive 0 power off\n> 80\n+5ms drive 0 power on\n? received 1 bytes",

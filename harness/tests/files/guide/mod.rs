@@ -6,7 +6,7 @@ mod page;
 mod shell;
 mod words;
 
-use harness::buses::MANUALS;
+use harness::buses::BUSES;
 use page::{Page, Step};
 use std::cell::Cell;
 use std::collections::BTreeSet;
@@ -134,9 +134,16 @@ fn anchor(line: &str) -> Option<String> {
 /// Every section of the manual that a page cites is one that the manual has.
 pub(crate) fn citations(path: &Path) -> datatest_stable::Result<()> {
     let mut sections: BTreeSet<String> = WITHOUT_TABLES.iter().map(|s| (*s).to_owned()).collect();
-    sections.extend(MANUALS[0].tables()?.into_iter().map(|table| table.section));
     sections.extend(
-        MANUALS[0]
+        BUSES[0]
+            .manual
+            .tables()?
+            .into_iter()
+            .map(|table| table.section),
+    );
+    sections.extend(
+        BUSES[0]
+            .manual
             .errata()?
             .into_iter()
             .map(|erratum| erratum.section),

@@ -1,5 +1,6 @@
 //! `drivebench cells --bus unitek`: the registers of the drive.
 
+use harness_bench::command::args::CellsArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::output::Output;
 use harness_proto::unitek::units::usual;
@@ -10,8 +11,15 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     REGISTERS.iter().map(|register| register.name)
 }
 
-/// Shows the registers that have `filter` in their name, number or meaning.
-pub fn cells(filter: &str, output: &mut Output) -> std::io::Result<Exit> {
+/// Shows the registers that have the filter in their name, number or meaning.
+pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+    if arguments.eeprom {
+        output.complain(
+            "--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM",
+        );
+        return Ok(Exit::Usage);
+    }
+    let filter = arguments.filter.as_deref().unwrap_or_default();
     let filter = filter.to_lowercase();
     let lines = REGISTERS.iter().map(line);
     let wanted: String = lines

@@ -10,6 +10,7 @@ mod info;
 mod params;
 mod position;
 mod read;
+pub(crate) mod sim;
 mod watch;
 mod write;
 

@@ -1,7 +1,10 @@
 //! The language of this bus: reading, writing, mistakes and verdicts.
 
 use super::Unitek;
-use harness_bench::scenario::parse::parse;
+use harness_bench::bus::BusName;
+use harness_bench::fuzz::written;
+use harness_bench::scenario::files::sources;
+use harness_bench::scenario::parse::{bus, parse};
 use harness_bench::scenario::settled::settle;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
@@ -19,7 +22,7 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let found = settle::<Unitek, Unitek>(&source(&format!("{HEADER}{lines}")), None);
+    let found = settle::<Unitek>(&source(&format!("{HEADER}{lines}")), None);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
@@ -40,7 +43,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = settle::<Unitek, Unitek>(&source, None).expect_err(lines);
+    let found = settle::<Unitek>(&source, None).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);
@@ -301,7 +304,7 @@ fn several_drives() {
 fn a_full_bus_ends() {
     let lines = "rate 100\ndrive 1\nfor k in 1..8\n> 201 3D (k) 01\nend\n> 201 3D 01 FF\n? quiet\n";
     let source = source(&format!("{HEADER}{lines}"));
-    let (_, plan) = settle::<Unitek, Unitek>(&source, None).expect("a scenario");
+    let (_, plan) = settle::<Unitek>(&source, None).expect("a scenario");
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Failed);
@@ -375,13 +378,13 @@ fn damaged_scenarios() {
             }
         }
         let source = source(&text);
-        if harness_bench::scenario::parse::bus(&source) != harness_bench::bus::BusName::Unitek {
+        if bus(&source) != BusName::Unitek {
             continue;
         }
         if let Ok(scenario) = parse::<Unitek>(&source) {
-            harness_bench::fuzz::written(&scenario);
+            written(&scenario);
         }
-        match settle::<Unitek, Unitek>(&source, None) {
+        match settle::<Unitek>(&source, None) {
             Ok((_, plan)) => {
                 let mut link = plan.simulate();
                 plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::GoOn);
@@ -397,4 +400,15 @@ fn damaged_scenarios() {
         }
     }
     assert!(played > 300 && refused > 300, "{played} {refused}");
+}
+
+/// `parse(write(x)) == x`.
+#[test]
+fn every_built_in_scenario_comes_back() {
+    let mut all = sources(&[]).expect("the library");
+    all.retain(|source| bus(source) == BusName::Unitek);
+    assert!(all.len() > 100, "{}", all.len());
+    for source in all {
+        written(&parse::<Unitek>(&source).expect("a scenario"));
+    }
 }

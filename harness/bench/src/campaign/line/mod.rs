@@ -199,7 +199,7 @@ pub fn replayed<L: crate::scenario::language::Language>(
         name: case.to_owned(),
         text: text.clone().into(),
     };
-    let settled = crate::scenario::settled::settle::<L, L>(&source, None);
+    let settled = crate::scenario::settled::settle::<L>(&source, None);
     let (_, plan) = settled.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
     let mut link = plan.simulate();
     let played = plan.play(&mut *link, AtMismatch::Stop);

@@ -2,13 +2,14 @@
 
 use super::replay::{ReplayArguments, kept, play};
 use super::run::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore};
-use super::tell;
+use super::{tell, verify};
 use crate::command::exit::Exit;
 use crate::command::fuzz::promote::{PromoteArguments, keep};
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
 use crate::counted::counted;
+use crate::evidence::Signer;
 use crate::explore::line::{
     LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
 };
@@ -21,6 +22,7 @@ use crate::link::Line as _;
 use crate::rig::buses::RigBuses;
 use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
+use std::path::Path;
 use std::time::Duration;
 
 /// How often a finding is tried before it is made small on a rig.
@@ -36,7 +38,12 @@ pub struct LineFuzz {
     pub shrink: fn(&ShrinkArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>,
     /// `promote`
     pub promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
+    /// `verify` of the folder of a run; `None` if the folder has no run of this bus.
+    pub verify: Verify,
 }
+
+/// Judges the findings of a run again.
+type Verify = fn(&Path, Option<Signer<'_>>, &mut Output) -> Option<std::io::Result<Exit>>;
 
 impl LineFuzz {
     /// The commands on a bus.
@@ -46,6 +53,10 @@ impl LineFuzz {
             replay: replay::<B>,
             shrink: shrink::<B>,
             promote: keep::<LineTalk<B>>,
+            verify: |folder, signer, output| {
+                let (kept, _) = read_as::<LineTalk<B>>(folder).ok()?;
+                Some(verify(folder, &kept, signer, output))
+            },
         }
     }
 }

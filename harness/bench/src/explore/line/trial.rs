@@ -189,7 +189,7 @@ fn verdict<L: Language>(text: &str, line: &str, under: &[String]) -> (Verdict, S
         name: "finding".to_owned(),
         text: text.clone().into(),
     };
-    let found = settle::<L, L>(&source, None);
+    let found = settle::<L>(&source, None);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
     let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
     (

@@ -46,19 +46,31 @@ impl<L: Language> Scenario<L> {
 }
 
 impl<L: Language> Scenario<L> {
-    /// What it says in words that every bus has; without the header lines of its bus and without steps.
-    pub fn in_common<C: Language>(self) -> Scenario<C> {
-        Scenario {
+    /// What it says in words that every bus has.
+    pub fn head(self) -> ScenarioHead {
+        ScenarioHead {
             title: self.title,
             sources: self.sources,
             bus: self.bus,
-            header: Default::default(),
-            needs: self.needs,
-            strict: self.strict,
-            deadline: self.deadline,
-            steps: Vec::new(),
+            steps: self.steps.len(),
+            rings: L::rings(&self.header),
         }
     }
+}
+
+/// What a scenario says of itself in words that every bus has.
+#[derive(Clone, Debug)]
+pub struct ScenarioHead {
+    /// What the conversation shows, in a line.
+    pub title: String,
+    /// The tables of which manuals it pins.
+    pub sources: Vec<Citation>,
+    /// Which bus.
+    pub bus: BusName,
+    /// How many steps are written.
+    pub steps: usize,
+    /// The numbers of drives for which it is written, such as `1..250`, a ring each; none on another bus.
+    pub rings: Vec<String>,
 }
 
 /// A reference to a manual: `nd21 9.7`, `nd21 8.2 exchange-6`.
