@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("codec");
+drivebench_fuzz::noting!(novobus, "codec");

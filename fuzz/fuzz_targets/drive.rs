@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("drive");
+drivebench_fuzz::noting!(novobus, "drive");

@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("guard");
+drivebench_fuzz::noting!(novobus, "guard");

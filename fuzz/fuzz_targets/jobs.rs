@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("jobs");
+drivebench_fuzz::noting!(novobus, "jobs");

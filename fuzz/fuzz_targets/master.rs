@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("master");
+drivebench_fuzz::noting!(novobus, "master");

@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("nordac-fdl");
+drivebench_fuzz::noting!(nordac, "nordac-fdl");

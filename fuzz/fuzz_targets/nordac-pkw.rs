@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("nordac-pkw");
+drivebench_fuzz::noting!(nordac, "nordac-pkw");

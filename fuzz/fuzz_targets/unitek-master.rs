@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("unitek-master");
+drivebench_fuzz::noting!(unitek, "unitek-master");

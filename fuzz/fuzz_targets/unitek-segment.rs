@@ -1,2 +1,2 @@
 #![no_main]
-drivebench_fuzz::noting!("unitek-segment");
+drivebench_fuzz::noting!(unitek, "unitek-segment");

@@ -1,10 +1,14 @@
-//! What the targets share: libFuzzer's extra counters, fed with the protocol transitions or the cells of a case, and the mutator that
-//! repairs commands.
+//! What the targets share: libFuzzer's extra counters, fed with what a case goes through.
 
-use harness_sim::novobus::fuzz::repair;
-use harness_sim::novobus::transitions::Transition;
+mod noting;
+#[cfg(feature = "novobus")]
+mod transitions;
+
+pub use noting::{FEATURES, note};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicU8, AtomicU16};
+#[cfg(feature = "novobus")]
+pub use transitions::{mutate, not_counted};
 
 /// Number of counters for `cells` cells: libFuzzer reads them in steps of eight bytes.
 pub const fn counters(cells: usize) -> usize {
@@ -15,45 +19,13 @@ pub const fn counters(cells: usize) -> usize {
 /// those of nearly every case would only cost time.
 pub const NEWS: u16 = 4_096;
 
-/// Defines `Counters`, which reports each transition to libFuzzer when it happens: one counter for each of the first `$cells` cells of the
-/// matrix of protocol transitions. Pass no more cells than the target can reach: libFuzzer finds the counters by the name of the section,
-/// clears all of them before each case, reads all of them after it and keeps an input that raises one of them for the first time.
-#[macro_export]
-macro_rules! counters {
-    ($cells:expr) => {
-        // `used` keeps the linker from leaving them out. Unsafe, since a section of a wrong form would harm the program; this one is an
-        // array of bytes, as libFuzzer documents it.
-        #[used]
-        #[unsafe(link_section = "__libfuzzer_extra_counters")]
-        static TRANSITIONS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
-            [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
-
-        // The number of further cases in which each transition is reported.
-        static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
-            [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
-
-        #[derive(Clone, Debug, Default)]
-        struct Counters;
-
-        impl harness_sim::novobus::transitions::Notes for Counters {
-            #[inline]
-            fn note(&mut self, cell: harness_sim::novobus::transitions::Transition) {
-                let told = cell.number().is_some_and(|number| $crate::tell(&TRANSITIONS, &LEFT, number));
-                if !told {
-                    $crate::not_counted(cell);
-                }
-            }
-
-            fn join(&mut self, _other: &Self) {}
-
-            fn assert_possible(&self) {}
-        }
-    };
-}
-
 /// Raises the counter with this number, once a case, while `left` reports remain for it; `false` if there is no such counter.
 #[inline]
-pub fn tell<const N: usize>(counters: &[AtomicU8; N], left: &[AtomicU16; N], number: usize) -> bool {
+pub fn tell<const N: usize>(
+    counters: &[AtomicU8; N],
+    left: &[AtomicU16; N],
+    number: usize,
+) -> bool {
     let (Some(counter), Some(left)) = (counters.get(number), left.get(number)) else {
         return false;
     };
@@ -77,40 +49,10 @@ macro_rules! cell_counters {
         static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
             [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
         libfuzzer_sys::fuzz_target!(|data: &[u8]| $body(data, &mut |cell: usize| {
-            assert!($crate::tell(&CELLS, &LEFT, cell), "cell {cell}: this target has no counter for it");
+            assert!(
+                $crate::tell(&CELLS, &LEFT, cell),
+                "cell {cell}: this target has no counter for it"
+            );
         }));
     };
 }
-
-/// Ends the case of a target that reaches a cell that it cannot reach.
-///
-/// # Panics
-/// Always.
-#[cold]
-pub fn not_counted(cell: Transition) {
-    cell.assert_possible();
-    panic!("{cell}: this target has no counter for it");
-}
-
-/// The longest command (ND21 10).
-const LONGEST_COMMAND: usize = 6;
-
-/// libFuzzer's mutation, and behind it, for every fourth seed, repaired commands; `head` bytes in front are no wire bytes. For all but a
-/// few seeds an input grows by a command at most: of a long input nearly every byte comes to a drive that is in the error mode already.
-pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: usize) -> usize {
-    let most = if seed % 32 == 1 {
-        max_size
-    } else {
-        max_size.min(size + LONGEST_COMMAND)
-    };
-    let size = libfuzzer_sys::fuzzer_mutate(data, size, most);
-    if seed.is_multiple_of(4)
-        && let Some(wire) = data[..size].get_mut(head..)
-    {
-        repair(wire);
-    }
-    size
-}
-
-mod noting;
-pub use noting::{FEATURES, note};

@@ -28,11 +28,17 @@ pub mod decode;
 pub mod limit;
 pub mod line;
 pub mod marks;
+#[cfg(feature = "novobus")]
 pub mod nd21;
+#[cfg(feature = "nordac")]
 pub mod nordac;
+#[cfg(feature = "novobus")]
 pub mod novobus;
+#[cfg(any(feature = "unitek", feature = "nordac"))]
 mod open_words;
+#[cfg(feature = "nordac")]
 pub mod profibus;
 pub mod ratio;
 pub mod time;
+#[cfg(feature = "unitek")]
 pub mod unitek;

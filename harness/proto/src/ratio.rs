@@ -84,19 +84,6 @@ impl Ratio {
             denominator: denominator / divisor,
         }
     }
-
-    /// A raw value times its scale. The scales of this module have numerators below 2^31.
-    pub(super) const fn times(self, raw: i32) -> Self {
-        Self::of(self.numerator.saturating_mul(raw as i64), self.denominator)
-    }
-
-    /// How many steps of `scale` this is, rounded to the nearest. `scale` is positive.
-    pub(super) const fn steps(self, scale: Self) -> i128 {
-        round_div(
-            self.numerator as i128 * scale.denominator as i128,
-            self.denominator as i128 * scale.numerator as i128,
-        )
-    }
 }
 
 /// The nearest whole number to `a` / `b`, a half away from 0. `b` is positive.

@@ -11,7 +11,7 @@ use std::fmt;
 pub type FuzzTarget = (&'static str, fn(&[u8]));
 
 /// Maximum length of an input; further bytes are ignored.
-pub(crate) const LONGEST: usize = 4_096;
+pub const LONGEST: usize = 4_096;
 
 /// Something that an input reaches: a place (a state, a command, a kind of fault) and what happened there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -173,6 +173,7 @@ pub fn slug(name: &str) -> String {
 }
 
 /// Rows of events: variant, section, words.
+#[cfg(any(feature = "unitek", feature = "nordac"))]
 macro_rules! events {
     ($($name:ident $section:literal $words:literal;)+) => {
         /// What happens to a drive, or what it does by itself.
@@ -192,6 +193,7 @@ macro_rules! events {
     };
 }
 
+#[cfg(any(feature = "unitek", feature = "nordac"))]
 pub(crate) use events;
 
 #[cfg(test)]

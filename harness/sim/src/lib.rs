@@ -9,14 +9,19 @@
 //! the fuzz targets of all buses share.
 #![forbid(unsafe_code)]
 
+#[cfg(any(feature = "unitek", feature = "nordac"))]
 mod compiled;
 pub mod fault;
 pub mod fuzz;
+#[cfg(feature = "novobus")]
 pub mod nd21;
+#[cfg(feature = "nordac")]
 pub mod nordac;
+#[cfg(feature = "novobus")]
 pub mod novobus;
 pub mod octet_segment;
 pub mod participant;
 pub mod record;
 pub mod segment;
+#[cfg(feature = "unitek")]
 pub mod unitek;

@@ -3,7 +3,7 @@
 use harness::fuzz::coverage::Coverage;
 use harness::fuzz::distil::superfluous;
 use harness::fuzz::input::input;
-use harness::fuzz::{noting, targets};
+use harness::fuzz::{BENCH_TARGETS, noting, targets};
 use harness_sim::novobus::transitions::{State, tour};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -102,6 +102,19 @@ fn the_scripts_know_every_target() {
     let known: BTreeSet<_> = targets().map(|(name, _)| name.to_owned()).collect();
     let listed = script("fuzz-targets", &[]);
     assert_eq!(listed.iter().cloned().collect::<BTreeSet<_>>(), known);
+    // The feature that a target needs is its bus: no other bus is built with it.
+    let buses = [
+        ("novobus", &harness_sim::novobus::fuzz::TARGETS[..]),
+        ("unitek", &harness_sim::unitek::fuzz::TARGETS),
+        ("nordac", &harness_sim::nordac::fuzz::TARGETS),
+        ("texts", &BENCH_TARGETS),
+    ];
+    let needed = buses.into_iter().flat_map(|(feature, targets)| {
+        let names = targets.iter().map(|(name, _)| name);
+        names.map(move |name| format!("{name} {feature}"))
+    });
+    let listed = script("fuzz-targets", &["--features"]).into_iter();
+    assert_eq!(listed.collect::<BTreeSet<_>>(), needed.collect());
     let with_dictionary = script("fuzz-targets", &["--dictionary"]);
     let wanted = ["bus_end", "codec", "detector", "guard", "ring"].map(str::to_owned);
     assert_eq!(

@@ -1,6 +1,7 @@
 //! One link of a ring: a wire that carries one byte at a time, and its faults.
 
-use crate::fault::{FaultPlan, Flips, LinkFault};
+use crate::fault::{Flips, LinkFault};
+use crate::novobus::fault_plan::FaultPlan;
 use crate::novobus::uart::{self, Uart};
 use crate::novobus::under_way::{Bytes, UnderWay};
 use crate::record::LineByte;

@@ -12,6 +12,7 @@ pub mod counted;
 pub mod deviation;
 pub mod device;
 pub mod drive;
+mod fault_plan;
 pub mod fuzz;
 mod group;
 pub mod link;

@@ -1,7 +1,8 @@
 //! A place in the ring: a device between its two links, with the faults of a drive.
 
-use crate::fault::{DriveFault, FaultPlan};
+use crate::fault::DriveFault;
 use crate::novobus::device::Device;
+use crate::novobus::fault_plan::FaultPlan;
 use crate::novobus::link::Link;
 use crate::novobus::mark::bits;
 use crate::record::Remark;

@@ -43,6 +43,7 @@ pub use temperature::{
     cooler_from_raw, cooler_resistance, cooler_to_raw, motor_sensor_from_raw, motor_sensor_to_raw,
 };
 
+use crate::ratio::round_div;
 use core::fmt;
 
 /// The type of the device, on which the scales of the currents depend (ND21 4.2.2).
@@ -206,6 +207,24 @@ fn check(
         ))
     } else {
         Ok(())
+    }
+}
+
+impl Ratio {
+    /// A raw value times its scale. The scales of this module have numerators below 2^31.
+    const fn times(self, raw: i32) -> Self {
+        Self::of(
+            self.numerator().saturating_mul(raw as i64),
+            self.denominator(),
+        )
+    }
+
+    /// How many steps of `scale` this is, rounded to the nearest. `scale` is positive.
+    const fn steps(self, scale: Self) -> i128 {
+        round_div(
+            self.numerator() as i128 * scale.denominator() as i128,
+            self.denominator() as i128 * scale.numerator() as i128,
+        )
     }
 }
 
