@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| harness::buses::novobus::capture::fuzz::import(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| harness::fuzz::capture(data));

@@ -1,15 +1,17 @@
 //! Fuzz targets whose bodies need the whole bench, the kept inputs of all of them, and what those reach.
 //!
-//! The bodies for bytes and frames of a bus are in `harness_sim`, in the folder of the bus. Here are those for texts ([`scenario`], [`rig`]);
-//! those for captures and records stand beside what reads them.
+//! The bodies for bytes and frames of a bus are in `harness_sim`, in the folder of the bus. Here are those for texts ([`scenario`], [`rig`]) and
+//! for captures ([`capture`](fn@capture)); that for records stands beside what reads them.
 //! [`coverage`] compares the kept inputs with the matrix of protocol transitions and sums up what they reach. [`distil`](mod@distil) chooses
 //! the inputs to keep.
 
 pub use harness_bench::fuzz::*;
+mod capture;
 pub mod coverage;
 mod noted;
 mod text;
 
+pub use capture::capture;
 pub use text::{rig, scenario};
 
 use crate::buses::BUSES;
@@ -19,7 +21,7 @@ use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
 pub const BENCH_TARGETS: [FuzzTarget; 4] = [
     ("scenario", scenario),
     ("rig", rig),
-    ("capture", crate::buses::novobus::capture::fuzz::import),
+    ("capture", capture),
     ("record", crate::evidence::fuzz::record),
 ];
 

@@ -1,5 +1,6 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
+use super::capture::capture as capture_body;
 use super::text::{rig as rig_body, scenario as scenario_body};
 use crate::bus::BusName;
 use crate::buses::novobus::capture::scenario as sketch;
@@ -72,7 +73,7 @@ pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
 /// # Panics
 /// As the target.
 pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
-    crate::buses::novobus::capture::fuzz::import(data);
+    capture_body(data);
     let form = match data.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{') => "JSON",
         _ => "pcapng",

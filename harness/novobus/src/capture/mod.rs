@@ -3,7 +3,6 @@
 mod begin;
 pub mod diff;
 pub(crate) mod faults;
-pub mod fuzz;
 pub mod judge;
 mod open;
 pub mod scenario;

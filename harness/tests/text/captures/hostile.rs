@@ -56,8 +56,7 @@ fn flipped_bits() {
                 _ => u8::try_from(random(256)).expect("a byte"),
             };
         }
-        let result =
-            std::panic::catch_unwind(|| harness::buses::novobus::capture::fuzz::import(&file));
+        let result = std::panic::catch_unwind(|| harness::fuzz::capture(&file));
         assert!(
             result.is_ok(),
             "case {case}; repeat with: DRIVEBENCH_SEED={seed} cargo test --test text flipped_bits"
@@ -72,13 +71,13 @@ fn kept_inputs() {
     let mut played = 0;
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("readable").path();
-        harness::buses::novobus::capture::fuzz::import(&std::fs::read(&path).expect("readable"));
+        harness::fuzz::capture(&std::fs::read(&path).expect("readable"));
         played += 1;
     }
     assert!(played > 1);
     for capture in [built_in("9.8-two-check-sequences"), run(DAMAGED)] {
-        harness::buses::novobus::capture::fuzz::import(&pcapng(&capture));
-        harness::buses::novobus::capture::fuzz::import(&json(&capture));
+        harness::fuzz::capture(&pcapng(&capture));
+        harness::fuzz::capture(&json(&capture));
     }
 }
 

@@ -1,11 +1,10 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use super::diff::{ComparedRun, diff};
-use super::scenario::{JudgeOptions, scenario};
-use crate::report::vcd;
-use crate::report::{csv, json, svg};
-use harness_bench::capture::{ReadSettings, read, read_with};
-use harness_bench::report::pcapng;
+use crate::buses::novobus::capture::diff::{ComparedRun, diff};
+use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
+use crate::buses::novobus::report::{csv, json, svg, vcd};
+use crate::capture::{ReadSettings, read, read_with};
+use crate::report::pcapng;
 use harness_proto::time::Span;
 
 /// The longest input that is looked at.
@@ -16,7 +15,7 @@ const LONGEST: usize = 65_536;
 ///
 /// # Panics
 /// Something that was written is not read back.
-pub fn import(data: &[u8]) {
+pub fn capture(data: &[u8]) {
     let data = &data[..data.len().min(LONGEST)];
     // What the kernel says of a CAN interface, and a frame of one.
     let _any = harness_socketcan::State::parse(data);
@@ -31,28 +30,25 @@ pub fn import(data: &[u8]) {
         };
         let _any = read_with(data, &settings);
     }
-    let capture = match read(data, None) {
-        Ok(capture) => capture,
+    let taken = match read(data, None) {
+        Ok(taken) => taken,
         Err(error) => {
             assert!(!error.to_string().is_empty());
             return;
         }
     };
     // What is written is not longer than some tens of bytes for each byte read: nothing here grows without bound.
-    assert!(
-        capture.bytes() <= data.len(),
-        "more bytes than the file has"
-    );
+    assert!(taken.bytes() <= data.len(), "more bytes than the file has");
     let mut written = Vec::new();
-    let put = pcapng::write(&capture.traces, capture.rate, &mut written);
+    let put = pcapng::write(&taken.traces, taken.rate, &mut written);
     assert!(put.is_ok(), "a Vec takes everything");
-    match read(&written, Some(capture.rate)) {
+    match read(&written, Some(taken.rate)) {
         // Small times are relative to the start; large ones are times since 1970.
-        Ok(again) if capture.end().since_start() < Span::from_millis(86_400_000) => {
+        Ok(again) if taken.end().since_start() < Span::from_millis(86_400_000) => {
             let (left, right) = (
                 ComparedRun {
                     name: "read",
-                    capture: &capture,
+                    capture: &taken,
                 },
                 ComparedRun {
                     name: "written",
@@ -63,20 +59,20 @@ pub fn import(data: &[u8]) {
             assert!(same.same(), "{}", same.show("read", "written"));
         }
         Ok(_) => {}
-        Err(error) => assert_eq!(capture.traces.len(), 0, "{error}"),
+        Err(error) => assert_eq!(taken.traces.len(), 0, "{error}"),
     }
     let mut sink = std::io::sink();
-    let shown = csv::write(&capture.traces, &mut sink)
-        .and_then(|()| json::write(&capture.traces, &[], &mut sink))
-        .and_then(|()| vcd::write(&capture.traces, capture.rate, vcd::Signals::All, &mut sink));
+    let shown = csv::write(&taken.traces, &mut sink)
+        .and_then(|()| json::write(&taken.traces, &[], &mut sink))
+        .and_then(|()| vcd::write(&taken.traces, taken.rate, vcd::Signals::All, &mut sink));
     assert!(shown.is_ok(), "a sink takes everything");
     let picture = svg::svg(
-        &capture.traces,
+        &taken.traces,
         &svg::SvgOptions {
             title: "any",
             id: "any",
             scale: svg::RowPlacing::Time,
-            rate: capture.rate,
+            rate: taken.rate,
             rows: None,
         },
     );
@@ -90,7 +86,7 @@ pub fn import(data: &[u8]) {
         setup: None,
         tolerance: Span::ZERO,
     };
-    if let Ok(text) = scenario(&capture, &options) {
+    if let Ok(text) = scenario(&taken, &options) {
         assert!(!text.is_empty());
     }
 }
