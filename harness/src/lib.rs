@@ -36,8 +36,9 @@ pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
 pub use harness_bench::{
-    bus, campaign, capture, explore, file, frames, guard, html, link, listen, manual, medium,
-    partition, port, qualify, regular, rig, scenario, serve, signals, top, traffic, trouble, web,
+    bus, bus_name, campaign, capture, explore, file, frames, guard, html, link, listen, manual,
+    medium, partition, port, qualify, regular, rig, scenario, serve, signals, top, traffic,
+    trouble, web,
 };
 use harness_proto::counted;
 #[doc(inline)]

@@ -1,6 +1,6 @@
 //! A scenario of any bus, read and settled.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::buses::named;
 use crate::buses::novobus::language::plan::Plan;
 use crate::buses::novobus::language::read::RingScenario;

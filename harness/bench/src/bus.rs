@@ -1,5 +1,6 @@
 //! What the program asks of a bus. The crate of a bus exports one [`Bus`].
 
+use crate::bus_name::BusName;
 use crate::campaign::line::LineCampaign;
 use crate::capture::live::LiveText;
 use crate::capture::{Carries, JudgedFrames, RecordedPlace};
@@ -23,39 +24,6 @@ use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::Trace;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Which bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum BusName {
-    /// The ND21's ring.
-    Novobus,
-    /// UNITEK DS/BAMOCAR on CAN.
-    Unitek,
-    /// NORDAC vector on PROFIBUS DP.
-    Nordac,
-}
-
-impl BusName {
-    /// The names in a scenario.
-    pub const NAMES: [(&'static str, Self); 3] = [
-        ("novobus", Self::Novobus),
-        ("unitek", Self::Unitek),
-        ("nordac", Self::Nordac),
-    ];
-
-    /// The bus of a scenario without a `bus` line.
-    pub const DEFAULT: Self = Self::Novobus;
-
-    /// The name in a scenario, and of its folders in `corpora/scenarios` and `snapshots/scenarios`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Novobus => "novobus",
-            Self::Unitek => "unitek",
-            Self::Nordac => "nordac",
-        }
-    }
-}
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 pub type Found = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;

@@ -5,6 +5,7 @@
 pub use harness_proto::counted;
 
 pub mod bus;
+pub mod bus_name;
 pub mod campaign;
 pub mod capture;
 pub mod command;

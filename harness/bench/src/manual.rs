@@ -1,6 +1,6 @@
 //! The manuals' tables and examples, which scenario pins each, and the errata ledgers.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use serde::Deserialize;
 
 /// The manual of a bus.

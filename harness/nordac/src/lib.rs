@@ -27,7 +27,8 @@ pub mod simulate;
 pub mod stream;
 pub mod value;
 
-use harness_bench::bus::{Bus, BusName, SharedLine};
+use harness_bench::bus::{Bus, SharedLine};
+use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::LineCampaign;
 use harness_bench::capture::Carries;
 use harness_bench::scenario::settled;

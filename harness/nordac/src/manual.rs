@@ -1,6 +1,6 @@
 //! The manual of PROFIBUS DP for NORDAC *vector*.
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 

@@ -25,7 +25,8 @@ pub mod stream;
 pub mod top;
 pub mod twin;
 
-use harness_bench::bus::{Bus, BusName};
+use harness_bench::bus::Bus;
+use harness_bench::bus_name::BusName;
 use harness_bench::capture::{Carries, ends};
 use harness_bench::scenario::settled;
 use harness_proto::line::Rate;

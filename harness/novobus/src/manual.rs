@@ -1,6 +1,6 @@
 //! The ND21 User Manual.
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;

@@ -5,7 +5,7 @@ mod interrupt_tests;
 #[cfg(test)]
 mod live_tests;
 #[cfg(test)]
-mod toy;
+mod toy_tests;
 pub use harness_nordac as nordac;
 pub use harness_novobus as novobus;
 pub use harness_unitek as unitek;
@@ -16,7 +16,8 @@ pub use novobus::link::SimulatedLink;
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, twin};
 
-use crate::bus::{Bus, BusName, SharedLine};
+use crate::bus::{Bus, SharedLine};
+use crate::bus_name::BusName;
 use crate::capture::Carries;
 use crate::command::args::ListFormat;
 use crate::command::drive::DriveCommand;

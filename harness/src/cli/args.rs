@@ -8,7 +8,7 @@ use super::merge::MergeArguments;
 use super::plot::PlotArguments;
 use super::rig::RigCommand;
 use super::shell::ShellArguments;
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::capture::{NamedLink, UartFormat};
 use crate::command::args::{
     CellsArguments, ColourWhen, DeviationsArguments, ShowProgress, TableFormat, duration,

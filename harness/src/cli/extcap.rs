@@ -5,7 +5,8 @@
 //! closes it or sends SIGTERM. Messages on standard error appear in Wireshark where the exit code is not 0.
 
 use super::capture::{listen_into, taps_of};
-use crate::bus::{Bus, BusName};
+use crate::bus::Bus;
+use crate::bus_name::BusName;
 use crate::buses::BUSES;
 use crate::buses::RIG_BUSES;
 use crate::capture::Carries;

@@ -2,7 +2,8 @@
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::bus::{BusName, SharedLine};
+use crate::bus::SharedLine;
+use crate::bus_name::BusName;
 use crate::buses::novobus::capture::diff::{ComparedRun, diff as compare};
 use crate::buses::novobus::capture::judge::{Judged, judge};
 use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};

@@ -2,7 +2,7 @@
 
 use super::capture::capture as capture_body;
 use super::text::{rig as rig_body, scenario as scenario_body};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::buses::novobus::capture::scenario as sketch;
 use crate::buses::novobus::language::syntax::Scenario;
 use crate::capture::{self, CaptureError};

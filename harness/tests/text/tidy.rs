@@ -138,9 +138,9 @@ fn imports_go_one_way() {
 
 /// The rooms of the engine and of the program: each imports from those in front of it only. The compiler keeps the buses out of the engine; in
 /// the program `buses` stands in front of the command line and behind nothing.
-const ROOMS: [&str; 33] = [
+const ROOMS: [&str; 34] = [
     "counted",
-    "bus",
+    "bus_name",
     "regular",
     "partition",
     "signals",
@@ -170,6 +170,7 @@ const ROOMS: [&str; 33] = [
     "embed",
     "top",
     "command",
+    "bus",
     "cli",
     "main",
 ];
@@ -222,7 +223,7 @@ fn rooms_import_from_rooms_in_front_of_them() {
 /// What each crate of the workspace may depend on, of this workspace: the engine knows no bus, and no bus another.
 #[test]
 fn crates_depend_one_way() {
-    let below: [(&str, &[&str]); 8] = [
+    let below: [(&str, &[&str]); 9] = [
         ("proto", &[]),
         ("sim", &["proto"]),
         ("uart", &[]),
@@ -231,6 +232,7 @@ fn crates_depend_one_way() {
         ("novobus", &["bench", "proto", "sim"]),
         ("unitek", &["bench", "proto", "sim"]),
         ("nordac", &["bench", "proto", "sim"]),
+        ("toy", &["bench", "proto", "sim"]),
     ];
     for (name, allowed) in below {
         let text = read(&root().join(format!("harness/{name}/Cargo.toml")));
@@ -254,7 +256,7 @@ fn no_bus_imports_another() {
         &["toy"],
     ];
     for own in buses {
-        for place in ["proto/src/*", "sim/src/*", "src/buses/*", "*/src"] {
+        for place in ["proto/src/*", "sim/src/*", "*/src"] {
             let folders = own
                 .iter()
                 .map(|name| format!("harness/{}", place.replace('*', name)));

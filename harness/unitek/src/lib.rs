@@ -23,7 +23,8 @@ pub mod simulate;
 pub mod value;
 mod whereabouts;
 
-use harness_bench::bus::{Bus, BusName, SharedLine};
+use harness_bench::bus::{Bus, SharedLine};
+use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::LineCampaign;
 use harness_bench::capture::Carries;
 use harness_bench::scenario::settled;

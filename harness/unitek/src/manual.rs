@@ -1,6 +1,6 @@
 //! The UNITEK DS CAN-BUS manual.
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::manual::{Manual, Open};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 

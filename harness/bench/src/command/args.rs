@@ -1,6 +1,6 @@
 //! Options that several commands have.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::file::values::{Time, ValueError};
 use clap::{Args, ValueEnum};
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Where `sim` serves drives on a bus of frames, and the drives of a shared line.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::serve::ServedAt;
 use crate::serve::frames::{FramePlace, Protocol};
 use clap::Args;

@@ -2,7 +2,7 @@
 
 use super::drive::RigArguments;
 use super::frames::FrameArguments;
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::command::failure::Failure;
 use crate::file::values::LinkName;
 use crate::medium::ErrorMarks;

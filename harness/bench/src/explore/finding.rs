@@ -2,7 +2,7 @@
 
 use super::files::{read_text, write_whole};
 use super::{ExploreError, FuzzCase};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use crate::link::frames::AdapterPlace;
 use crate::medium::ErrorMarks;

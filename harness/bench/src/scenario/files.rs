@@ -2,7 +2,7 @@
 
 use super::problem::{Problems, nearest};
 use super::source::{Source, SourceError};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::regular;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};

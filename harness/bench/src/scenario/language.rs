@@ -12,7 +12,7 @@ use super::run::player::{MAX_ROUND, Runner};
 use super::run::record::CellRecord;
 use super::scanner::Scanner;
 use super::syntax::Scenario;
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::link::{Capability, Link, LinkFault};
 use crate::traffic::SegmentReport;
 use harness_proto::time::{Instant, Span};

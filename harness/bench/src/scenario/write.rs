@@ -4,7 +4,7 @@
 //! this file and to the buses' `write`.
 
 use super::syntax::{Action, Scenario, Step, When};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::scenario::language::Language;
 use std::fmt::Write as _;
 use std::marker::PhantomData;

@@ -1,7 +1,7 @@
 //! What stands in a campaign file of this bus (`corpora/campaigns/nordac/*.toml`).
 
 use super::CLASSES;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::file::values::Time;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::parameter::ParameterRef;

@@ -12,7 +12,7 @@ mod tests;
 pub use converse::{Conversation, SlaveState, StepEnd};
 pub use file::{CampaignStep, TelegramCampaignFile};
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};

@@ -1,7 +1,8 @@
 //! `drivebench sim --bus nordac`: simulated slaves, a place for each master.
 
 use crate::serve::{SegmentServer, bench};
-use harness_bench::bus::{BusName, Served};
+use harness_bench::bus::Served;
+use harness_bench::bus_name::BusName;
 use harness_bench::command::output::Output;
 use harness_bench::command::sim::{SimArguments, SimSpeed, header, options, places, refuse};
 use harness_bench::serve::serve;

@@ -14,7 +14,7 @@ use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, TelegramStep};
 use crate::report::TelegramReport;
 use crate::simulate;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::link::Link;
 use harness_bench::scenario::language::{Language, Opening};
 use harness_bench::scenario::plan::{Plan, PlannedStep};

@@ -1,7 +1,7 @@
 //! The language of this bus: reading, writing, mistakes and verdicts.
 
 use super::Nordac;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::fuzz::written;
 use harness_bench::scenario::files::sources;
 use harness_bench::scenario::parse::{bus, parse};

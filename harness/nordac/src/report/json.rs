@@ -14,7 +14,7 @@
 //! | `error` | `null`, `"parity"`, `"framing"`, `"break"`, `"overrun"` or `"dropped"` |
 //! | `bytes` of a telegram | its octets as they arrived |
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::capture::runs::{octets, said};
 use harness_sim::record::Trace;
 use serde::{Serialize, Serializer};

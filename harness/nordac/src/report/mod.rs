@@ -13,7 +13,7 @@ mod words;
 pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::capture::runs::said;
 use harness_bench::html::Html;
 use harness_bench::traffic::{SegmentReport, SharedForm, drawn, no_form};

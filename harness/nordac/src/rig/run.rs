@@ -7,7 +7,7 @@ use super::session::{Inverters, patience_of};
 use super::{Session, limits, rate, setup, slaves};
 use crate::simulate::Bench;
 use crate::stream::TOLERANCE;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::link::{Capability, Link, LinkEvent, Replay};
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;

@@ -11,7 +11,7 @@ use crate::campaign::sharing::Sharing;
 use crate::language::read::RingScenario;
 use crate::language::syntax::{Setup, SetupKind};
 use crate::simulate::bench;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::scenario::files::{LibraryError, sources};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::problem::{Problem, Problems};

@@ -9,7 +9,7 @@ use crate::link::BesideTheBus;
 use crate::rig::shared::Shared;
 use crate::rig::sim::RigOfRings;
 use crate::rig::{Run, Session};
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;

@@ -17,7 +17,7 @@ use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
 use crate::language::plan::PlannedStep;
 use crate::simulate;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::link::{Link, LinkFault, Octets as _};
 use harness_bench::scenario::language::{Language, Opening};
 use harness_bench::scenario::pattern::{self, Expected, Pattern};

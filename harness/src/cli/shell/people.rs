@@ -416,7 +416,7 @@ impl<P: ExternalPrinter> Write for AbovePrompt<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::BusName;
+    use crate::bus_name::BusName;
 
     fn line(text: &str) -> String {
         match read_line(text) {

@@ -6,7 +6,7 @@ use super::inbox::{LineWriter, RequestReader, SessionItem};
 use super::people::{self, Turn};
 use super::people_output;
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::buses::novobus::rig::sim::RigOfRings;
 use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::help::command;

@@ -1,6 +1,6 @@
 //! What the writer writes is what the parser reads: `parse(write(x)) == x`.
 
-use harness::bus::BusName;
+use harness::bus_name::BusName;
 use harness::buses::novobus::language::syntax::Scenario;
 use harness::fuzz::written;
 use harness::scenario::files::sources;

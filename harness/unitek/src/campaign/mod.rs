@@ -10,7 +10,7 @@ pub mod file;
 pub use converse::{Conversation, JobEnd};
 pub use file::{CampaignStep, FrameCampaignFile};
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};

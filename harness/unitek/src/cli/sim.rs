@@ -1,7 +1,8 @@
 //! `drivebench sim --bus unitek`: simulated drives on a CAN bus that its clients share.
 
 use crate::serve::{bench, serve};
-use harness_bench::bus::{BusName, Served};
+use harness_bench::bus::Served;
+use harness_bench::bus_name::BusName;
 use harness_bench::command::output::Output;
 use harness_bench::command::sim::{SimArguments, SimSpeed, header, options, refuse};
 use harness_bench::medium::ErrorMarks;

@@ -12,7 +12,7 @@ use crate::manual::MANUAL;
 use crate::rig::axes;
 use crate::serve;
 use crate::simulate::Setup;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::explore::line::{ActBounds, LineBus};
 use harness_bench::explore::pool::hash;
 use harness_bench::explore::{Dice, Differing};

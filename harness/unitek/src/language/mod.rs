@@ -15,7 +15,7 @@ use self::plan::{Act, Planner, WantedFrame};
 use self::syntax::{FrameStep, Header, Message};
 use crate::report::FrameReport;
 use crate::simulate;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::link::Link;
 use harness_bench::medium::Out;
 use harness_bench::scenario::language::{Language, Opening};

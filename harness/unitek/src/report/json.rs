@@ -14,7 +14,7 @@
 //! | `from` | `"master"` or the drive's number |
 //! | `fault` | `null`, `"lost"`, or the error that ended the frame: `"error-frame"`, `"no-acknowledge"`, `"bus-off"` |
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use serde::{Serialize, Serializer};
 use std::io::Write;

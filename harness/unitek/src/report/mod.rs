@@ -8,7 +8,7 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng_frames;
 use harness_bench::traffic::{SegmentReport, SharedForm, drawn};

@@ -7,7 +7,7 @@ use super::session::UnitekDrives;
 use super::set_back::set_back;
 use super::{Session, axes, limits, rate};
 use crate::simulate::Bench;
-use harness_bench::bus::BusName;
+use harness_bench::bus_name::BusName;
 use harness_bench::link::frames::SLACK;
 use harness_bench::link::{Link, LinkEvent, Replay};
 use harness_bench::rig::Rig;

@@ -23,7 +23,7 @@ pub use rig::{LineRig, OnAdapter, SessionOf};
 pub use setup::{LineSetup, PlantedDrive};
 pub use talk::{ActBounds, LineAct, LineSeen, LineTalk, Seen};
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::explore::{Dice, Differing, Spiced};
 use crate::manual::Manual;
 use crate::rig::Rig;

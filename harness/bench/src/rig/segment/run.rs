@@ -2,7 +2,7 @@
 
 use super::observed::Beats;
 use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
 use crate::rig::left::NotPutBack;

@@ -2,7 +2,7 @@
 
 use super::step;
 use super::words::named;
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::link::Capability;
 use crate::scenario::language::Language;
 use crate::scenario::problem::{Problem, Problems, Spanned, TextSpan};

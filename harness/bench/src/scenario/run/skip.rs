@@ -1,6 +1,6 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::link::{Capability, Link, is_wrong_parity};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;

@@ -1,6 +1,6 @@
 //! The scenario, its header and its steps.
 
-use crate::bus::BusName;
+use crate::bus_name::BusName;
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::language::Language;

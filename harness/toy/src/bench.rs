@@ -1,9 +1,9 @@
 //! The bench: the bus as a scenario sees it, in virtual time.
 
-use super::valve::Valve;
-use crate::link::bench_clock::BenchClock;
-use crate::link::{Capability, Line, Link, Moment, PlacedFault};
-use crate::medium::{Heard, Medium, Out};
+use crate::valve::Valve;
+use harness_bench::link::bench_clock::BenchClock;
+use harness_bench::link::{Capability, Line, Link, Moment, PlacedFault};
+use harness_bench::medium::{Heard, Medium, Out};
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
 use harness_sim::participant::Participant;
@@ -17,7 +17,7 @@ const RATE: BitRate = BitRate::K500;
 
 /// A simulated segment with valves.
 #[derive(Debug)]
-pub(super) struct Bench {
+pub(crate) struct Bench {
     segment: Segment<Participant<Host, Valve>>,
     valves: Vec<u8>,
     clock: BenchClock,
@@ -25,7 +25,7 @@ pub(super) struct Bench {
 
 impl Bench {
     /// A bench with these valves; true for one that sticks.
-    pub(super) fn new(valves: &[(u8, bool)]) -> Self {
+    pub(crate) fn new(valves: &[(u8, bool)]) -> Self {
         let host = Participant::Host(Host::default());
         let own = |&(number, sticks): &(u8, bool)| Participant::Drive(Valve::new(number, sticks));
         let stations = std::iter::once(host).chain(valves.iter().map(own));
@@ -37,7 +37,7 @@ impl Bench {
     }
 
     /// How far a valve is open, beside the bus.
-    pub(super) fn place(&self, valve: u8) -> Option<u8> {
+    pub(crate) fn place(&self, valve: u8) -> Option<u8> {
         let place = self.valves.iter().position(|own| *own == valve)?;
         let station = self.segment.station(place + 1);
         station.drive().map(|own| own.place)

@@ -1,39 +1,39 @@
 //! The words of the bus: header lines, messages and steps, as read, settled, played and written.
 
-use super::bench::Bench;
-use super::report::ValveReport;
-use super::valve::Said;
-use crate::bus::BusName;
-use crate::link::{Capability, Link};
-use crate::medium::Out;
-use crate::scenario::expression::Scope;
-use crate::scenario::language::{Language, Opening, Settle};
-use crate::scenario::parse::words::{equals, required};
-use crate::scenario::pattern::{self, Expected, Pattern};
-use crate::scenario::plan::{Plan, PlannedStep, Unroll};
-use crate::scenario::problem::{Problem, Spanned, TextSpan};
-use crate::scenario::run::outcome::Stop;
-use crate::scenario::run::player::Runner;
-use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::Scenario;
-use crate::traffic::SegmentReport;
+use crate::bench::Bench;
+use crate::report::ValveReport;
+use crate::valve::Said;
+use harness_bench::bus_name::BusName;
+use harness_bench::link::{Capability, Link};
+use harness_bench::medium::Out;
+use harness_bench::scenario::expression::Scope;
+use harness_bench::scenario::language::{Language, Opening, Settle};
+use harness_bench::scenario::parse::words::{equals, required};
+use harness_bench::scenario::pattern::{self, Expected, Pattern};
+use harness_bench::scenario::plan::{Plan, PlannedStep, Unroll};
+use harness_bench::scenario::problem::{Problem, Spanned, TextSpan};
+use harness_bench::scenario::run::outcome::Stop;
+use harness_bench::scenario::run::player::Runner;
+use harness_bench::scenario::scanner::Scanner;
+use harness_bench::scenario::syntax::Scenario;
+use harness_bench::traffic::SegmentReport;
 use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 
 /// The bus.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Valves;
+pub(crate) struct Valves;
 
 /// `101 01 32`: an identifier and bytes.
 #[derive(Clone, Debug)]
-pub(super) struct Message {
+pub(crate) struct Message {
     id: u16,
     data: Pattern,
 }
 
 /// A step of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Own {
+pub(crate) enum Own {
     /// `open 1 = 50`: moves a valve, and waits for its answer.
     Open(u8, u8),
     /// `? valve 1 at 50`: looks at it beside the bus.
@@ -42,7 +42,7 @@ pub(super) enum Own {
 
 /// An identifier and bytes.
 #[derive(Clone, Debug)]
-pub(super) struct Wanted(u16, Vec<Expected>);
+pub(crate) struct Wanted(u16, Vec<Expected>);
 
 /// A decimal number of at most `most`.
 fn number(scanner: &mut Scanner<'_>, most: u8, what: &str) -> Result<u8, Problem> {
@@ -69,7 +69,7 @@ fn frame(id: u16, data: &[u8], span: TextSpan) -> Result<Frame, Problem> {
 }
 
 /// Settles steps; it has the valves of the header.
-pub(super) struct Planner(Vec<(u8, bool)>);
+pub(crate) struct Planner(Vec<(u8, bool)>);
 
 impl Settle<Valves> for Planner {
     fn unroll<'s>(&self, scenario: &'s Scenario<Valves>) -> Unroll<'s, Valves> {
@@ -330,5 +330,32 @@ impl Language for Valves {
             Own::Open(valve, place) => format!("open {valve} = {place}"),
             Own::At(valve, place) => format!("? valve {valve} at {place}"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use harness_bench::scenario::parse::parse;
+    use harness_bench::scenario::run::AtMismatch;
+    use harness_bench::scenario::settled::settle;
+    use harness_bench::scenario::source::Source;
+    use harness_bench::scenario::verdict::Verdict;
+    use harness_bench::scenario::write::write;
+
+    /// The writer is the inverse of the parser, also for what the core gives: times, patterns, loops.
+    #[test]
+    fn what_is_written_is_read_again() {
+        let text = "title   A valve opens\nsource  valves 2.1\nbus     valves\nvalve 1\nvalve 2 sticks\n\n\
+                    > 101 01 32\n+0.1ms..20ms < 201 01 xx\nfor k in 1..3\nopen 1 = 7\nend\n? valve 2 at 0\n";
+        let source = Source {
+            name: "valves.scn".to_owned(),
+            text: text.into(),
+        };
+        let scenario: Scenario<Valves> = parse(&source).expect("a scenario");
+        assert_eq!(write(&scenario), text);
+        let (_, plan) = settle::<Valves>(&source, None).expect("a scenario");
+        let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
+        assert_eq!(outcome.verdict, Verdict::Passed);
     }
 }

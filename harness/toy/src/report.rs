@@ -1,13 +1,15 @@
 //! How the bus is shown: its table. Pictures and files for tools have defaults.
 
-use super::valve::Said;
-use crate::traffic::SegmentReport;
+use crate::valve::Said;
+use harness_bench::capture::Piece;
+use harness_bench::capture::live::{LiveLine, LiveText};
+use harness_bench::traffic::SegmentReport;
 use harness_sim::record::{LineFrame, Trace};
 use std::ops::Range;
 
 /// The table of valves.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ValveReport;
+pub(crate) struct ValveReport;
 
 impl SegmentReport for ValveReport {
     fn carries(&self) -> &'static str {
@@ -24,12 +26,28 @@ impl SegmentReport for ValveReport {
     }
 }
 
+/// Frames as lines of text, while they arrive.
+#[derive(Debug)]
+pub(crate) struct ValveText;
+
+impl LiveText for ValveText {
+    fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {
+        match piece {
+            Piece::Frame(frame) => vec![(frame.at.since_start().as_nanos(), meaning(frame))],
+            _ => Vec::new(),
+        }
+    }
+}
+
 fn row(frame: &LineFrame) -> String {
-    let meaning = match Said::decode(&frame.frame) {
+    format!("{}  {}\n", frame.at, meaning(frame))
+}
+
+fn meaning(frame: &LineFrame) -> String {
+    match Said::decode(&frame.frame) {
         Some(Said::Ask(valve)) => format!("where is valve {valve}?"),
         Some(Said::Move(valve, place)) => format!("valve {valve}: go to {place} %"),
         Some(Said::At(valve, place)) => format!("valve {valve} is at {place} %"),
         None => format!("foreign: {}", frame.frame),
-    };
-    format!("{}  {meaning}\n", frame.at)
+    }
 }

@@ -1,32 +1,15 @@
-//! A bus in a few hundred lines: valves on frames. It is the example of the page "A fourth bus" in CONTRIBUTING.md, and proves that a
-//! bus needs nothing outside its own folder: from the text of a scenario to the table and the page of HTML.
-//!
-//! | file | what it has | trait |
-//! |---|---|---|
-//! | `valve.rs` | what a frame says; the simulated device, with one deviation | `Station` |
-//! | `bench.rs` | the bus as a scenario sees it | `Line`, `Link` |
-//! | `language.rs` | the words of a scenario | `Language`, `Settle` |
-//! | `report.rs` | the table | `SegmentReport` |
-
-mod bench;
-mod language;
-mod report;
-mod valve;
+//! The example bus `harness/toy`, from the text of a scenario to the table and the page of HTML.
 
 use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::report::finding::explain;
 use crate::report::page::page;
 use crate::report::pages::{Head, ScenarioView, run, section};
-use crate::scenario::parse::parse;
 use crate::scenario::run::{AtMismatch, Outcome};
-use crate::scenario::settled::settle;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
-use crate::scenario::write::write;
 use harness_sim::record::Trace;
-use language::Valves;
+use harness_toy::BUS;
 
 const HEADER: &str = "title   A valve opens\nsource  valves 2.1\nbus     valves\n";
 
@@ -40,7 +23,7 @@ fn source(text: &str) -> Source {
 /// Plays it as `run` does.
 fn played(text: &str) -> (Entry, Outcome, Vec<Trace>) {
     let source = source(&format!("{HEADER}{text}"));
-    let found = settle::<Valves>(&source, None).expect("a scenario");
+    let found = (BUS.settle)(&source, None).expect("a scenario");
     let entry = Entry::of_other(source, found);
     let played = play_entry(&entry, AtMismatch::GoOn);
     (entry, played.outcome, played.traces)
@@ -117,23 +100,11 @@ fn what_no_line_asks_for_is_a_failure() {
     assert!(message.starts_with("201#0000 was received"), "{message}");
 }
 
-/// The writer is the inverse of the parser, also for what the core gives: times, patterns, loops.
-#[test]
-fn what_is_written_is_read_again() {
-    let text = format!(
-        "{HEADER}valve 1\nvalve 2 sticks\n\n> 101 01 32\n+0.1ms..20ms < 201 01 xx\nfor k in 1..3\nopen 1 = 7\nend\n? valve 2 at 0\n"
-    );
-    let scenario: Scenario<Valves> = parse(&source(&text)).expect("a scenario");
-    assert_eq!(write(&scenario), text);
-    let (_, outcome, _) = played(text.strip_prefix(HEADER).expect("the header"));
-    assert_eq!(outcome.verdict, Verdict::Passed);
-}
-
 #[test]
 fn its_mistakes_have_their_places_and_suggestions() {
     let mistake = |steps: &str| {
         let source = source(&format!("{HEADER}valve 1\n\n{steps}\n"));
-        let found = settle::<Valves>(&source, None).expect_err("a mistake");
+        let found = (BUS.settle)(&source, None).expect_err("a mistake");
         let first = found.all()[0].clone();
         let place = source.text[first.span.start..first.span.end].to_owned();
         (place, first.help.unwrap_or_default())

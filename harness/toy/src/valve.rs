@@ -17,7 +17,7 @@ const DELAY: Span = Span::from_micros(100);
 
 /// What a frame says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Said {
+pub(crate) enum Said {
     /// The bench asks where a valve stands.
     Ask(u8),
     /// The bench moves a valve to a percentage.
@@ -28,7 +28,7 @@ pub(super) enum Said {
 
 impl Said {
     /// Reads a frame; `None` for one that says nothing on this bus.
-    pub(super) fn decode(frame: &Frame) -> Option<Self> {
+    pub(crate) fn decode(frame: &Frame) -> Option<Self> {
         let number = u16::try_from(frame.id().number()).ok()?;
         let valve = |base| u8::try_from(number.checked_sub(base)?).ok();
         match (valve(REQUESTS), valve(ANSWERS), frame.data()) {
@@ -40,7 +40,7 @@ impl Said {
     }
 
     /// The identifier and the bytes.
-    pub(super) fn encode(self) -> (u16, Vec<u8>) {
+    pub(crate) fn encode(self) -> (u16, Vec<u8>) {
         match self {
             Self::Ask(valve) => (REQUESTS + u16::from(valve), vec![0]),
             Self::Move(valve, place) => (REQUESTS + u16::from(valve), vec![MOVE, place]),
@@ -51,17 +51,17 @@ impl Said {
 
 /// A valve.
 #[derive(Debug)]
-pub(super) struct Valve {
-    pub(super) number: u8,
+pub(crate) struct Valve {
+    pub(crate) number: u8,
     /// How far it is open, in percent.
-    pub(super) place: u8,
+    pub(crate) place: u8,
     /// A deviation: it answers, and does not move.
-    pub(super) sticks: bool,
+    pub(crate) sticks: bool,
     answer: Option<(Instant, Frame)>,
 }
 
 impl Valve {
-    pub(super) fn new(number: u8, sticks: bool) -> Self {
+    pub(crate) fn new(number: u8, sticks: bool) -> Self {
         Self {
             number,
             place: 0,
