@@ -67,6 +67,15 @@ fn no_right_drive_behind_an_adapter_is_accused() {
     }
 }
 
+#[test]
+#[ignore = "a minute; .ci/nightly runs it"]
+fn no_right_drive_behind_an_adapter_is_accused_in_more_cases() {
+    for header in right_drives() {
+        let rig = find("sim:unitek:1", Path::new(""), &BUSES).expect("a rig");
+        EngineTrial::<Unitek>::accuses_nobody_behind_a_port(rig, &header, 120);
+    }
+}
+
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_drives_are_found_and_their_findings_are_scenarios() {

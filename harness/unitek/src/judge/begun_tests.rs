@@ -388,3 +388,37 @@ fn a_log_ends_before_the_reply() {
     assert_eq!(remarks(&[(0, "201#3DE200")]), 0);
     assert_eq!(remarks(&[(0, "201#3DE200"), (1_000, "201#3DE200")]), 1);
 }
+
+/// Ex 10: a frame of STATUS by event comes in front of the reply to an earlier request, which a slow drive has read while MODE released it.
+#[test]
+fn an_event_is_not_taken_for_the_reply_to_a_request() {
+    let released = [(10, "201#510000"), (20, "201#3D4000")];
+    let locked = [
+        (30, "201#511400"),
+        (34, "181#408031000000"),
+        (40, "201#3D4000"),
+        (60, "181#40813100"),
+        (80, "181#40803100"),
+    ];
+    right(&[&READ, &released[..], &locked].concat());
+    wrong(&[&READ[..], &locked].concat(), FrameSymptom::Value, "ex 2");
+}
+
+/// A drive reads a register at any time between a request and its reply.
+#[test]
+fn what_was_written_in_between_may_be_read() {
+    let asked = |reply: &'static str| {
+        let frames = [
+            (10, "201#D411110000"),
+            (20, "201#3DD400"),
+            (22, "201#D422220000"),
+            (24, "201#D433330000"),
+            (28, reply),
+        ];
+        [&READ[..], &frames].concat()
+    };
+    for text in ["181#D41111000000", "181#D42222000000", "181#D43333000000"] {
+        right(&asked(text));
+    }
+    wrong(&asked("181#D44444000000"), FrameSymptom::Value, "App 6");
+}

@@ -39,7 +39,7 @@ pub(super) struct Asked {
     pub(super) sure: bool,
     /// The same, and a gap of the log followed it.
     pub(super) excused: bool,
-    /// What the register could hold at the request: a drive may read it then, or when it replies.
+    /// What the register could hold since the request: a drive may read it at any time until it replies.
     pub(super) held: Held,
 }
 
@@ -69,6 +69,8 @@ pub struct Follower {
     pub(super) held: Vec<Held>,
     pub(super) cycles: [Cycle; 256],
     pub(super) asked: VecDeque<Asked>,
+    /// Contents that a reply under way may have, by register: a frame of a cycle or an event came behind its request, and may not have been it.
+    pub(super) loose: BTreeMap<u8, (Instant, Held)>,
     /// The latest of all replies, behind its request.
     pub(super) slowest: Option<Span>,
     /// Whether replies with 8F are short, once it is known (`map-reply`).
@@ -127,6 +129,7 @@ impl Follower {
             held,
             cycles: [Cycle::Unknown; 256],
             asked: VecDeque::new(),
+            loose: BTreeMap::new(),
             slowest: None,
             short_map: None,
             wide: None,
@@ -352,15 +355,31 @@ impl Follower {
         if self.asked.len() >= MOST_ASKED {
             self.asked.pop_front();
         }
-        let place = if register == 0x40 { 0x51 } else { register };
+        let mut held = self.held[usize::from(shown_in(register))].clone();
+        let latest = self.slowest.unwrap_or_default() + self.patience;
+        if let Some((since, other)) = self.loose.get(&register)
+            && at.since(*since) <= latest
+        {
+            held = held.or(other);
+        }
         self.asked.push_back(Asked {
             register,
             at,
             frame,
             sure,
             excused: false,
-            held: self.held[usize::from(place)].clone(),
+            held,
         });
+    }
+
+    /// A frame of a cycle or an event has come in place of the reply to this request, which may be under way still.
+    pub(super) fn may_come_later(&mut self, asked: &Asked, at: Instant) {
+        let held = self.held[usize::from(shown_in(asked.register))].or(&asked.held);
+        let later = self.asked.iter_mut();
+        for other in later.filter(|own| own.register == asked.register) {
+            other.held = other.held.or(&held);
+        }
+        self.loose.insert(asked.register, (at, held));
     }
 
     fn starts(&mut self, register: u8, every: u8, at: Instant, sure: bool) {
@@ -418,6 +437,10 @@ impl Follower {
         // Identifiers out of a range are ignored (`id-range`).
         let takes = sure && !matches!(number, 0x68 | 0x69);
         self.held[place] = before.written(register, data, takes);
+        let waiting = self.asked.iter_mut();
+        for asked in waiting.filter(|own| shown_in(own.register) == number) {
+            asked.held = asked.held.or(&self.held[place]);
+        }
         self.supply
             .wrote(number, before.sure().filter(|_| takes), at);
         if number == 0x51 && data.bits() & u32::from(MODE_LOCK) != 0 {
@@ -537,6 +560,14 @@ impl Follower {
         });
         self.differs((number, register), (Name, "3.1"), (about, why));
         self.may_use(0x69, own.frame.id().number());
+    }
+}
+
+/// The register whose contents a reply is judged by: MODE for STATUS.
+const fn shown_in(register: u8) -> u8 {
+    match register {
+        0x40 => 0x51,
+        own => own,
     }
 }
 

@@ -39,7 +39,7 @@ impl Held {
     }
 
     /// This or that.
-    fn or(&self, other: &Self) -> Self {
+    pub(super) fn or(&self, other: &Self) -> Self {
         let (Some(own), Some(others)) = (&self.0, &other.0) else {
             return Self::any();
         };

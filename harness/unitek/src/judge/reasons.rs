@@ -27,7 +27,9 @@ impl Follower {
                 Cycle::Unknown => self.unsolicited.contains_key(&register),
                 Cycle::Off(_) => false,
             };
-            if !may_be_other && register != 0x40 {
+            if may_be_other || self.may_be_event(register, own.start) {
+                self.may_come_later(&asked, own.start);
+            } else {
                 let late = own.start.since(asked.at);
                 self.slowest = Some(self.slowest.map_or(late, |slowest| slowest.max(late)));
             }

@@ -16,6 +16,7 @@ pub use permitted::limits;
 use permitted::special_register;
 pub(crate) use player::Player;
 pub use session::{OfUnitek, Session, UnitekDrives};
+pub(crate) use set_back::HeldBefore;
 
 use super::language::Unitek;
 use super::serve;

@@ -25,7 +25,7 @@ pub(super) type Written = BTreeSet<(Addressed, u8)>;
 pub(super) type Given = (u8, u16, Addressed);
 
 /// What was noted.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct FrameNotes {
     /// The registers that frames may have written.
     pub(super) written: Written,

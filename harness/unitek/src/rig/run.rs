@@ -111,7 +111,8 @@ impl PortPlayer for Player {
         if own.frames().any(stores) {
             self.note_stored();
         }
-        set_back(self, session)
+        let changed = (self.written(), self.stored_levels());
+        set_back(session, self.read_so_far(), changed)
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {

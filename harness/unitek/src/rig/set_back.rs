@@ -2,21 +2,22 @@
 //! that does it.
 
 use super::known::Known;
-use super::observed::{Given, Written};
-use super::player::Player;
+use super::observed::{FrameNotes, Given, Written};
 use super::{Axis, Session};
 use crate::driver::{Driver, Error};
 use crate::rig::OfUnitek as _;
 use crate::safe_state::last_words;
-use harness_bench::medium::Pieces;
+use harness_bench::medium::{Out, Pieces};
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;
-use harness_proto::time::Span;
+use harness_bench::rig::segment::observed::LinkNotes as _;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::guard::{Class, class};
 use harness_proto::unitek::master::Job;
 use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS, ERRORS_FAULT, set_bits};
-use harness_proto::unitek::{Access, Register, Width};
+use harness_proto::unitek::{Access, Register, Request, Width};
 use std::collections::BTreeSet;
 
 /// Registers that commands and functions change, which the safe state sets.
@@ -34,6 +35,9 @@ const CANCEL: (u8, u16) = (0x8E, 0x4D44);
 /// The registers of the identifiers: to receive, and to send.
 const IDENTIFIERS: [u8; 2] = [0x68, 0x69];
 
+/// How a drive is reached: on which identifiers it sends, its second ones, its time-out of the bus.
+const REACHED_BY: [u8; 4] = [0x69, 0x88, 0x89, TIME_OUT];
+
 /// The most identifiers beside those of the rig's file on which a watchdog stops drives.
 const MOST_STOPPED: usize = 16;
 
@@ -43,13 +47,77 @@ const TRIES: usize = 3;
 /// What a drive needs to take notice: some of its scans of 1 ms.
 const SCANS: Span = Span::from_millis(5);
 
-/// Sets back what was changed in the drives since they were read at first. Returns what is left to say.
-pub(super) fn set_back(player: &Player, session: &mut Session) -> Vec<String> {
+/// What drives held before conversations, and what those may have written.
+#[derive(Debug)]
+pub(crate) struct HeldBefore {
+    drives: Vec<Known>,
+    notes: FrameNotes,
+}
+
+impl HeldBefore {
+    /// Reads what the drives of a session hold.
+    ///
+    /// # Errors
+    /// The link is in trouble, or a drive does not answer.
+    pub(crate) fn read(session: &mut Session) -> Result<Self, Error> {
+        let axes = session.axes().to_vec();
+        let mut driver = session.driver();
+        let mut drives = Vec::new();
+        for axis in axes {
+            let mut known = Known::new(axis);
+            known.read_all(&mut driver)?;
+            drives.push(known);
+        }
+        let notes = FrameNotes::default();
+        Ok(Self { drives, notes })
+    }
+
+    /// Notes a frame that was sent.
+    pub(crate) fn sent(&mut self, frame: &Frame, end: Instant) {
+        self.notes.sent(Out::Frames(&[*frame]), end);
+    }
+
+    /// The frames that bring drives back to their identifiers and to their time-out of the bus, those on other identifiers first.
+    pub(crate) fn reached_again(&self) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        for known in &self.drives {
+            let axis = known.axis;
+            let mut write = |rx: u16, register: u8, raw: u32| {
+                let data = Data::of(Register::of(register), raw);
+                frames.extend(Request::Write { register, data }.encode(rx).ok());
+            };
+            for rx in places(axis, &self.notes.given, 0x68).skip(1) {
+                write(rx, 0x68, axis.rx.into());
+            }
+            for register in REACHED_BY {
+                if self.notes.written.contains(&(axis.rx, register)) {
+                    let before = known.first.get(&register).copied();
+                    write(axis.rx, register, before.unwrap_or_default());
+                }
+            }
+        }
+        frames
+    }
+
+    /// Sets back what was changed. Returns what is left to say.
+    pub(crate) fn set_back(&self, session: &mut Session) -> Vec<String> {
+        let stored = self.notes.stored().collect();
+        set_back(session, &self.drives, (&self.notes.written, &stored))
+    }
+}
+
+/// Sets back what was changed in the drives since they were read at first: registers that may have been written, and levels of the EEPROM that
+/// may have been stored. Returns what is left to say.
+pub(super) fn set_back(
+    session: &mut Session,
+    drives: &[Known],
+    (written, stored): (&Written, &BTreeSet<(u16, u16)>),
+) -> Vec<String> {
     let rig = session.rig().clone();
     // No motor is released behind an interlock that has tripped.
     let may_release = rig.file.interlock.is_empty();
     let mut notes = Vec::new();
-    for known in player.read_so_far() {
+    for known in drives {
         let axis = known.axis;
         let mut driver = session.driver();
         let mut own = SetBack {
@@ -57,14 +125,13 @@ pub(super) fn set_back(player: &Player, session: &mut Session) -> Vec<String> {
             axis,
             rig: &rig,
         };
-        let registers = own.registers(known, player);
+        let registers = own.registers(known, written);
         let silent = registers.is_err();
         notes.extend(registers.unwrap_or_else(|error| vec![error.to_string()]));
         if !silent {
             let errors = own.errors(known, may_release);
             notes.extend(errors.unwrap_or_else(|error| Some(error.to_string())));
         }
-        let stored = player.stored_levels();
         let levels = stored.iter().filter(|own| own.0 == axis.rx);
         notes.extend(levels.map(|(_, level)| own.level(*level)));
     }
@@ -188,9 +255,9 @@ struct SetBack<'d, 'l> {
 
 impl SetBack<'_, '_> {
     /// Sets registers back that may have been written.
-    fn registers(&mut self, known: &Known, player: &Player) -> Result<Vec<String>, Error> {
+    fn registers(&mut self, known: &Known, written: &Written) -> Result<Vec<String>, Error> {
         let mut notes = Vec::new();
-        for (register, raw) in held_before(known, player.written()) {
+        for (register, raw) in held_before(known, written) {
             notes.extend(self.register(register, raw)?);
         }
         Ok(notes)

@@ -86,6 +86,8 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
     pub fn restore(&mut self) -> Vec<String> {
         self.session.link().reset_after_denial();
         B::tidy(self.session, &mut self.kept);
+        // A command of the last case may still move a motor; the end of the session confirms that none does.
+        let _as_far_as_they_do = self.session.make_safe();
         B::restore(self.session, &mut self.kept)
     }
 

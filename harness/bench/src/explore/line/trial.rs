@@ -116,6 +116,10 @@ impl<B: LineBus> EngineTrial<B> {
             progress.cases > 2 * progress.not_sent,
             "{line:?}: {progress:?}"
         );
+        // What is stored is said, with the command that stores what was there before.
+        let mut left = target.restore();
+        left.retain(|own| !own.contains("EEPROM"));
+        assert_eq!(left, [""; 0], "{line:?}");
         drop(target);
         assert!(!session.close(false).is_unsafe(), "{line:?}");
     }
