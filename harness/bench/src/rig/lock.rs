@@ -139,6 +139,7 @@ impl Drop for RigLock {
         self.record.holder = None;
         // The lock goes in any case when the file is closed; a name left behind is stale.
         let _stale = write(&mut self.file, &self.record);
+        unlock(&self.file);
     }
 }
 
@@ -202,6 +203,11 @@ fn lock(file: &File) -> io::Result<bool> {
     }
 }
 
+/// Unlocks the file. To close it is not enough while another thread starts a program: until that runs, it has the descriptor as well.
+fn unlock(file: impl AsFd) {
+    let _gone = flock(file, FlockOperation::Unlock);
+}
+
 fn attempt(folder: &Path, id: &str, me: &Holder) -> Result<RigLock, LockError> {
     let failed = |error| io_error(id, folder, error);
     let mut file = open(folder, id).map_err(failed)?;
@@ -238,7 +244,11 @@ pub fn standing(folder: &Path, id: &str) -> io::Result<Standing> {
         Err(error) => return Err(error),
     };
     let free = lock(&file)?;
-    let record = record(&mut file)?;
+    let record = record(&mut file);
+    if free {
+        unlock(&file);
+    }
+    let record = record?;
     Ok(match (free, record.reserved) {
         (false, _) => Standing::Held(record.holder),
         (true, Some(holder)) => Standing::Reserved(holder),
@@ -382,14 +392,28 @@ impl Drop for PortLock {
             // A port that was unplugged has nothing to undo.
             let _gone = rustix::termios::ioctl_tiocnxcl(&self.port);
         }
-        // The description may live on in the caller's descriptor: closing this one does not unlock it.
-        let _gone = flock(&self.port, FlockOperation::Unlock);
+        // The description may live on in the caller's descriptor.
+        unlock(&self.port);
     }
 }
 
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
     use super::*;
+
+    /// As where another thread has started a program, which does not run yet.
+    #[test]
+    fn a_rig_is_free_at_once_though_another_descriptor_is_open() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let me = Holder::me("run");
+        let take = || RigLock::acquire_in(folder.path(), "lab", &me, Duration::ZERO);
+        let lock = take().expect("free");
+        let _other = lock.file.try_clone().expect("a descriptor");
+        drop(lock);
+        let free = standing(folder.path(), "lab").expect("read");
+        assert_eq!(free, Standing::Free);
+        drop(take().expect("free"));
+    }
 
     #[test]
     fn an_interface_has_one_program_at_a_time() {
