@@ -32,7 +32,7 @@ pub type Found = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
 pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
 
 /// A campaign that was found and read; or what is wrong with it, with file, place and remedy.
-pub type ReadCampaign = Result<Box<dyn LineCampaign>, String>;
+pub(crate) type ReadCampaign = Result<Box<dyn LineCampaign>, String>;
 
 /// A bus.
 pub struct Bus {

@@ -41,7 +41,7 @@ impl Html {
     }
 
     /// An element without content, as HTML writes it (`meta`).
-    pub fn void(&mut self, name: &'static str, attributes: &[Attribute<'_>]) {
+    pub(crate) fn void(&mut self, name: &'static str, attributes: &[Attribute<'_>]) {
         self.open(name, attributes, ">\n");
     }
 
@@ -166,7 +166,7 @@ impl Html {
 }
 
 /// How a policy of a page names a script or a style that is part of it: `'sha256-...'`.
-pub fn hash_source(text: &str) -> String {
+pub(crate) fn hash_source(text: &str) -> String {
     format!("'sha256-{}'", base64(&Sha256::digest(text.as_bytes())))
 }
 

@@ -113,7 +113,7 @@ impl<'a> Out<'a> {
 
     /// A copy of it.
     #[must_use]
-    pub fn to_pieces(self) -> Pieces {
+    pub(crate) fn to_pieces(self) -> Pieces {
         match self {
             Self::Octets(octets) => Pieces::Octets(octets.to_vec()),
             Self::Frames(frames) => Pieces::Frames(frames.to_vec()),

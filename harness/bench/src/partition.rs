@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The largest number of parts.
-pub const MOST_PARTS: u32 = 10_000;
+pub(crate) const MOST_PARTS: u32 = 10_000;
 
 /// How items are dealt out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -130,7 +130,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// The most similar name in the folder of a file that is not there, if one is near.
-pub fn near_in_folder(path: &Path) -> Option<String> {
+pub(crate) fn near_in_folder(path: &Path) -> Option<String> {
     let wanted = path.file_name()?.to_string_lossy().to_lowercase();
     let names = std::fs::read_dir(folder_of(path)).ok()?.flatten();
     let names = names.map(|own| own.file_name().to_string_lossy().into_owned());

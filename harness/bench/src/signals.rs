@@ -39,7 +39,7 @@ fn flag(signals: impl Iterator<Item = c_int>) -> Arc<AtomicBool> {
 ///
 /// # Errors
 /// The signal cannot be raised.
-pub fn interrupt() -> std::io::Result<()> {
+pub(crate) fn interrupt() -> std::io::Result<()> {
     signal_hook::low_level::raise(SIGINT)
 }
 

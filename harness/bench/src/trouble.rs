@@ -33,7 +33,7 @@ impl Trouble {
 
     /// Whether nothing arrives any more. After a denial or a failed interlock, what was sent before still comes round.
     #[must_use]
-    pub fn stops_the_line(&self) -> bool {
+    pub(crate) fn stops_the_line(&self) -> bool {
         matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interrupted)
     }
 }

@@ -180,7 +180,7 @@ pub fn end(text: &str) -> Option<Option<u8>> {
 }
 
 /// Whether a link can have these ends (ND21 8.5).
-pub fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
+pub(crate) fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
     match (from, to) {
         (None, Some(_)) | (Some(0), None) => true,
         (Some(from), Some(to)) => from == to + 1,
@@ -189,7 +189,7 @@ pub fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
 }
 
 /// A link of a capture that is being read.
-pub struct LinkRead {
+pub(crate) struct LinkRead {
     from: Option<u8>,
     to: Option<u8>,
     pub bytes: Vec<LineByte>,
@@ -197,14 +197,14 @@ pub struct LinkRead {
 
 /// Puts a capture together of its links.
 #[derive(Default)]
-pub struct Assembly {
+pub(crate) struct Assembly {
     /// In ring order: that of falling numbers of the receiver, the master being the last.
     rings: [Vec<Option<LinkRead>>; 2],
 }
 
 impl Assembly {
     /// The link with these ends, its bytes so far.
-    pub fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkRead {
+    pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkRead {
         let place = to.map_or(256, |drive| 255 - usize::from(drive));
         let links = &mut self.rings[ring.min(1)];
         if links.len() <= place {
@@ -218,7 +218,7 @@ impl Assembly {
     }
 
     /// The capture; `sizes` where the file says how many drives there are.
-    pub fn finish(
+    pub(crate) fn finish(
         self,
         sizes: [Option<u8>; 2],
         remarks: [Vec<Remark>; 2],
@@ -314,7 +314,7 @@ impl Capture {
     /// Where more than a quarter of the octets of a line was received with an error, in a sentence: that is no cable, but a wrong rate, format
     /// or channel, and what is not damaged there may be wrong as well.
     #[must_use]
-    pub fn mostly_damaged(&self) -> Option<String> {
+    pub(crate) fn mostly_damaged(&self) -> Option<String> {
         // What a simulation has damaged is known to the bit.
         let is_damaged = |own: &&LineByte| own.error.is_some() && own.sent == own.received;
         let line = |octets: &[&Channel]| {
@@ -381,7 +381,7 @@ pub fn line_formats(shared: bool) -> Vec<Format> {
 }
 
 /// A byte of a link, its time in nanoseconds since the start.
-pub fn line_byte(
+pub(crate) fn line_byte(
     nanos: u64,
     sent: Option<u8>,
     received: Option<u8>,

@@ -163,7 +163,7 @@ impl<W: Write> LiveRecorder<W> {
     ///
     /// # Errors
     /// None: blocks are kept until [`flush`](Self::flush).
-    pub fn statistics(&mut self, began: u64, ended: u64) -> io::Result<()> {
+    pub(crate) fn statistics(&mut self, began: u64, ended: u64) -> io::Result<()> {
         for place in 0..u32::try_from(self.places.len()).unwrap_or(0) {
             self.block.statistics(place, began, ended);
             self.block.end(&mut self.waiting)?;

@@ -12,7 +12,7 @@ use harness_sim::record::LineByte;
 
 /// The octets of a line that is recorded at one place, with their senders.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LineRead {
+pub(crate) struct LineRead {
     /// Each octet with its sender: `None` for a master.
     pub octets: Vec<(Option<u8>, PacketOctet)>,
     /// Octets that are of no telegram and that no slave owes: a reply may be among them.
@@ -27,7 +27,7 @@ impl LineRead {
     ///
     /// In `pieces` of an adapter the times between octets may not be those on the line: where more telegrams are whole without them, their
     /// own octets say where they end.
-    pub fn of(octets: &[PacketOctet], octet: Span, pieces: bool) -> Self {
+    pub(crate) fn of(octets: &[PacketOctet], octet: Span, pieces: bool) -> Self {
         let mut notes = Vec::new();
         let mut runs = by_time(octets, octet);
         if pieces && of_no_telegram(&runs, |_| true) > 0 {

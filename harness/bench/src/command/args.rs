@@ -72,7 +72,7 @@ pub enum ShowProgress {
 }
 
 /// What `--wire-time` of the commands of `fuzz` says of itself.
-pub const WIRE_TIME_HELP: &str =
+pub(crate) const WIRE_TIME_HELP: &str =
     "Maximum time on the line, such as 60s; by default one minute on a rig with ports";
 
 /// A time such as `30s`; at most a day.

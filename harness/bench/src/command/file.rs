@@ -39,7 +39,7 @@ pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The file cannot be begun; then the work has not begun either.
-pub fn write_while<T>(
+pub(crate) fn write_while<T>(
     path: &Path,
     work: impl FnOnce(&mut dyn Write) -> (T, bool),
 ) -> Result<(T, Result<(), Failure>), Failure> {

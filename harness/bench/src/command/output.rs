@@ -173,7 +173,7 @@ impl Output {
     }
 
     /// Whether what goes to standard output may have colours.
-    pub const fn colours(&self) -> bool {
+    pub(crate) const fn colours(&self) -> bool {
         self.colour_out
     }
 

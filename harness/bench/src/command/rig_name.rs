@@ -63,7 +63,7 @@ impl Use {
     }
 
     /// Whether it changes nothing, so that a failure leaves the drives as they are.
-    pub const fn looks_only(&self) -> bool {
+    pub(crate) const fn looks_only(&self) -> bool {
         self.holds && !self.moves
     }
 }

@@ -14,7 +14,7 @@ use harness_proto::time::Span;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-pub const SIM_HELP: &str = "\
+pub(crate) const SIM_HELP: &str = "\
 Once all places are ready, standard output has one line per ring, such as `ring 1: 3 drives at 127.0.0.1:40123`, or per
 place of a CAN bus, such as `slcan: 1 drive, 500 kbit/s at 127.0.0.1:40123`, and with --control ADDRESS a line
 `control at 127.0.0.1:40124`; with --control - the answers follow. With --web a line `page at http://127.0.0.1:8090/#TOKEN`

@@ -142,7 +142,7 @@ pub fn live(
 }
 
 /// What a user asks for.
-pub enum TopOrder {
+pub(crate) enum TopOrder {
     /// The end.
     Quit,
     /// The end, as by a signal.
@@ -154,7 +154,7 @@ pub enum TopOrder {
 }
 
 /// Where drives are shown.
-pub trait TopView {
+pub(crate) trait TopView {
     /// Whether it wants readings now.
     fn is_wanted(&mut self, reader: &mut dyn TopReader) -> bool;
 

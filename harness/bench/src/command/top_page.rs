@@ -14,7 +14,7 @@ const READ_ONLY: &str = "This page only looks on: `top` reads drives, and a page
 const EVERY: Duration = Duration::from_millis(250);
 
 /// The page of a bench in use.
-pub struct TopPage {
+pub(crate) struct TopPage {
     page: LivePage,
     top: Top,
     opened: Instant,
@@ -29,7 +29,7 @@ impl TopPage {
     ///
     /// # Errors
     /// [`Failure`]: the address is not free, or other machines could reach it.
-    pub fn open(
+    pub(crate) fn open(
         place: &str,
         allow_remote: bool,
         heading: Heading,
@@ -54,7 +54,7 @@ impl TopPage {
     }
 
     /// The line of standard output that says where it is.
-    pub fn line(&self) -> String {
+    pub(crate) fn line(&self) -> String {
         format!("page at {}\n", self.page.url())
     }
 

@@ -12,7 +12,7 @@ use harness_proto::time::Span;
 pub const MAX_SIZE: u64 = 1 << 31;
 
 /// The longest time of a conversation: what a damaged digit makes of one must not keep a computer busy for years.
-pub const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
+pub(crate) const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
 
 /// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
 ///

@@ -11,7 +11,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// There is no such file, or no `ssh-keygen`.
-pub fn can_sign(key: &Path) -> Result<(), EvidenceError> {
+pub(crate) fn can_sign(key: &Path) -> Result<(), EvidenceError> {
     signature::ready(key)
 }
 
@@ -19,7 +19,7 @@ pub fn can_sign(key: &Path) -> Result<(), EvidenceError> {
 ///
 /// # Errors
 /// [`EvidenceError`].
-pub fn seal(path: &Path, key: Option<&Path>) -> Result<(), EvidenceError> {
+pub(crate) fn seal(path: &Path, key: Option<&Path>) -> Result<(), EvidenceError> {
     unseal(path)?;
     let file = path.join(SUMS);
     fs::write(&file, sums(path)?).map_err(|error| failed(&file, error))?;
@@ -30,7 +30,7 @@ pub fn seal(path: &Path, key: Option<&Path>) -> Result<(), EvidenceError> {
 ///
 /// # Errors
 /// [`EvidenceError`].
-pub fn unseal(path: &Path) -> Result<(), EvidenceError> {
+pub(crate) fn unseal(path: &Path) -> Result<(), EvidenceError> {
     for file in [SIGNATURE, SUMS].map(|name| path.join(name)) {
         match fs::remove_file(&file) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&file, error)),

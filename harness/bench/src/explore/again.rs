@@ -59,7 +59,7 @@ fn told<C: FuzzCase>(finding: &Finding<C>) -> String {
 
 /// The name of the files of a case's finding.
 #[must_use]
-pub fn file_of(number: u64) -> String {
+pub(crate) fn file_of(number: u64) -> String {
     format!("finding-{number:06}")
 }
 

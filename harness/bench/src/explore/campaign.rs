@@ -88,7 +88,7 @@ impl<C: FuzzCase> FuzzRun<C> {
     ///
     /// # Errors
     /// The model cannot be made.
-    pub fn resumed(
+    pub(crate) fn resumed(
         kept: &KeptRun<C>,
         scope: C::Scope,
         target: &mut dyn Target<C>,
@@ -325,7 +325,7 @@ impl<C: FuzzCase> FuzzRun<C> {
 }
 
 /// Counts a finding by the key of its difference: how often it was flaky, or `SETTLED` for a confirmed one.
-pub fn count_finding(known: &mut BTreeMap<String, u8>, key: &str, confirmed: bool) {
+pub(crate) fn count_finding(known: &mut BTreeMap<String, u8>, key: &str, confirmed: bool) {
     let times = known.entry(key.to_owned()).or_default();
     *times = match confirmed {
         true => SETTLED,

@@ -8,7 +8,7 @@ use std::path::Path;
 const LONGEST: u64 = 256 * 1024 * 1024;
 
 /// Writes a file as a whole or not at all.
-pub fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
     regular::write_text(path, text).map_err(|error| ExploreError::unwritten("write", path, &error))
 }
 

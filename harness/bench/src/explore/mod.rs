@@ -23,8 +23,9 @@ pub mod smaller;
 pub mod swarm;
 pub mod target;
 
-pub use again::{file_of, impossible, played_again};
-pub use campaign::count_finding;
+pub(crate) use again::file_of;
+pub use again::{impossible, played_again};
+pub(crate) use campaign::count_finding;
 pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
 pub use confirm::Confirmation;
 pub use dice::Dice;

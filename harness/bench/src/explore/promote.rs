@@ -34,7 +34,7 @@ pub struct Promoted {
 }
 
 /// Plays a scenario with this name and text on simulated drives: what comes of it, why, and its page.
-pub type Plays = fn(&str, &str) -> Result<(Verdict, String, String), ExploreError>;
+pub(crate) type Plays = fn(&str, &str) -> Result<(Verdict, String, String), ExploreError>;
 
 /// A case whose findings can be kept as scenarios.
 pub trait Promotes: FuzzCase {

@@ -20,7 +20,7 @@ pub trait Acts: FuzzCase {
 
 /// What came of making a finding small.
 #[derive(Clone, Debug)]
-pub struct Smaller<C: FuzzCase> {
+pub(crate) struct Smaller<C: FuzzCase> {
     /// The finding.
     pub finding: Finding<C>,
     /// Whether nothing more can be taken away.
@@ -31,7 +31,7 @@ pub struct Smaller<C: FuzzCase> {
 ///
 /// # Errors
 /// Those of the target.
-pub fn smaller<C: Acts>(
+pub(crate) fn smaller<C: Acts>(
     finding: &Finding<C>,
     target: &mut dyn Target<C>,
     most: u32,

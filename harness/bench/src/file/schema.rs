@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 const MAX_DEPTH: usize = 32;
 
 /// A place of a TOML value.
-pub fn span_of<T>(value: &Spanned<T>) -> TextSpan {
+pub(crate) fn span_of<T>(value: &Spanned<T>) -> TextSpan {
     let range = value.span();
     TextSpan {
         start: range.start,

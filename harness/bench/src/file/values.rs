@@ -324,7 +324,7 @@ macro_rules! text_values {
         )*
 
         /// Checks a text against the `format` of the schema; formats that are not ours fit every text.
-        pub fn check_format(format: &str, text: &str) -> Result<(), ValueError> {
+        pub(crate) fn check_format(format: &str, text: &str) -> Result<(), ValueError> {
             match format {
                 $($format => text.parse::<$value>().map(|_| ()),)*
                 _ => Ok(()),

@@ -20,7 +20,7 @@ const SHOWN: usize = 40;
 
 impl BadMessage {
     /// Whether the message begins with these characters.
-    pub fn concerns(&self, beginning: &str) -> bool {
+    pub(crate) fn concerns(&self, beginning: &str) -> bool {
         self.received.starts_with(beginning)
     }
 

@@ -18,31 +18,31 @@ use super::{BadMessage, digit, hexadecimal};
 use harness_proto::can::{BitRate, Frame, Id};
 
 /// The longest line: a frame with 29 bits, 8 bytes and a time stamp has 30 characters.
-pub const MAX_LINE: usize = 64;
+pub(crate) const MAX_LINE: usize = 64;
 
 /// Milliseconds of a time stamp before it starts again.
-pub const STAMP_PERIOD: u16 = 60_000;
+pub(crate) const STAMP_PERIOD: u16 = 60_000;
 
 /// Ends a line; as an answer: done.
-pub const CR: u8 = b'\r';
+pub(crate) const CR: u8 = b'\r';
 
 /// Answer: refused.
-pub const BEL: u8 = 0x07;
+pub(crate) const BEL: u8 = 0x07;
 
 /// Bits of the status that `F` reads and clears.
 pub mod flags {
     /// The receive queue is full.
-    pub const RECEIVE_FULL: u8 = 0x01;
+    pub(crate) const RECEIVE_FULL: u8 = 0x01;
     /// The transmit queue is full.
-    pub const TRANSMIT_FULL: u8 = 0x02;
+    pub(crate) const TRANSMIT_FULL: u8 = 0x02;
     /// The controller warns of errors.
     pub const WARNING: u8 = 0x04;
     /// The controller lost frames.
-    pub const OVERRUN: u8 = 0x08;
+    pub(crate) const OVERRUN: u8 = 0x08;
     /// The controller is error passive.
     pub const PASSIVE: u8 = 0x20;
     /// The controller lost an arbitration.
-    pub const ARBITRATION: u8 = 0x40;
+    pub(crate) const ARBITRATION: u8 = 0x40;
     /// There was an error on the bus; with an adapter that stopped sending, bus-off.
     pub const BUS_ERROR: u8 = 0x80;
 
@@ -116,7 +116,7 @@ impl BitTiming {
 
 /// What a host says to an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SlcanCommand {
+pub(crate) enum SlcanCommand {
     /// Nothing: an empty line, with which hosts clear what was begun.
     Nothing,
     /// `t`, `T`, `r`, `R`: send a frame.
@@ -150,7 +150,7 @@ impl SlcanCommand {
     ///
     /// # Errors
     /// [`BadMessage`], with what was expected.
-    pub fn parse(line: &[u8]) -> Result<Self, BadMessage> {
+    pub(crate) fn parse(line: &[u8]) -> Result<Self, BadMessage> {
         const EXPECTED: &str = "a command of SLCAN expected: t, T, r, R, S0 to S8, s, O, L, C, V, N, F, Z0 or Z1, ended by CR";
         let bad = |expected| BadMessage::new(line, expected);
         Ok(match line {
@@ -188,7 +188,7 @@ impl SlcanCommand {
     }
 
     /// Writes the command with its end.
-    pub fn write(self, out: &mut Vec<u8>) {
+    pub(crate) fn write(self, out: &mut Vec<u8>) {
         match self {
             Self::Nothing => {}
             Self::Send(frame) => write_frame(&frame, out),

@@ -18,13 +18,13 @@ use harness_proto::can::{Frame, Id, MAX_DATA};
 use std::fmt::Write as _;
 
 /// The longest message, both brackets included.
-pub const MAX_MESSAGE: usize = 256;
+pub(crate) const MAX_MESSAGE: usize = 256;
 
 pub use harness_socketcan::{class, flag};
 
 /// A time: seconds and microseconds, since 1970 with the daemon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stamp {
+pub(crate) struct Stamp {
     /// Seconds.
     pub seconds: u64,
     /// Microseconds, 0 to 999999.
@@ -33,7 +33,7 @@ pub struct Stamp {
 
 /// What a client says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SocketcandRequest {
+pub(crate) enum SocketcandRequest {
     /// `open`: the bus with this name.
     Open(String),
     /// `rawmode`: report every frame.
@@ -51,7 +51,7 @@ impl SocketcandRequest {
     ///
     /// # Errors
     /// [`BadMessage`], with what was expected.
-    pub fn parse(message: &[u8]) -> Result<Self, BadMessage> {
+    pub(crate) fn parse(message: &[u8]) -> Result<Self, BadMessage> {
         let bad = |expected| BadMessage::new(message, expected);
         let words = words(message);
         match words.as_slice() {
@@ -70,7 +70,7 @@ impl SocketcandRequest {
     }
 
     /// Writes the message.
-    pub fn write(&self, out: &mut Vec<u8>) {
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
         let text = match self {
             Self::Open(name) => format!("< open {name} >"),
             Self::RawMode => "< rawmode >".to_owned(),
@@ -92,7 +92,7 @@ impl SocketcandRequest {
 
 /// What the server says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SocketcandAnswer {
+pub(crate) enum SocketcandAnswer {
     /// `hi`, at the beginning.
     Hi,
     /// `ok`.
@@ -112,7 +112,7 @@ impl SocketcandAnswer {
     ///
     /// # Errors
     /// [`BadMessage`], with what was expected.
-    pub fn parse(message: &[u8]) -> Result<Self, BadMessage> {
+    pub(crate) fn parse(message: &[u8]) -> Result<Self, BadMessage> {
         let bad = |expected| BadMessage::new(message, expected);
         let words = words(message);
         match words.as_slice() {
@@ -152,7 +152,7 @@ impl SocketcandAnswer {
     }
 
     /// Writes the message. A remote frame is written as an empty message would be: not at all.
-    pub fn write(&self, out: &mut Vec<u8>) {
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
         let text = match self {
             Self::Hi => "< hi >".to_owned(),
             Self::Ok => "< ok >".to_owned(),
@@ -244,7 +244,7 @@ fn stamp(word: &[u8]) -> Option<Stamp> {
 
 /// Cuts a stream into messages. What stands between messages is dropped if it is blank, and is an error if not.
 #[derive(Clone, Debug, Default)]
-pub struct Messages {
+pub(crate) struct Messages {
     begun: Vec<u8>,
     /// Characters of the message that were not kept.
     more: usize,
@@ -255,7 +255,7 @@ impl Messages {
     ///
     /// # Errors
     /// The message is longer than [`MAX_MESSAGE`], or something else stands in front of it; it is dropped.
-    pub fn push(&mut self, character: u8) -> Option<Result<Vec<u8>, BadMessage>> {
+    pub(crate) fn push(&mut self, character: u8) -> Option<Result<Vec<u8>, BadMessage>> {
         if self.begun.is_empty() && character.is_ascii_whitespace() {
             return None;
         }

@@ -216,7 +216,7 @@ impl<L: Line> Guarded<L> {
     }
 
     /// Runs `act` without the watch and the deadline: nothing may stop the way to a safe state.
-    pub fn unwatched<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+    pub(crate) fn unwatched<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
         let (watch, deadline) = (self.watch.take(), self.deadline.take());
         let result = act(self);
         self.watch = watch;

@@ -22,7 +22,7 @@ impl Echo {
     }
 
     /// How many octets the adapter still owes.
-    pub fn owed(&self) -> usize {
+    pub(crate) fn owed(&self) -> usize {
         self.owed.len()
     }
 

@@ -121,7 +121,7 @@ impl InnerLink {
         up.abilities().shows_errors && down.abilities().sends_wrong_parity
     }
 
-    pub fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
+    pub(crate) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
         let (first, second) = match &self.ports {
             InnerPorts::Tap(wire) | InnerPorts::Interposer(wire) => (wire, None),
             InnerPorts::TwoPortInterposer(up, down) => (up, Some(down)),

@@ -27,7 +27,7 @@ pub use octets::Octets;
 pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;
 pub use stimulus::AnyStimulus;
-pub use tamper::is_wrong_parity;
+pub(crate) use tamper::is_wrong_parity;
 pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::medium::{Heard, Medium, Out};

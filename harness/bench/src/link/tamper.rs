@@ -102,7 +102,7 @@ impl Tamper {
     }
 
     /// Whether the next byte gets a wrong parity bit.
-    pub fn damages_next_parity(&self) -> bool {
+    pub(crate) fn damages_next_parity(&self) -> bool {
         let next = self.armed.get(&(self.count + 1));
         next.is_some_and(|all| all.iter().copied().any(is_wrong_parity))
     }
@@ -163,7 +163,7 @@ pub fn needs_line_errors(fault: LinkFault) -> bool {
 }
 
 /// Whether a fault gives a byte a wrong parity bit.
-pub fn is_wrong_parity(fault: LinkFault) -> bool {
+pub(crate) fn is_wrong_parity(fault: LinkFault) -> bool {
     matches!(fault, LinkFault::Flip(flips) if flips.noticed() == Some(LineError::Parity))
 }
 

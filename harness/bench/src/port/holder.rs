@@ -71,7 +71,7 @@ pub(super) fn refuse_used(path: &Path, fd: impl AsFd) -> Result<(), OpenError> {
 }
 
 /// Whether a terminal is exclusive (TIOCEXCL): a second open is refused, but not to root.
-pub fn is_exclusive(fd: impl AsFd) -> bool {
+pub(crate) fn is_exclusive(fd: impl AsFd) -> bool {
     let again = format!("/proc/self/fd/{}", fd.as_fd().as_raw_fd());
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     matches!(

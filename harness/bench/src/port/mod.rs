@@ -24,10 +24,11 @@ pub mod wire;
 
 pub use harness_uart::Counts;
 pub use holder::OtherProgram;
-pub use holder::is_exclusive;
+pub(crate) use holder::is_exclusive;
 pub use last_words::Parts;
 pub use last_words::{LastWords, Unsaid};
-pub use open::{OpenError, PortAddress, PortSettings, open, open_adapter};
+pub(crate) use open::open_adapter;
+pub use open::{OpenError, PortAddress, PortSettings, open};
 pub use serial::Switch;
 pub use tap::{SilentTap, TapState};
 pub use wire::{Abilities, Outgoing, Wire};
@@ -40,7 +41,7 @@ pub const UNPROVEN_RATE: &str = "the driver of the port does not say whether its
 
 /// Lets the sleeps of this thread and of those that it starts end when they are due. By itself the system lets them take up to 50 us
 /// longer, a sixth of a byte at 38400 bit/s, to wake up less often.
-pub fn wake_on_time() {
+pub(crate) fn wake_on_time() {
     // A system that cannot do it wakes as it always has.
     let _unsupported = set_current_timer_slack(NonZeroU64::new(1));
 }

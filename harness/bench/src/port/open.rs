@@ -227,7 +227,7 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
 ///
 /// # Errors
 /// [`OpenError`]; the port is left as it was.
-pub fn open_adapter(address: &PortAddress, bits_per_second: u32) -> Result<Wire, OpenError> {
+pub(crate) fn open_adapter(address: &PortAddress, bits_per_second: u32) -> Result<Wire, OpenError> {
     let name = address.to_string();
     match address {
         PortAddress::Serial(path) | PortAddress::Pty(path) => {

@@ -172,7 +172,7 @@ impl Wire {
 
     /// Whether bytes reach the other end as soon as they are handed over: no adapter collects them for a millisecond.
     #[must_use]
-    pub fn is_prompt(&self) -> bool {
+    pub(crate) fn is_prompt(&self) -> bool {
         match self.coding {
             Coding::Plain | Coding::Marked(_) => self.plain_serial.is_none(),
             Coding::Serial(..) | Coding::Telnet(_) => false,
@@ -357,7 +357,7 @@ impl Wire {
 
     /// Whether something is read that [`Self::receive`] has not given yet: the operating system does not report it again.
     #[must_use]
-    pub fn has_early(&self) -> bool {
+    pub(crate) fn has_early(&self) -> bool {
         !self.early.is_empty()
     }
 

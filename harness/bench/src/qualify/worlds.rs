@@ -10,7 +10,7 @@ use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, VecDeque};
 
 /// The most worlds at one time.
-pub const MOST_WORLDS: usize = 4_096;
+pub(crate) const MOST_WORLDS: usize = 4_096;
 
 /// The most steps of all worlds together.
 const MOST_STEPS: usize = 1_000_000;

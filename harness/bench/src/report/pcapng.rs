@@ -26,28 +26,28 @@ pub const LINK_TYPE: u16 = 250;
 /// The length of the header in front of a byte.
 pub const HEADER: usize = 12;
 /// The types of blocks.
-pub const SECTION: u32 = 0x0A0D_0D0A;
+pub(crate) const SECTION: u32 = 0x0A0D_0D0A;
 pub const INTERFACE: u32 = 1;
-pub const STATISTICS: u32 = 5;
-pub const PACKET: u32 = 6;
+pub(crate) const STATISTICS: u32 = 5;
+pub(crate) const PACKET: u32 = 6;
 /// The byte-order magic of a section.
-pub const MAGIC: u32 = 0x1A2B_3C4D;
+pub(crate) const MAGIC: u32 = 0x1A2B_3C4D;
 /// Options.
 pub const END: u16 = 0;
-pub const COMMENT: u16 = 1;
-pub const IF_NAME: u16 = 2;
-pub const IF_SPEED: u16 = 8;
-pub const IF_TSRESOL: u16 = 9;
-pub const ISB_STARTTIME: u16 = 2;
-pub const ISB_ENDTIME: u16 = 3;
+pub(crate) const COMMENT: u16 = 1;
+pub(crate) const IF_NAME: u16 = 2;
+pub(crate) const IF_SPEED: u16 = 8;
+pub(crate) const IF_TSRESOL: u16 = 9;
+pub(crate) const ISB_STARTTIME: u16 = 2;
+pub(crate) const ISB_ENDTIME: u16 = 3;
 const USER_APPLICATION: u16 = 4;
 /// Nanoseconds: 10 to the power of -9.
-pub const NANOSECONDS: u8 = 9;
+pub(crate) const NANOSECONDS: u8 = 9;
 
 /// The event of a byte that arrived well.
 pub const RECEIVED: u8 = 0x02;
 /// The event of a byte that did not arrive.
-pub const LOST: u8 = 0x05;
+pub(crate) const LOST: u8 = 0x05;
 /// The events of bytes that arrived damaged.
 pub const ERRORS: [(LineError, u8); 4] = [
     (LineError::Framing, 0x07),
@@ -86,7 +86,7 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
 }
 
 /// The packet of a byte of the link with this number.
-pub fn packet(block: &mut Block, link: usize, byte: &LineByte) {
+pub(crate) fn packet(block: &mut Block, link: usize, byte: &LineByte) {
     let error = |(own, event): &(LineError, u8)| (byte.error == Some(*own)).then_some(*event);
     let event = match byte.received {
         None => LOST,
@@ -151,7 +151,7 @@ impl Block {
     }
 
     /// Begins the statistics of an interface: when the capture there began and ended, in nanoseconds.
-    pub fn statistics(&mut self, interface: u32, began: u64, ended: u64) {
+    pub(crate) fn statistics(&mut self, interface: u32, began: u64, ended: u64) {
         let time = |own: u64| {
             let [high, low] = [own >> 32, own & 0xFFFF_FFFF];
             [high, low].map(|own| u32::try_from(own).unwrap_or(0).to_le_bytes())
@@ -165,7 +165,7 @@ impl Block {
     }
 
     /// Begins an interface: its link type, its name and, where it is known, its bit rate. Its times are in nanoseconds.
-    pub fn interface(&mut self, link_type: u16, name: &str, speed: Option<u64>) {
+    pub(crate) fn interface(&mut self, link_type: u16, name: &str, speed: Option<u64>) {
         self.begin(INTERFACE);
         self.put(&link_type.to_le_bytes());
         self.put(&[0; 6]);

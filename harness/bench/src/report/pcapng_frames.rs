@@ -24,7 +24,7 @@ pub const LINK_TYPE: u16 = 227;
 /// The length of the header in front of the data.
 pub const HEADER: usize = 8;
 /// The comment of a frame that no station has got.
-pub const LOST: &str = "lost";
+pub(crate) const LOST: &str = "lost";
 /// The name of the interface of the bench's own frames, and what stands in front of a drive's number.
 pub const MASTER: &str = "master";
 pub const DRIVE: &str = "drive ";
@@ -86,7 +86,7 @@ pub fn rate_of(own: &LineFrame) -> Option<BitRate> {
 }
 
 /// The packet of a frame that the sender with this number sent.
-pub fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
+pub(crate) fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
     let frame = &own.frame;
     let mut data = [0; HEADER + MAX_DATA];
     let mut id = frame.id().number();

@@ -73,7 +73,7 @@ pub fn write(
 }
 
 /// The packet of octets that followed each other at the interface with this number; the event is that of good octets.
-pub fn packet(
+pub(crate) fn packet(
     block: &mut Block,
     (interface, good): (usize, u8),
     octets: &[LineByte],

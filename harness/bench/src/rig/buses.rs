@@ -43,7 +43,7 @@ pub struct PortRow {
 
 impl PortRow {
     /// The mistakes of `setup` lines of a simulated port, each with the number of its line, counted from 0.
-    pub fn line_mistakes(&self, port: &Port, lines: &[String]) -> Vec<(usize, Problem)> {
+    pub(crate) fn line_mistakes(&self, port: &Port, lines: &[String]) -> Vec<(usize, Problem)> {
         let source = Source {
             name: "setup".to_owned(),
             text: lines.join("\n").into(),

@@ -115,7 +115,7 @@ impl Rig {
 }
 
 /// The profile of a name that stands in a rig's file, or why there is none.
-pub type FindProfile<'f> = dyn Fn(&str) -> Result<Source, String> + 'f;
+pub(crate) type FindProfile<'f> = dyn Fn(&str) -> Result<Source, String> + 'f;
 
 /// Reads a rig file.
 ///
@@ -170,7 +170,7 @@ pub fn parse_beside(
 }
 
 /// Whether a text is an address of the form host:port.
-pub fn is_address(text: &str) -> bool {
+pub(crate) fn is_address(text: &str) -> bool {
     text.rsplit_once(':').is_some_and(|(host, number)| {
         !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
     })
@@ -297,7 +297,7 @@ impl RigCheck<'_> {
     }
 
     /// Ports that fit their transport.
-    pub fn endpoint(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
+    pub(crate) fn endpoint(&mut self, path: &[PathStep<'_>], endpoint: &Endpoint) {
         let at = |key| [path, &[PathStep::Key(key)]].concat();
         let transport = endpoint.transport.name();
         match (endpoint.transport, &endpoint.port, endpoint.udev.is_empty()) {

@@ -10,7 +10,7 @@ const PORT: [PathStep<'static>; 2] = [PathStep::Key("port"), PathStep::Key("1")]
 
 impl RigCheck<'_> {
     /// Checks whether the file has rings or a port, and what it says of the port. Returns whether it has a port in place of rings.
-    pub fn has_port(&mut self) -> bool {
+    pub(crate) fn has_port(&mut self) -> bool {
         let (rings, ports) = (&self.file.ring, &self.file.port);
         let port = match (rings, ports) {
             (Some(_), None) => {

@@ -16,7 +16,11 @@ impl RigCheck<'_> {
     }
 
     /// The same, of drives behind a port. Each of its lines must be about one of them.
-    pub fn port_profile(&mut self, port: &Port, find: &FindProfile<'_>) -> Option<KnownProfile> {
+    pub(crate) fn port_profile(
+        &mut self,
+        port: &Port,
+        find: &FindProfile<'_>,
+    ) -> Option<KnownProfile> {
         let read = |text: &str| Ok(Profile::<ProfileLines>::parse(text)?.header());
         let (lines, text) = self.read_profile(find, read)?;
         let row = self.buses.port(port.bus);

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../rigs");
 
 /// The folder of rigs, where the environment names one.
-pub const FOLDER_VARIABLE: &str = "DRIVEBENCH_RIGS";
+pub(crate) const FOLDER_VARIABLE: &str = "DRIVEBENCH_RIGS";
 
 /// The most rigs that are taken from a folder.
 const MAX_RIGS: usize = 1000;
@@ -110,7 +110,7 @@ fn meant_bus(text: &str) -> Option<String> {
 }
 
 /// Why there is no simulated rig of this name, given what stands behind `sim:`: the bus that was probably meant, or this reason.
-pub fn or_meant(text: &str, reason: String) -> String {
+pub(crate) fn or_meant(text: &str, reason: String) -> String {
     meant_bus(text).map_or(reason, |meant| {
         format!("there is no bus of this name; did you mean `{meant}`?")
     })
@@ -201,7 +201,7 @@ fn rig_name(path: &Path) -> Option<String> {
 /// The number of drives of `sim:BUS` and `sim:BUS:N` for a bus of [`Port`](super::port_file::Port), given what stands behind `sim:`; `None`
 /// where no bus is named.
 #[must_use]
-pub fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
+pub(crate) fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
     let (bus, number) = text.split_once(':').unwrap_or((text, "1"));
     let bus = PortBus::ALL.into_iter().find(|own| own.name() == bus)?;
     let most = bus.most_drives();

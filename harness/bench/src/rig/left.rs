@@ -79,7 +79,7 @@ impl NotPutBack {
     }
 
     /// What the scenario that is played now may have changed.
-    pub fn foretold(&self) -> Vec<String> {
+    pub(crate) fn foretold(&self) -> Vec<String> {
         self.changed().now.clone()
     }
 

@@ -30,7 +30,7 @@ pub mod state;
 pub mod taken;
 pub mod watchdog;
 
-pub use check::{FindProfile, Rig, parse, parse_beside};
+pub use check::{Rig, parse, parse_beside};
 pub use ends::Ends;
 pub use file::schema;
 pub use find::{FindError, find};
@@ -38,8 +38,6 @@ pub use in_use::{End, UseOptions};
 pub use permitted::standing;
 pub use played::{Again, attempts_of};
 pub use played::{Attempt, Keeper, PlayedScenario};
-pub use profile::{
-    KnownProfile, Profile, ProfileError, ProfileLines, ProfileSetup, SettledProperty,
-};
+pub use profile::{KnownProfile, Profile, ProfileError, ProfileSetup, SettledProperty};
 pub use session_error::SessionError;
 pub use watchdog::Alarm;

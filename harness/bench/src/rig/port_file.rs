@@ -40,7 +40,7 @@ impl PortBus {
 
     /// The most drives of a simulated bench: node 1 to 127; address 8 to 126.
     #[must_use]
-    pub const fn most_drives(self) -> u8 {
+    pub(crate) const fn most_drives(self) -> u8 {
         match self {
             Self::Unitek => 127,
             Self::Nordac => 119,
@@ -166,13 +166,13 @@ impl Port {
 
     /// The keys of the adapters that are given.
     #[must_use]
-    pub fn adapters(&self) -> Vec<&'static str> {
+    pub(crate) fn adapters(&self) -> Vec<&'static str> {
         self.places().map(|(key, _)| key).collect()
     }
 
     /// The other keys that are given and that only some buses have.
     #[must_use]
-    pub fn more(&self) -> Vec<&'static str> {
+    pub(crate) fn more(&self) -> Vec<&'static str> {
         let all = [
             ("channel", self.channel.is_some()),
             ("transport", self.transport.is_some()),

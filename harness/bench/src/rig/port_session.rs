@@ -206,7 +206,7 @@ impl<D: PortDrives> PortSession<D> {
     }
 
     /// Waits as long as an adapter may take to report a loss, at ports.
-    pub fn hear_of_losses(&mut self) {
+    pub(crate) fn hear_of_losses(&mut self) {
         if self.link.inner().ports().is_none() {
             return;
         }
@@ -242,7 +242,7 @@ impl<D: PortDrives> PortSession<D> {
     }
 
     /// Does something that is not ended in its middle by the end of the longest run.
-    pub fn without_deadline<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+    pub(crate) fn without_deadline<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
         self.link.set_deadline(None);
         let result = act(self);
         self.link.set_deadline(self.deadline);
@@ -389,7 +389,7 @@ impl<D: PortDrives> Drop for PortSession<D> {
 }
 
 /// The header lines that a rig's file has for its drives: those of its profile, and behind them those of `[sim]`.
-pub fn setup_lines(rig: &Rig) -> Vec<String> {
+pub(crate) fn setup_lines(rig: &Rig) -> Vec<String> {
     let profile = rig.profile.iter().flat_map(|own| &own.lines);
     let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
     profile.chain(own).cloned().collect()

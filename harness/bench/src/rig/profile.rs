@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Header lines of a scenario, as a profile keeps what makes simulated drives behave as was found.
-pub type ProfileLines = Vec<String>;
+pub(crate) type ProfileLines = Vec<String>;
 
 /// What makes simulated drives behave as was found.
 pub trait ProfileSetup: Default {

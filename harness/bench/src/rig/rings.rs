@@ -31,14 +31,14 @@ pub fn rings(sizes: &[u8]) -> Result<Vec<RingSize>, String> {
 ///
 /// # Errors
 /// What is wrong, in a sentence.
-pub fn sizes_of_rings(text: &str) -> Result<Vec<u8>, String> {
+pub(crate) fn sizes_of_rings(text: &str) -> Result<Vec<u8>, String> {
     let sizes: Vec<_> = text.split(',').map(ring_size).collect::<Result<_, _>>()?;
     rings(&sizes)?;
     Ok(sizes)
 }
 
 /// The file of a simulated bench, made from the sizes of its rings.
-pub fn simulated_rings(sizes: &str) -> Result<String, String> {
+pub(crate) fn simulated_rings(sizes: &str) -> Result<String, String> {
     let sizes = sizes_of_rings(sizes)?;
     let ring = |number: usize| {
         let drives = sizes[number];

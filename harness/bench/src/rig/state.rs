@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The folder, where the environment names one.
-pub const FOLDER_VARIABLE: &str = "DRIVEBENCH_STATE";
+pub(crate) const FOLDER_VARIABLE: &str = "DRIVEBENCH_STATE";
 
 /// The folder for all users: its parent and its name.
 const SHARED: [&str; 2] = ["/run/lock", "drivebench"];

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/scenarios");
 
 /// The ending of a scenario's file name.
-pub const ENDING: &str = "scn";
+pub(crate) const ENDING: &str = "scn";
 
 /// The most files that are taken from a folder.
 const MAX_FILES: usize = 10_000;

@@ -177,7 +177,7 @@ impl Problems {
     }
 
     /// Each mistake as something that can be shown.
-    pub fn diagnostics(&self) -> impl Iterator<Item = &dyn Diagnostic> {
+    pub(crate) fn diagnostics(&self) -> impl Iterator<Item = &dyn Diagnostic> {
         self.shown.iter().map(|shown| shown as &dyn Diagnostic)
     }
 }

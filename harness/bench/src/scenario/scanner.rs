@@ -27,7 +27,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    pub fn skip_space(&mut self) {
+    pub(crate) fn skip_space(&mut self) {
         let rest = &self.text[self.at..];
         // Most places have none.
         if !rest.as_bytes().first().is_some_and(u8::is_ascii_graphic) {

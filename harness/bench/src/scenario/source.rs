@@ -9,7 +9,7 @@ use std::sync::Arc;
 pub const MAX_SIZE: u64 = 1 << 20;
 
 /// The longest line, in bytes: mistakes are shown with their line.
-pub const MAX_LINE: usize = 10_000;
+pub(crate) const MAX_LINE: usize = 10_000;
 
 /// A text with the name under which people know it.
 #[derive(Clone, Debug)]

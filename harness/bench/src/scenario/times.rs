@@ -128,7 +128,7 @@ pub struct Window {
 impl Window {
     /// Whether it is one time and no window.
     #[must_use]
-    pub fn is_exact(self) -> bool {
+    pub(crate) fn is_exact(self) -> bool {
         self.from == self.to
     }
 }
@@ -160,7 +160,7 @@ pub fn duration(scanner: &mut Scanner<'_>) -> Result<Duration, Problem> {
 }
 
 /// Reads a time or a window.
-pub fn window(scanner: &mut Scanner<'_>) -> Result<Window, Problem> {
+pub(crate) fn window(scanner: &mut Scanner<'_>) -> Result<Window, Problem> {
     let start = scanner.here();
     let (digits, decimals) = number(scanner)?;
     // In `5..7ms` the first number borrows the unit of the second.

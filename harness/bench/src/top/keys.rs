@@ -123,7 +123,7 @@ impl Top {
     }
 
     /// What Enter orders: all drives where no name has been typed. `None` while no drive has that name.
-    pub fn stop_order(&self) -> Option<Press> {
+    pub(crate) fn stop_order(&self) -> Option<Press> {
         if self.to_stop.is_empty() {
             return Some(Press::Stop(None));
         }

@@ -127,7 +127,7 @@ impl Top {
         self.keep_in_sight();
     }
 
-    pub const fn forget_events(&mut self) {
+    pub(crate) const fn forget_events(&mut self) {
         self.forgotten = Some(self.reading.at);
     }
 
@@ -138,7 +138,7 @@ impl Top {
         all.filter(move |one| forgotten.is_none_or(|until| one.last > until))
     }
 
-    pub fn keep_in_sight(&mut self) {
+    pub(crate) fn keep_in_sight(&mut self) {
         let rows = self.rows().len();
         self.first = self.first.min(rows.saturating_sub(self.page.max(1)));
     }
@@ -166,7 +166,7 @@ impl Top {
     }
 
     /// How many drives are in each state, the least serious state first.
-    pub fn states(&self) -> impl Iterator<Item = (&'static str, usize)> {
+    pub(crate) fn states(&self) -> impl Iterator<Item = (&'static str, usize)> {
         let states = self.heading.form.states.iter().enumerate().rev();
         states.map(|(state, name)| {
             let drives = self.reading.drives.values();

@@ -14,7 +14,7 @@ const LINGER: Duration = Duration::from_secs(10);
 
 /// The events of a page.
 #[derive(Debug, Default)]
-pub struct Feed {
+pub(crate) struct Feed {
     inner: Mutex<Inner>,
     more: Condvar,
 }
@@ -36,7 +36,7 @@ struct Inner {
 
 /// What a reader gets.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum FeedPiece {
+pub(crate) enum FeedPiece {
     /// An event and its number.
     Event(u64, Arc<str>),
     /// This number of events are not kept any more.
@@ -56,7 +56,7 @@ impl Feed {
     }
 
     /// Adds an event, a line of text. The oldest ones make room for it.
-    pub fn publish(&self, text: String) {
+    pub(crate) fn publish(&self, text: String) {
         let mut inner = self.inner();
         inner.count += 1;
         inner.bytes += text.len();
@@ -70,7 +70,7 @@ impl Feed {
     }
 
     /// Drops all events that are kept; their numbers stay used.
-    pub fn clear(&self) {
+    pub(crate) fn clear(&self) {
         let mut inner = self.inner();
         inner.events.clear();
         inner.bytes = 0;
@@ -78,7 +78,7 @@ impl Feed {
 
     /// Whether a reader is there, or was some seconds ago.
     #[must_use]
-    pub fn is_wanted(&self) -> bool {
+    pub(crate) fn is_wanted(&self) -> bool {
         let inner = self.inner();
         inner.readers > 0 || inner.left.is_some_and(|left| left.elapsed() < LINGER)
     }
@@ -91,19 +91,19 @@ impl Feed {
 
     /// How many readers there have been.
     #[must_use]
-    pub fn came(&self) -> u64 {
+    pub(crate) fn came(&self) -> u64 {
         self.inner().came
     }
 
     /// Ends the streams of all readers.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         self.inner().ended = true;
         self.more.notify_all();
     }
 
     /// A reader comes, who knows the events up to number `after`. Without a number it gets all that are kept.
     #[must_use]
-    pub fn watch(self: &Arc<Self>, after: Option<u64>) -> FeedReader {
+    pub(crate) fn watch(self: &Arc<Self>, after: Option<u64>) -> FeedReader {
         let mut inner = self.inner();
         inner.readers += 1;
         inner.came += 1;
@@ -119,7 +119,7 @@ impl Feed {
 
 /// A reader.
 #[derive(Debug)]
-pub struct FeedReader {
+pub(crate) struct FeedReader {
     feed: Arc<Feed>,
     /// The number of the next event.
     next: u64,
@@ -127,7 +127,7 @@ pub struct FeedReader {
 
 impl FeedReader {
     /// What has come since the last call; waits for it at most `patience`. `None` if the stream has ended.
-    pub fn wait(&mut self, patience: Duration) -> Option<Vec<FeedPiece>> {
+    pub(crate) fn wait(&mut self, patience: Duration) -> Option<Vec<FeedPiece>> {
         let inner = self.feed.inner();
         let next = self.next;
         let nothing = |inner: &mut Inner| !inner.ended && inner.count < next;

@@ -20,8 +20,7 @@ pub mod request;
 pub mod server;
 pub mod view;
 
-pub use feed::{Feed, FeedPiece, FeedReader};
-pub use server::{AskedOrder, LivePage};
+pub(crate) use server::LivePage;
 pub use view::ARROWS;
 pub use view::{
     FaultPlace, LiveCell, LiveNews, LiveOrder, LivePicture, LiveRow, LiveScene, LiveView,

@@ -35,7 +35,7 @@ const STACK: usize = 256 << 10;
 
 /// An order of a page, and where its answer goes.
 #[derive(Debug)]
-pub struct AskedOrder {
+pub(crate) struct AskedOrder {
     /// What.
     pub order: LiveOrder,
     reply: SyncSender<Result<String, String>>,
@@ -43,7 +43,7 @@ pub struct AskedOrder {
 
 impl AskedOrder {
     /// Answers: what was done, or why not.
-    pub fn answer(self, answer: Result<String, String>) {
+    pub(crate) fn answer(self, answer: Result<String, String>) {
         // A client that has gone needs no answer.
         let _gone = self.reply.try_send(answer);
     }
@@ -73,7 +73,7 @@ impl Shared {
 
 /// A page that is served, until it is dropped.
 #[derive(Debug)]
-pub struct LivePage {
+pub(crate) struct LivePage {
     address: SocketAddr,
     token: String,
     feed: Arc<Feed>,
@@ -89,7 +89,11 @@ impl LivePage {
     ///
     /// # Errors
     /// [`ListenError`].
-    pub fn open(place: &str, allow_remote: bool, scene: &LiveScene) -> Result<Self, ListenError> {
+    pub(crate) fn open(
+        place: &str,
+        allow_remote: bool,
+        scene: &LiveScene,
+    ) -> Result<Self, ListenError> {
         Self::open_patiently(place, allow_remote, scene, PATIENCE)
     }
 
@@ -136,24 +140,24 @@ impl LivePage {
 
     /// The address to open, with the token behind its `#`, which no browser sends to a server.
     #[must_use]
-    pub fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         format!("http://{}/#{}", self.address, self.token)
     }
 
     /// Where the events go.
     #[must_use]
-    pub fn feed(&self) -> &Feed {
+    pub(crate) fn feed(&self) -> &Feed {
         &self.feed
     }
 
     /// What to wait for: it is readable when a page has come or has an order.
     #[must_use]
-    pub fn poll(&self) -> PollFd<'_> {
+    pub(crate) fn poll(&self) -> PollFd<'_> {
         PollFd::new(&self.wake, PollFlags::IN)
     }
 
     /// The orders of pages since the last call.
-    pub fn orders(&mut self) -> Vec<AskedOrder> {
+    pub(crate) fn orders(&mut self) -> Vec<AskedOrder> {
         let mut bytes = [0; 64];
         while matches!(self.wake.read(&mut bytes), Ok(1..)) {}
         self.orders.try_iter().collect()

@@ -30,7 +30,7 @@ pub fn tell(error: &ExploreError, output: &mut Output) -> Exit {
 }
 
 /// The exit code of cases that were played.
-pub fn exit_of_cases<C: FuzzCase>(campaign: &FuzzRun<C>) -> Exit {
+pub(crate) fn exit_of_cases<C: FuzzCase>(campaign: &FuzzRun<C>) -> Exit {
     let progress = campaign.progress();
     match campaign.findings() {
         (0, 0) if progress.not_sent < progress.cases => Exit::Passed,

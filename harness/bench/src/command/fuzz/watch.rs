@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// Writes findings to standard output and everything else to standard error.
-pub struct Telling<'o> {
+pub(crate) struct Telling<'o> {
     pub output: &'o mut Output,
     /// The folder with the files of findings.
     pub folder: Option<PathBuf>,

@@ -17,19 +17,19 @@ pub struct LineScope<B: LineBus> {
 
 /// Makes conversations.
 #[derive(Debug)]
-pub struct Maker<'s, B: LineBus> {
+pub(crate) struct Maker<'s, B: LineBus> {
     scope: &'s LineScope<B>,
     swarm: &'s Swarm<B::Spice>,
 }
 
 impl<'s, B: LineBus> Maker<'s, B> {
     /// Makes conversations of this scope with what the swarm has.
-    pub const fn new(scope: &'s LineScope<B>, swarm: &'s Swarm<B::Spice>) -> Self {
+    pub(crate) const fn new(scope: &'s LineScope<B>, swarm: &'s Swarm<B::Spice>) -> Self {
         Self { scope, swarm }
     }
 
     /// A new conversation.
-    pub fn case(&self, dice: &mut Dice) -> LineTalk<B> {
+    pub(crate) fn case(&self, dice: &mut Dice) -> LineTalk<B> {
         let mut acts = Vec::new();
         if let Some(station) = self.station(dice) {
             let (begin, parts) = B::begin(station, dice);
@@ -42,7 +42,7 @@ impl<'s, B: LineBus> Maker<'s, B> {
     }
 
     /// A conversation made of another one.
-    pub fn mutated(
+    pub(crate) fn mutated(
         &self,
         old: &LineTalk<B>,
         other: Option<&LineTalk<B>>,

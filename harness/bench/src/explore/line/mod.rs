@@ -17,9 +17,10 @@ pub mod trial;
 
 pub use fuzz_case::NoAttempt;
 pub use generate::LineScope;
-pub use on_sim::OnLine;
+pub(crate) use on_sim::OnLine;
+pub use rig::LineRig;
 pub use rig::pass;
-pub use rig::{LineRig, OnAdapter, SessionOf};
+pub(crate) use rig::{OnAdapter, SessionOf};
 pub use setup::{LineSetup, PlantedDrive};
 pub use talk::{ActBounds, LineAct, LineSeen, LineTalk, Seen};
 

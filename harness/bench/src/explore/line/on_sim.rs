@@ -7,7 +7,7 @@ use crate::explore::{ExploreError, Rehearsal, Target, Tried};
 /// Plays conversations on simulated drives, and judges them beside the model. That the drives are simulated, the judge does not use: it
 /// takes any value of every open point for possible.
 #[derive(Debug)]
-pub struct OnLine<B: LineBus> {
+pub(crate) struct OnLine<B: LineBus> {
     oracle: Oracle<B>,
     undecided: u64,
 }
@@ -15,7 +15,7 @@ pub struct OnLine<B: LineBus> {
 impl<B: LineBus> OnLine<B> {
     /// Plays on these drives.
     #[must_use]
-    pub fn new(under_test: B::Setup) -> Self {
+    pub(crate) fn new(under_test: B::Setup) -> Self {
         Self {
             oracle: Oracle::new(under_test),
             undecided: 0,
@@ -24,7 +24,7 @@ impl<B: LineBus> OnLine<B> {
 
     /// How many conversations were not judged, since too many models would have had to be played.
     #[must_use]
-    pub const fn undecided(&self) -> u64 {
+    pub(crate) const fn undecided(&self) -> u64 {
         self.undecided
     }
 }

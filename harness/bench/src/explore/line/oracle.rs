@@ -11,7 +11,7 @@ const UNLIKE: i64 = 1_000_000;
 
 /// The outcome of a conversation.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Judgement<D> {
+pub(crate) enum Judgement<D> {
     /// Some values of the open points explain everything.
     Explained,
     /// No model does; the best one is this.
@@ -22,7 +22,7 @@ pub enum Judgement<D> {
 
 /// Judges conversations on one line.
 #[derive(Clone, Debug)]
-pub struct Oracle<B: LineBus> {
+pub(crate) struct Oracle<B: LineBus> {
     under_test: B::Setup,
     begins: Vec<Vec<B::Properties>>,
     /// What explained the last conversation.
@@ -31,7 +31,7 @@ pub struct Oracle<B: LineBus> {
 
 impl<B: LineBus> Oracle<B> {
     /// Judges these drives.
-    pub fn new(under_test: B::Setup) -> Self {
+    pub(crate) fn new(under_test: B::Setup) -> Self {
         let begins = B::begins(&under_test);
         Self {
             last: begins.first().cloned().unwrap_or_default(),
@@ -41,17 +41,17 @@ impl<B: LineBus> Oracle<B> {
     }
 
     /// The drives under test.
-    pub const fn under_test(&self) -> &B::Setup {
+    pub(crate) const fn under_test(&self) -> &B::Setup {
         &self.under_test
     }
 
     /// The drives as the manual has them, with the most likely values of what it leaves open.
-    pub fn model(&self) -> B::Setup {
+    pub(crate) fn model(&self) -> B::Setup {
         B::model(&self.under_test, &self.last)
     }
 
     /// Judges what the drives under test have done in a conversation.
-    pub fn judge(&mut self, talk: &LineTalk<B>, seen: &Seen<B>) -> Judgement<B::Difference> {
+    pub(crate) fn judge(&mut self, talk: &LineTalk<B>, seen: &Seen<B>) -> Judgement<B::Difference> {
         let played = Played {
             under_test: &self.under_test,
             talk,

@@ -15,7 +15,7 @@ const REST: Span = Span::from_millis(60);
 const LONGEST_REST: Span = Span::from_millis(1_000);
 
 /// A rig in use, of the drives of a bus.
-pub type SessionOf<B> = PortSession<<B as LineRig>::Drives>;
+pub(crate) type SessionOf<B> = PortSession<<B as LineRig>::Drives>;
 
 /// A bus whose drives are explored behind adapters.
 ///
@@ -58,7 +58,7 @@ pub trait LineRig: LineBus {
 
 /// Plays conversations on the drives of a rig. The drives are in their safe state before each of them.
 #[derive(Debug)]
-pub struct OnAdapter<'s, B: LineRig> {
+pub(crate) struct OnAdapter<'s, B: LineRig> {
     session: &'s mut SessionOf<B>,
     model: B::Setup,
     kept: B::Kept,
@@ -69,7 +69,10 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
     ///
     /// # Errors
     /// A drive does not answer.
-    pub fn new(session: &'s mut SessionOf<B>, model: B::Setup) -> Result<Self, ExploreError> {
+    pub(crate) fn new(
+        session: &'s mut SessionOf<B>,
+        model: B::Setup,
+    ) -> Result<Self, ExploreError> {
         Ok(Self {
             kept: B::keep(session)?,
             session,
@@ -78,12 +81,12 @@ impl<'s, B: LineRig> OnAdapter<'s, B> {
     }
 
     /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
-    pub fn end_between_cases(&mut self) {
+    pub(crate) fn end_between_cases(&mut self) {
         self.session.link().set_deadline(None);
     }
 
     /// Leaves the drives as they were before, as far as the rig's file permits that. Returns what could not be restored, in sentences.
-    pub fn restore(&mut self) -> Vec<String> {
+    pub(crate) fn restore(&mut self) -> Vec<String> {
         self.session.link().reset_after_denial();
         B::tidy(self.session, &mut self.kept);
         // A command of the last case may still move a motor; the end of the session confirms that none does.

@@ -13,7 +13,7 @@ pub mod open;
 pub mod talk;
 pub mod transport;
 
-pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD, Listening};
+pub use open::{AdapterError, AdapterPlace, AdapterSettings, Listening};
 
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};

@@ -13,7 +13,7 @@ use std::str::FromStr;
 use std::sync::atomic::AtomicBool;
 
 /// The rate of the serial line of adapters with a UART; those on USB ignore it.
-pub const DEFAULT_BAUD: u32 = 115_200;
+pub(crate) const DEFAULT_BAUD: u32 = 115_200;
 
 /// A CAN adapter, and how to reach it.
 #[derive(Clone, Debug, PartialEq, Eq)]

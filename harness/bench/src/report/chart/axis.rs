@@ -12,7 +12,7 @@ const LARGEST: f64 = 1e15;
 const SECONDS: f64 = 10_000.0;
 
 /// Round numbers between two others, at most one more than `most`.
-pub fn ticks(from: f64, to: f64, most: usize, unit: &str) -> Vec<f64> {
+pub(crate) fn ticks(from: f64, to: f64, most: usize, unit: &str) -> Vec<f64> {
     let raw = (to - from) / most.max(1) as f64;
     if !raw.is_finite() || raw <= 0.0 {
         return vec![from];

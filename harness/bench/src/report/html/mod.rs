@@ -15,4 +15,4 @@
 pub mod page;
 pub mod sequence;
 
-pub use page::{FoldedPart, MAX_PAGE, Section, page};
+pub use page::{FoldedPart, Section, page};

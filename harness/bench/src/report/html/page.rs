@@ -3,7 +3,7 @@
 use crate::html::{Html, hash_source};
 
 /// The most bytes of a page, unless what is always shown is longer.
-pub const MAX_PAGE: usize = 1_990_000;
+pub(crate) const MAX_PAGE: usize = 1_990_000;
 
 /// How things look.
 const STYLE: &str = concat!(

@@ -172,7 +172,7 @@ impl<P: PortPlayer> PortRun<P> {
     }
 
     /// Forgets what is known of the drives: others have used them.
-    pub fn forget_drives(&mut self) {
+    pub(crate) fn forget_drives(&mut self) {
         let (rig, options) = (self.session.rig(), &self.options);
         self.player = P::new(rig, options.allow_motion, options.ill_as_well);
         self.player.shows_life(self.session.beats());

@@ -43,7 +43,7 @@ impl<'s, L: Language> Unroll<'s, L> {
     }
 
     /// Whether the last step stands in a loop.
-    pub const fn in_loop(&self) -> bool {
+    pub(crate) const fn in_loop(&self) -> bool {
         !self.loops.is_empty()
     }
 

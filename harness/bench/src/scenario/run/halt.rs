@@ -23,7 +23,7 @@ pub enum Halt {
 impl<L: Language> Runner<'_, L> {
     /// Ends the conversation: nothing more is sent, and what is under way comes back. Trouble of the
     /// link outweighs every finding, as a finding may be its effect.
-    pub fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
+    pub(crate) fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
         let mut result = match (result, self.unseen.take()) {
             (Ok(()), Some(unseen)) => Err(unseen),
             (result, _) => result,

@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
-pub const MAX_ROUND: Span = Span::from_millis(3_600_000);
+pub(crate) const MAX_ROUND: Span = Span::from_millis(3_600_000);
 
 /// How long a link may need for a pause.
 const PAUSE: Span = Span::from_millis(50);

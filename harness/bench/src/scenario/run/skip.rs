@@ -108,7 +108,7 @@ impl Skip {
 
     /// The same on a rig with a port, where not even simulated drives show what only the simulator has.
     #[must_use]
-    pub fn on_port(mut self) -> Self {
+    pub(crate) fn on_port(mut self) -> Self {
         if self.unlocks.remove(&Unlock::Simulated) {
             self.unlocks.insert(Unlock::NoRig);
         }
