@@ -41,26 +41,8 @@ pub mod flags {
     pub(crate) const OVERRUN: u8 = 0x08;
     /// The controller is error passive.
     pub const PASSIVE: u8 = 0x20;
-    /// The controller lost an arbitration.
-    pub(crate) const ARBITRATION: u8 = 0x40;
     /// There was an error on the bus; with an adapter that stopped sending, bus-off.
     pub const BUS_ERROR: u8 = 0x80;
-
-    /// The set bits in words.
-    #[must_use]
-    pub fn words(bits: u8) -> String {
-        let names = [
-            (RECEIVE_FULL, "receive queue full"),
-            (TRANSMIT_FULL, "transmit queue full"),
-            (WARNING, "error warning"),
-            (OVERRUN, "overrun"),
-            (PASSIVE, "error passive"),
-            (ARBITRATION, "arbitration lost"),
-            (BUS_ERROR, "bus error"),
-        ];
-        let set = names.iter().filter(|(bit, _)| bits & bit != 0);
-        set.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
-    }
 }
 
 /// The rates of `S0` to `S8`, in kbit/s.

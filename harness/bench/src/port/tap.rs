@@ -19,7 +19,7 @@ use rustix::termios::{
 };
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 /// What is read at a time.
@@ -29,7 +29,6 @@ const CHUNK: usize = 4_096;
 #[derive(Debug)]
 pub struct SilentTap {
     fd: OwnedFd,
-    path: PathBuf,
     unmark: Option<Unmark>,
     kinds: ErrorKinds,
     ledger: Option<Ledger>,
@@ -79,7 +78,6 @@ impl SilentTap {
         rustix::termios::tcsetattr(&fd, OptionalActions::Now, &mode).map_err(of)?;
         rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(of)?;
         let tap = Self {
-            path: path.to_owned(),
             unmark: (marks || !pty).then(Unmark::default),
             kinds: ErrorKinds::new(harness_uart::counts(&fd)),
             ledger: harness_uart::counts(&fd).map(|own| Ledger::new(own, Instant::now())),
@@ -109,12 +107,6 @@ impl SilentTap {
         refuse_rate(path, format.bits_per_second, made)?;
         rustix::termios::ioctl_tiocexcl(&tap.fd).map_err(of)?;
         Ok(tap)
-    }
-
-    /// The port's path.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Takes what has arrived, without waiting; in order, behind what is in `heard` already.
@@ -275,6 +267,7 @@ fn speaks(mode: &Termios) -> Option<&'static str> {
 mod tests {
     use super::*;
     use rustix::pty::OpenptFlags;
+    use std::path::PathBuf;
 
     const FORMAT: Format = Format {
         bits_per_second: 38_400,

@@ -73,7 +73,6 @@ pub struct FrameLink {
     listening: Listening,
     /// The identifier with which each drive sends.
     senders: Vec<(can::Id, u8)>,
-    tolerance: Span,
     /// When the conversation started, and that on the adapter's clock, which starts with the link.
     start: time::Instant,
     opened: time::Instant,
@@ -129,7 +128,6 @@ impl FrameLink {
             listen_only: settings.listen_only,
             listening: Listening::MayAcknowledge,
             senders,
-            tolerance: SLACK,
             start: now,
             opened: now,
             told: Cell::new(Instant::START),
@@ -146,11 +144,6 @@ impl FrameLink {
             beats: Arc::default(),
             trouble: None,
         }
-    }
-
-    /// Sets how exact its times are; 30 ms at first.
-    pub const fn set_time_tolerance(&mut self, tolerance: Span) {
-        self.tolerance = tolerance;
     }
 
     /// What is known of the adapter's acknowledgements.
@@ -406,7 +399,7 @@ impl Link for FrameLink {
     }
 
     fn busy(&self) -> bool {
-        let answers = self.free + SLACK.max(self.tolerance);
+        let answers = self.free + SLACK;
         let waits = !self.queue.is_empty() || self.transport.waits();
         let sent = self.log.iter().any(|own| own.from.is_none());
         self.is_sound() && (waits || (sent && self.clock_now() < answers))
@@ -419,7 +412,7 @@ impl Link for FrameLink {
     }
 
     fn time_tolerance(&self) -> Span {
-        self.tolerance
+        SLACK
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -187,12 +187,6 @@ impl PlannedParameter {
     pub fn is_long(&self) -> bool {
         self.known.is_some_and(|own| own.has(Flag::Long))
     }
-
-    /// Whether it has sub-indices that tasks for arrays reach.
-    #[must_use]
-    pub fn is_array(&self) -> bool {
-        self.known.is_some_and(Parameter::is_array)
-    }
 }
 
 /// The bytes of a word.
