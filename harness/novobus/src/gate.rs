@@ -21,7 +21,7 @@ const NO_FRAMES: &str = "frames are not sent: the guard judges the bytes of a ri
 
 /// The gate of one ring, in doubt until the ring was [synchronised](Guarded::synchronise).
 #[derive(Clone, Debug)]
-pub struct RingGate {
+pub(crate) struct RingGate {
     /// Which ring, counted from 0.
     ring: usize,
     size: RingSize,

@@ -91,7 +91,7 @@ impl SimulatedLink {
     }
 
     /// The first thing that the witnesses of a ring saw: the drive, and what it was. Nothing more comes.
-    pub fn complaint(&mut self, ring: usize) -> Option<(u8, Complaint)> {
+    pub(crate) fn complaint(&mut self, ring: usize) -> Option<(u8, Complaint)> {
         let now = self.bench.now();
         let ring = self.bench.ring_mut(ring)?;
         let drives = 0..ring.size().drives();
@@ -209,7 +209,7 @@ impl SimulatedLink {
 
     /// When the next byte of an open link can be fetched.
     #[must_use]
-    pub fn next_fetch(&self, ring: usize, link: usize) -> Option<Instant> {
+    pub(crate) fn next_fetch(&self, ring: usize, link: usize) -> Option<Instant> {
         let next = self.ring(ring)?.next_fetch(link)?;
         Some(self.since_origin(next))
     }
@@ -223,7 +223,7 @@ impl SimulatedLink {
 
     /// The next byte that the master has received from a ring, its time, and whether it goes back to a byte that the master sent. A byte
     /// that a drive sent unasked after a time-out (ND21 9.9) does not.
-    pub fn receive_with_cause(&mut self, ring: usize) -> Option<(Instant, Received, bool)> {
+    pub(crate) fn receive_with_cause(&mut self, ring: usize) -> Option<(Instant, Received, bool)> {
         let own = self.bench.ring_mut(ring)?;
         loop {
             let byte = own.receive()?;

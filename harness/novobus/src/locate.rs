@@ -16,7 +16,7 @@ pub const MAX_ZEROS: usize = 25;
 
 /// A drive that the ring spells out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Location {
+pub(crate) struct Location {
     /// Its number.
     pub drive: u8,
     /// The zeros in front of its address; `None` for drive 0, whose address is a zero itself.
@@ -27,7 +27,7 @@ pub struct Location {
 
 /// The drive that the ring spells out, from what was received since the last check sequence.
 #[must_use]
-pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
+pub(crate) fn locate(received: &[Received], drives: u8) -> Option<Location> {
     let last = received.last()?;
     let repeats = received
         .iter()

@@ -124,7 +124,7 @@ impl StreamLink {
     }
 
     /// Sets the time tolerance.
-    pub fn set_time_tolerance(&mut self, tolerance: Span) {
+    pub(crate) fn set_time_tolerance(&mut self, tolerance: Span) {
         self.pump.tolerance = tolerance;
     }
 

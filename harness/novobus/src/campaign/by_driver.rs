@@ -30,7 +30,7 @@ struct Before {
 
 /// Calls of the driver that are ready to be disturbed.
 #[derive(Clone, Debug)]
-pub struct ByDriver {
+pub(crate) struct ByDriver {
     /// The conversation before each step: a case begins before the step of its first fault.
     before: Vec<Before>,
     calls: Vec<Vec<(u8, PlannedCall)>>,
@@ -54,7 +54,7 @@ fn job(call: &(u8, PlannedCall)) -> Option<(Axis, Job)> {
 impl ByDriver {
     /// Lets the driver do it without a fault. `None` where a call is not one command, or where it fails without any fault.
     #[must_use]
-    pub fn new(start: SimulatedLink, calls: Vec<Vec<(u8, PlannedCall)>>) -> Option<Self> {
+    pub(crate) fn new(start: SimulatedLink, calls: Vec<Vec<(u8, PlannedCall)>>) -> Option<Self> {
         if calls.iter().flatten().any(|call| job(call).is_none()) {
             return None;
         }
@@ -92,13 +92,13 @@ impl ByDriver {
 
     /// What the master sends without a fault, up to the end of the last job.
     #[must_use]
-    pub fn sent(&self) -> &[u8] {
+    pub(crate) fn sent(&self) -> &[u8] {
         &self.sent
     }
 
     /// Plays a case, from the start of the step in which its first fault happens.
     #[must_use]
-    pub fn play(&self, case: &CaseFaults) -> CaseEvidence {
+    pub(crate) fn play(&self, case: &CaseFaults) -> CaseEvidence {
         let first = case.faults().map(|fault| fault.byte).min();
         let step = self
             .before

@@ -33,7 +33,7 @@ pub struct Said {
 
 /// A conversation that is ready to be disturbed.
 #[derive(Clone, Debug)]
-pub struct ByManual {
+pub(crate) struct ByManual {
     start: SimulatedLink,
     answers: Answers,
     sound: Sound,
@@ -80,7 +80,7 @@ impl ByManual {
     /// Plays the conversation twice without a fault. `None` where the second time leaves something else than the first: a
     /// master that repeats telegrams would do so too.
     #[must_use]
-    pub fn new(start: SimulatedLink, bytes: Vec<u8>) -> Option<Self> {
+    pub(crate) fn new(start: SimulatedLink, bytes: Vec<u8>) -> Option<Self> {
         let drives = start.count();
         let spelling = if Sound::any_monitors(&start) {
             SPELLING_AFTER_SILENCE
@@ -116,13 +116,13 @@ impl ByManual {
 
     /// The conversation.
     #[must_use]
-    pub fn answers(&self) -> &Answers {
+    pub(crate) fn answers(&self) -> &Answers {
         &self.answers
     }
 
     /// Plays a case on a ring of its own, from the start.
     #[must_use]
-    pub fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<Said>) {
+    pub(crate) fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<Said>) {
         let mut link = self.start.clone();
         for fault in case.faults() {
             for (distance, what) in fault.what.on_link() {

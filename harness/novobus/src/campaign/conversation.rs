@@ -95,7 +95,7 @@ enum Back {
 
 /// A conversation in bytes, taken apart.
 #[derive(Clone, Debug)]
-pub struct Answers {
+pub(crate) struct Answers {
     /// The bytes.
     pub sent: Vec<u8>,
     /// What the plan of cases depends on.
@@ -130,7 +130,7 @@ struct Half {
 impl Answers {
     /// Analyses a conversation for a ring with this number of drives; `sound` is what comes back without a fault.
     #[must_use]
-    pub fn new(sent: Vec<u8>, drives: u8, sound: &[Received]) -> Self {
+    pub(crate) fn new(sent: Vec<u8>, drives: u8, sound: &[Received]) -> Self {
         let telegrams = telegrams(&sent);
         let mut back: Vec<Back> = sent.iter().map(|byte| Back::Exact(*byte)).collect();
         let mut restarts = Vec::new();
@@ -201,7 +201,7 @@ impl Answers {
     /// The place of the first wrong byte among those that came back for the bytes from `from` on and for SYNCO behind them; `None` if a
     /// master finds nothing wrong. A missing byte is wrong too.
     #[must_use]
-    pub fn wrong(&self, heard: &[Received], from: usize) -> Option<usize> {
+    pub(crate) fn wrong(&self, heard: &[Received], from: usize) -> Option<usize> {
         for (index, byte) in heard.iter().enumerate() {
             let right = match self.back.get(from + index) {
                 Some(Back::Exact(expected)) => byte.is(*expected),
@@ -226,7 +226,7 @@ impl Answers {
     /// Where a master begins again that has found the byte at `wrong` wrong: with the telegram of the byte before it, since
     /// process data and `ReadLong` have no check of their own, or with an earlier one.
     #[must_use]
-    pub fn restart(&self, wrong: usize) -> usize {
+    pub(crate) fn restart(&self, wrong: usize) -> usize {
         let before = wrong.saturating_sub(1);
         let mut earlier = self.restarts.iter().rev();
         earlier
@@ -236,7 +236,7 @@ impl Answers {
     }
 
     /// The places of data, with the drive that was asked.
-    pub fn data(&self) -> impl Iterator<Item = (usize, u8)> + '_ {
+    pub(crate) fn data(&self) -> impl Iterator<Item = (usize, u8)> + '_ {
         self.back
             .iter()
             .enumerate()

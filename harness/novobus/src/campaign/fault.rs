@@ -69,13 +69,13 @@ pub struct Injected {
 
 /// The link that ends at a drive, counted from the master's outgoing one.
 #[must_use]
-pub fn link_index(drives: u8, drive: u8) -> Option<usize> {
+pub(crate) fn link_index(drives: u8, drive: u8) -> Option<usize> {
     Some(usize::from(drives.checked_sub(drive)?.checked_sub(1)?))
 }
 
 /// The place of a link in a ring, if the ring has it.
 #[must_use]
-pub fn link_place(drives: u8, link: LinkName) -> Option<usize> {
+pub(crate) fn link_place(drives: u8, link: LinkName) -> Option<usize> {
     if !link.is_in(drives) {
         return None;
     }
@@ -86,7 +86,7 @@ pub fn link_place(drives: u8, link: LinkName) -> Option<usize> {
 }
 
 /// The most byte times that one gap may last.
-pub const MAX_GAP: u16 = 1000;
+pub(crate) const MAX_GAP: u16 = 1000;
 
 /// The longest delay or break.
 pub const LONGEST: Duration = Duration::from_secs(1);

@@ -12,7 +12,7 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 /// The most cases of a campaign: each is kept with its outcome.
-pub const MAX_CASES: u64 = 1_000_000;
+pub(crate) const MAX_CASES: u64 = 1_000_000;
 
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -208,7 +208,7 @@ impl ExpectedCounts {
 impl CampaignFile {
     /// The bytes of the conversation that are disturbed, first and last, counted from 1.
     #[must_use]
-    pub fn byte_range(&self, length: u64) -> (u64, u64) {
+    pub(crate) fn byte_range(&self, length: u64) -> (u64, u64) {
         let range = self.bytes.as_deref().and_then(range);
         range.unwrap_or((1, length))
     }

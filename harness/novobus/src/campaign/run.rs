@@ -341,7 +341,7 @@ pub struct CasePlayer<'a> {
 impl CasePlayer<'_> {
     /// Whether cases share what they have in common.
     #[must_use]
-    pub const fn shares(&self) -> bool {
+    pub(crate) const fn shares(&self) -> bool {
         self.sharing.is_some()
     }
 

@@ -113,7 +113,7 @@ impl Sound {
 
     /// Whether every drive waits for the same as without a fault, so that it answers the same to all that follows.
     #[must_use]
-    pub fn waits_as(&self, now: &impl DrivesBeyondBus) -> bool {
+    pub(crate) fn waits_as(&self, now: &impl DrivesBeyondBus) -> bool {
         (0..now.count()).all(|drive| {
             let addressed = |cells: &Cells| cells.peek(BUS_ADDR);
             let of_sound = self.end.bus_end(drive).zip(self.end.cells(drive));
@@ -127,13 +127,13 @@ impl Sound {
 
     /// Whether no drive is in the error mode.
     #[must_use]
-    pub fn all_back(now: &impl DrivesBeyondBus) -> bool {
+    pub(crate) fn all_back(now: &impl DrivesBeyondBus) -> bool {
         (0..now.count()).all(|drive| now.bus_end(drive).is_some_and(|end| !end.in_error()))
     }
 
     /// Whether any drive watches for silence (9.9).
     #[must_use]
-    pub fn any_monitors(ring: &impl DrivesBeyondBus) -> bool {
+    pub(crate) fn any_monitors(ring: &impl DrivesBeyondBus) -> bool {
         use harness_proto::nd21::{bits::flags2::MONITORING, ram::FLAGS2};
         let monitors = |cells: &Cells| cells.peek(FLAGS2) & MONITORING != 0;
         (0..ring.count()).any(|drive| ring.cells(drive).is_some_and(monitors))

@@ -78,7 +78,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`]; the first one where several reads fail.
-    pub fn read_many(
+    pub(crate) fn read_many(
         &self,
         cells: impl IntoIterator<Item = (Axis, u16, Width)>,
     ) -> Result<Vec<u16>, Error> {

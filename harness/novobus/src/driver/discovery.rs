@@ -318,7 +318,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn speed_range(&self, axis: Axis) -> Result<SpeedRange, Error> {
+    pub(crate) fn speed_range(&self, axis: Axis) -> Result<SpeedRange, Error> {
         let byte = self.read_byte(axis, ram::SW_VERSION2)?;
         Ok(SpeedRange::from_sw_version2(byte))
     }

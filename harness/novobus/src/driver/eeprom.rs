@@ -34,7 +34,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`]; the first one where several drives fail.
-    pub fn read_eeprom_of(&self, axes: &[Axis], address: u8) -> Result<Vec<u8>, Error> {
+    pub(crate) fn read_eeprom_of(&self, axes: &[Axis], address: u8) -> Result<Vec<u8>, Error> {
         for _ in 0..ATTEMPTS {
             if let Some(bytes) = self.read_eeprom_once(axes, address)? {
                 return Ok(bytes);
@@ -75,7 +75,12 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn read_eeprom_bytes(&self, axis: Axis, address: u8, count: u16) -> Result<Vec<u8>, Error> {
+    pub(crate) fn read_eeprom_bytes(
+        &self,
+        axis: Axis,
+        address: u8,
+        count: u16,
+    ) -> Result<Vec<u8>, Error> {
         (u16::from(address)..u16::from(address) + count)
             .filter_map(|address| u8::try_from(address).ok())
             .map(|address| self.read_eeprom(axis, address))

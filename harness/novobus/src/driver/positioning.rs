@@ -35,7 +35,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// As of [`Self::reference`].
-    pub fn reference_showing(&self, axis: Axis, seen: impl FnMut(u8)) -> Result<(), Error> {
+    pub(crate) fn reference_showing(&self, axis: Axis, seen: impl FnMut(u8)) -> Result<(), Error> {
         // Step 1.
         let speed = self.read_word(axis, ram::PS_V0)?;
         // Step 2.
@@ -61,7 +61,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn restore_ps_v0(&self, axis: Axis, speed: u16) -> Result<bool, Error> {
+    pub(crate) fn restore_ps_v0(&self, axis: Axis, speed: u16) -> Result<bool, Error> {
         let restore = Command::WriteWord {
             address: ram::PS_V0,
             data: speed,
@@ -229,7 +229,11 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// As of [`Self::wait_for_end`].
-    pub fn wait_for_end_showing(&self, axis: Axis, mut seen: impl FnMut(u8)) -> Result<(), Error> {
+    pub(crate) fn wait_for_end_showing(
+        &self,
+        axis: Axis,
+        mut seen: impl FnMut(u8),
+    ) -> Result<(), Error> {
         let patience = self.options.motion_patience;
         let what = "the positioning";
         self.poll_byte(axis, ram::PS_STATUS, patience, what, |byte| {

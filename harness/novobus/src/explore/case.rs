@@ -19,7 +19,7 @@ pub const MOST_ACTS: usize = 48;
 pub const MOST_BYTES: usize = 400;
 
 /// Maximum number of net bytes of a telegram (ND21 9.2).
-pub const MOST_NET: u8 = 7;
+pub(crate) const MOST_NET: u8 = 7;
 
 /// A conversation with a ring of a given size.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 ///
 /// # Errors
 /// Its attempts are not those of a run with these settings.
-pub fn judged_again(
+pub(crate) fn judged_again(
     finding: &Finding,
     settings: &FuzzSettings,
     known: &BTreeMap<String, u8>,

@@ -445,7 +445,7 @@ impl<'s> Generator<'s> {
 
     /// Adds a recovery after each act that leaves the drives' state in doubt (ND21 9.8). On a rig that does not allow everything, the guard
     /// permits nothing else there.
-    pub fn keep_in_step(&self, case: &mut Case) {
+    pub(crate) fn keep_in_step(&self, case: &mut Case) {
         if self.scope.limits.allow_everything() {
             return;
         }

@@ -26,10 +26,7 @@ mod spice;
 pub mod text;
 mod tour;
 
-pub use case::{
-    Act, ActKind, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, OtherRing, Talk, To,
-};
-pub use confirm::judged_again;
+pub use case::{Act, ActKind, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, OtherRing, Talk, To};
 pub use finding::{scenario, sources};
 pub use generate::{CaseScope, Generator, RingScope};
 pub use mutate::mutate;
@@ -37,7 +34,7 @@ pub use novelty::features;
 pub use on_record::AttemptRecord;
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
-pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
+pub use oracle::{Difference, against_reference, beside};
 pub use order::{CommandSent, RawCommand, Spoil};
 pub use page::page;
 pub use play::{MasterView, play};

@@ -116,7 +116,11 @@ impl From<&twin::Divergence> for Difference {
 
 /// The first received byte that differs from the model: in value, line status or number, or else in time.
 #[must_use]
-pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Option<Difference> {
+pub(crate) fn against_model(
+    case: &Case,
+    model: &MasterView,
+    seen: &MasterView,
+) -> Option<Difference> {
     if model.received == seen.received {
         return None;
     }
@@ -231,7 +235,7 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
 
 /// What the witnesses of whole ND21s complain of, or an answer that did not go out a byte time after the byte received.
 #[must_use]
-pub fn against_witnesses(
+pub(crate) fn against_witnesses(
     case: &Case,
     link: &mut SimulatedLink,
     trace: &Trace,

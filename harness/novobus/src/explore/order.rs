@@ -126,7 +126,7 @@ impl RawCommand {
 
     /// The same command with this in its data, or in the low byte of them.
     #[must_use]
-    pub const fn with_data(mut self, new: u8) -> Self {
+    pub(crate) const fn with_data(mut self, new: u8) -> Self {
         match &mut self {
             Self::WriteByte { data, .. } | Self::And { data, .. } | Self::Or { data, .. } => {
                 *data = new;

@@ -113,7 +113,7 @@ impl RingSetup {
     /// The first line that sets a bus property that the manual leaves open. The reference model, which judges if no deviation is planted,
     /// knows only the defaults.
     #[must_use]
-    pub fn sets_property(&self) -> Option<String> {
+    pub(crate) fn sets_property(&self) -> Option<String> {
         let of_the_bus = |name: &str| PROPERTIES.iter().any(|known| known.name == name);
         let mut setups = self.header.setups.iter();
         let first = setups.find(|setup| setup.sets().is_some_and(of_the_bus));

@@ -35,7 +35,7 @@ pub struct Shrunk {
 }
 
 /// Runs a subject on a ring and returns how the ring differs from the expected behaviour, or `None` if it does not.
-pub type Asking<'a> = dyn FnMut(&Subject) -> Result<Option<Difference>, ExploreError> + 'a;
+pub(crate) type Asking<'a> = dyn FnMut(&Subject) -> Result<Option<Difference>, ExploreError> + 'a;
 
 /// Shrinks a subject in at most `most_runs` runs. The result is a finding of the same kind as `difference`.
 ///

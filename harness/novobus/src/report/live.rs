@@ -52,7 +52,7 @@ struct Begun {
 }
 
 /// Text of the bytes of one link.
-pub struct LinkText {
+pub(crate) struct LinkText {
     observer: Observer,
     to: Option<u8>,
     /// The number of drives, where it is known.
@@ -70,7 +70,7 @@ pub struct LinkText {
 
 impl LinkText {
     /// Text of the link between two ends, of a ring with this number of drives where it is known.
-    pub fn new(from: Option<u8>, to: Option<u8>, rate: Rate, drives: Option<u8>) -> Self {
+    pub(crate) fn new(from: Option<u8>, to: Option<u8>, rate: Rate, drives: Option<u8>) -> Self {
         Self {
             observer: Observer::new(from, to),
             to,

@@ -194,7 +194,7 @@ struct Begun {
 
 /// Reads the bytes of one link.
 #[derive(Clone, Debug)]
-pub struct Observer {
+pub(crate) struct Observer {
     /// What an address byte on this link falls short of the drive's number.
     behind: u8,
     from: Option<u8>,
@@ -218,7 +218,7 @@ pub struct Observer {
 impl Observer {
     /// For a link between two ends; `None` is the master.
     #[must_use]
-    pub fn new(from: Option<u8>, to: Option<u8>) -> Self {
+    pub(crate) fn new(from: Option<u8>, to: Option<u8>) -> Self {
         Self {
             behind: from.unwrap_or_else(|| to.unwrap_or(0).wrapping_add(1)),
             from,
@@ -238,12 +238,12 @@ impl Observer {
 
     /// Whether a telegram has begun and is not complete.
     #[must_use]
-    pub const fn in_telegram(&self) -> bool {
+    pub(crate) const fn in_telegram(&self) -> bool {
         !self.foreign && (self.address_next || self.net > 0)
     }
 
     /// Takes the next byte of the link, and what its receiver noticed.
-    pub fn see(&mut self, received: Option<u8>, error: Option<LineError>) -> Meaning {
+    pub(crate) fn see(&mut self, received: Option<u8>, error: Option<LineError>) -> Meaning {
         let Some(byte) = received else {
             return Meaning::of(ByteRole::Lost);
         };

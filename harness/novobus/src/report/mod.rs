@@ -18,4 +18,4 @@ pub mod vcd;
 pub mod walk;
 
 /// The dissector for Wireshark.
-pub const DISSECTOR: &str = include_str!("novobus.lua");
+pub(crate) const DISSECTOR: &str = include_str!("novobus.lua");

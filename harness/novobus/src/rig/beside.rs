@@ -81,7 +81,7 @@ impl OnRings for Attempt {
 }
 
 /// A scenario that was played on rings.
-pub trait PlayedOnRings {
+pub(crate) trait PlayedOnRings {
     /// The last attempt played and its differences from the model, if they say something about the drives. A difference that was not seen
     /// again may be due to the computer: drives that could not be made ready once, and, in real time, every byte that was late.
     fn telling(&self, real_time: bool) -> Option<(&Attempt, Vec<&Divergence>)>;

@@ -14,7 +14,7 @@ use harness_proto::novobus::sync::SYNCO;
 
 /// The likely cause of a ring that does not open, and what to do next.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum LikelyCause {
+pub(crate) enum LikelyCause {
     /// No byte came back.
     #[error(
         "the ring is open, a drive has no power, or this is another port. Next: check the power of every drive and the cable from drive 0 back to the bench; put the final connector on X4 of a drive in the middle to find the sound half (ND21 8.2)"

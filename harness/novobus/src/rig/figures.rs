@@ -45,7 +45,7 @@ pub struct RingFigures {
 impl RingFigures {
     /// The shortest, the median and the longest time round the ring; `None` if nothing came back.
     #[must_use]
-    pub fn spread(&self) -> Option<[Span; 3]> {
+    pub(crate) fn spread(&self) -> Option<[Span; 3]> {
         let first = *self.rounds.first()?;
         let last = *self.rounds.last()?;
         Some([first, self.rounds[self.rounds.len() / 2], last])

@@ -88,7 +88,7 @@ pub struct RingHealth {
 ///
 /// # Errors
 /// The first unhealthy ring, and what is wrong with it.
-pub fn examine(
+pub(crate) fn examine(
     link: &mut dyn Link,
     rings: &[RingSize],
     attempts: u8,

@@ -21,11 +21,12 @@ pub mod shared;
 pub mod sim;
 pub mod wrong_parity;
 
-pub use beside::{BesideTwin, OnRings, PlayedOnRings};
-pub use cause::LikelyCause;
+pub(crate) use beside::PlayedOnRings;
+pub use beside::{BesideTwin, OnRings};
 pub use condition::{InterlockCondition, condition};
 pub use driven::Driven;
-pub use health::{RingHealth, Unhealthy, examine};
+pub(crate) use health::examine;
+pub use health::{RingHealth, Unhealthy};
 pub use permitted::limits;
 pub use run::{Run, Way, play_one};
 pub use session::Session;

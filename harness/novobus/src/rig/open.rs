@@ -20,7 +20,7 @@ use std::sync::atomic::AtomicBool;
 
 /// Why a rig's ports cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenRigError {
+pub(crate) enum OpenRigError {
     /// A port.
     #[error(transparent)]
     Port(#[from] OpenError),

@@ -378,7 +378,7 @@ impl<'s> Run<'s> {
     }
 
     /// Resets no drive any more before a scenario: for a ring with a drive that does not answer `ResetH8` as it should.
-    pub fn leave_as_they_are(&mut self) {
+    pub(crate) fn leave_as_they_are(&mut self) {
         self.as_they_are = true;
     }
 

@@ -264,7 +264,7 @@ impl Session {
 
     /// Whether the session goes on although a ring fails its health check.
     #[must_use]
-    pub fn ill_as_well(&self) -> bool {
+    pub(crate) fn ill_as_well(&self) -> bool {
         self.ill_as_well
     }
 
@@ -506,7 +506,7 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError::Ill`].
-    pub fn health(&mut self) -> Result<RingHealth, SessionError> {
+    pub(crate) fn health(&mut self) -> Result<RingHealth, SessionError> {
         let health = self.examined()?;
         self.learn();
         Ok(health)
@@ -541,7 +541,7 @@ impl Session {
 
     /// The error for a ring that failed [`examine`].
     #[must_use]
-    pub fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
+    pub(crate) fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
         SessionError::Ill {
             rig: self.rig.id().to_owned(),
             ring: ring + 1,

@@ -38,7 +38,7 @@ pub enum WrongParity {
 impl WrongParity {
     /// Why scenarios with wrong parity are not played; `None` where they are.
     #[must_use]
-    pub fn obstacle(self, port: &str) -> Option<String> {
+    pub(crate) fn obstacle(self, port: &str) -> Option<String> {
         match self {
             Self::Noticed => None,
             Self::Unnoticed => Some(format!(

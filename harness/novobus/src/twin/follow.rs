@@ -142,7 +142,7 @@ impl Conversation {
 
     /// Whether it is that of a scenario, and not of what comes before or behind it.
     #[must_use]
-    pub fn has_steps(&self) -> bool {
+    pub(crate) fn has_steps(&self) -> bool {
         let step = |(_, done): &(usize, Done)| matches!(done, Done::Step(_));
         self.done.iter().any(step)
     }
@@ -293,7 +293,7 @@ impl Twin {
     }
 
     /// The same up to the first conversation in which a byte differs.
-    pub fn follow_while_alike(
+    pub(crate) fn follow_while_alike(
         &mut self,
         conversations: &[Conversation],
         exactness: Exactness,
@@ -372,7 +372,7 @@ impl Twin {
     }
 
     /// Lets time pass in which nothing is sent, until every drive has tested itself after its power-up (11.8).
-    pub fn rest_through_self_tests(&mut self) {
+    pub(crate) fn rest_through_self_tests(&mut self) {
         const STEP: Span = Span::from_millis(200);
         const LONGEST: Span = Span::from_millis(61_000);
         let end = self.link.now() + LONGEST;

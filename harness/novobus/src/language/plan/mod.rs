@@ -10,11 +10,12 @@ mod types;
 pub(crate) use drive::{MAX_LOOKS, number};
 pub(crate) use job::Exchange;
 pub(crate) use planner::Planner;
-pub use planner::plan_header;
+pub(crate) use planner::plan_header;
 pub(crate) use setup::{in_memory, number_bytes};
+pub(crate) use types::CellTest;
 pub use types::{
-    CellTest, LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck,
-    PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct, asks_the_driver,
+    LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
+    PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct, asks_the_driver,
 };
 pub(crate) use types::{PlannedSetupKind, fault_links, heard_links};
 

@@ -34,7 +34,7 @@ const MAX_FAULT: Span = Span::from_millis(10_000);
 ///
 /// # Errors
 /// Everything that cannot be in these rings, placed in the lines of the header as they are written. `name` says where they come from.
-pub fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Problems> {
+pub(crate) fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Problems> {
     let source = Source {
         name: name.to_owned(),
         text: header.lines().join("\n").into(),

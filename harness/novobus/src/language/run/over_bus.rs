@@ -281,7 +281,7 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), NotRead
 ///
 /// # Errors
 /// The first drive that does not come back, in a sentence.
-pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotReady> {
+pub(crate) fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotReady> {
     link.begin();
     let cells = in_each(all, nd21::ram::STATUS);
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {

@@ -40,7 +40,7 @@ impl CellPlace {
 
     /// The place at an address of the EEPROM, without a name.
     #[must_use]
-    pub fn in_eeprom(address: u8) -> Self {
+    pub(crate) fn in_eeprom(address: u8) -> Self {
         Self {
             name: format!("{address:02X}"),
             address: u16::from(address),
@@ -98,7 +98,7 @@ pub enum Relation {
 
 impl Relation {
     /// As written; what begins as another does comes first.
-    pub const NAMES: [(&'static str, Self); 5] = [
+    pub(crate) const NAMES: [(&'static str, Self); 5] = [
         ("<=", Self::AtMost),
         (">=", Self::AtLeast),
         ("<", Self::Less),
@@ -108,7 +108,7 @@ impl Relation {
 
     /// Whether it holds between what was found and what is expected.
     #[must_use]
-    pub fn holds<T: PartialOrd>(self, found: T, expected: T) -> bool {
+    pub(crate) fn holds<T: PartialOrd>(self, found: T, expected: T) -> bool {
         match self {
             Self::Equal => found == expected,
             Self::Less => found < expected,

@@ -134,7 +134,7 @@ impl Header {
 
     /// The same with drives, and a master, that follow the manual.
     #[must_use]
-    pub fn without_deviations(&self) -> Self {
+    pub(crate) fn without_deviations(&self) -> Self {
         Self {
             master: None,
             ..self.only(|own| !matches!(own.what, SetupKind::Deviates(_)))
@@ -149,14 +149,14 @@ impl Header {
 
     /// Whether a line names the model of a drive.
     #[must_use]
-    pub fn names_a_model(&self) -> bool {
+    pub(crate) fn names_a_model(&self) -> bool {
         let names = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
         self.setups.iter().any(names)
     }
 
     /// The same with a whole ND21 for every drive of this number of rings, unless a line names a model.
     #[must_use]
-    pub fn nd21_by_default(self, rings: usize) -> Self {
+    pub(crate) fn nd21_by_default(self, rings: usize) -> Self {
         match self.names_a_model() {
             true => self,
             false => Self::whole(rings).and(&self),

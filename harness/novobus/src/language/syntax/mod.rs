@@ -6,7 +6,8 @@ pub(crate) mod header;
 pub(crate) mod job;
 pub(crate) mod step;
 
-pub use cell::{CellCheck, CellPlace, Relation, Written};
+pub(crate) use cell::Relation;
+pub use cell::{CellCheck, CellPlace, Written};
 pub use check::{Check, Condition, DriveCheck, Ending, Showing};
 pub use header::{DriveRange, Header, Influence, RingRange, Setup, SetupKind};
 pub use job::{JobKind, JobStep, MasterCall, WrittenTarget};

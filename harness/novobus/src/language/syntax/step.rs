@@ -116,7 +116,7 @@ impl LinkEnds {
 
     /// The ends of a link of a ring of `drives`, by its place: 0 for the link that begins at the master.
     #[must_use]
-    pub fn of_place(drives: u8, place: usize) -> Self {
+    pub(crate) fn of_place(drives: u8, place: usize) -> Self {
         let behind = |place: usize| u8::try_from(usize::from(drives).checked_sub(place)?).ok();
         let from = behind(place).filter(|_| place > 0);
         Self::between(from, behind(place + 1))

@@ -20,7 +20,7 @@ impl Session {
 
     /// The same after a rig error or an interlock.
     #[must_use]
-    pub fn close_with_error(mut self) -> End {
+    pub(crate) fn close_with_error(mut self) -> End {
         self.end(true)
     }
 
