@@ -10,16 +10,12 @@ pub enum ListenError {
     #[error(
         "{address} can be reached from other machines: a loopback address such as 127.0.0.1 expected, or --allow-remote"
     )]
-    Remote {
-        /// The address.
-        address: SocketAddr,
-    },
+    Remote { address: SocketAddr },
     /// The socket cannot listen.
     #[error("failed to listen at {address}: {error}; HOST:PORT expected, port 0 for a free one")]
     Failed {
         /// As written.
         address: String,
-        /// Why.
         error: io::Error,
     },
 }

@@ -6,7 +6,6 @@ use serde::Deserialize;
 /// The manual of a bus.
 #[derive(Clone, Copy, Debug)]
 pub struct Manual {
-    /// The bus.
     pub bus: BusName,
     /// What it is called.
     pub title: &'static str,
@@ -20,7 +19,6 @@ pub struct Manual {
 /// What a manual leaves open: a property of a drive.
 #[derive(Clone, Debug)]
 pub struct Open {
-    /// The section.
     pub section: &'static str,
     /// The name of the property.
     pub name: &'static str,
@@ -39,7 +37,6 @@ pub const NOT_YET: &str = "not yet";
 pub struct ManualTable {
     /// The reference that a scenario's `source` line gives: the document, a section, and an item where the section has several.
     pub id: String,
-    /// The section.
     pub section: String,
     /// What the reader finds there.
     pub title: String,
@@ -55,11 +52,9 @@ pub struct Erratum {
     pub id: String,
     /// Which manual.
     pub document: String,
-    /// Which section.
     pub section: String,
     /// What is printed.
     pub prints: String,
-    /// What is meant.
     pub meant: String,
     /// The evidence.
     pub why: String,

@@ -15,7 +15,6 @@ pub(crate) const SELF_TEST_TIME: &str = "self-test-time";
 /// A value of an open property that is not the model's default.
 #[derive(Clone, Debug)]
 pub(crate) struct Choice {
-    /// The property.
     pub(crate) property: &'static str,
     /// It with its value.
     pub(crate) setting: SetupKind,

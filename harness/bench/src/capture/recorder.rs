@@ -20,7 +20,6 @@ pub enum Carries {
     Link,
     /// The octets of a line that stations share.
     Line,
-    /// Frames.
     Frames,
 }
 
@@ -45,9 +44,7 @@ impl Carries {
 pub struct RecordedPlace {
     /// Its name: a link such as `98->97`, or that of a bus.
     pub name: String,
-    /// What it carries.
     pub carries: Carries,
-    /// Bits a second.
     pub bits_per_second: u32,
 }
 
@@ -58,7 +55,6 @@ pub enum Piece {
     Octet(LineByte),
     /// Octets of a shared line that followed each other, and the station that sent them; `None` is a master.
     Telegram(Option<u8>, Vec<LineByte>),
-    /// A frame.
     Frame(LineFrame),
     /// Something else that happened, in words: nanoseconds, and the words.
     Event(u64, String),

@@ -21,7 +21,6 @@ type OpenJudge = fn(&Rig, bool, bool) -> Box<dyn SegmentJudge>;
 
 /// What the commands ask of a bus behind `[port.1]`.
 pub struct PortCommands {
-    /// The bus.
     pub bus: PortBus,
     /// Takes a rig to play scenarios on it.
     pub run: OpenRun,

@@ -81,7 +81,6 @@ pub trait TopReader {
 
 /// What a page shows of a bench beside the table of its drives.
 pub struct TopScene {
-    /// The title.
     pub title: String,
     /// The heads of the table of traffic.
     pub traffic: &'static [&'static str],

@@ -11,10 +11,8 @@ pub enum EvidenceError {
     /// There is something in it.
     #[error("{0} is not empty; name a new or empty folder for the evidence")]
     NotEmpty(String),
-    /// A file.
     #[error("failed to use {path}: {error}")]
     File {
-        /// Which.
         path: String,
         /// Why not.
         error: io::Error,

@@ -15,7 +15,6 @@ pub struct JunitCase {
     pub name: String,
     /// The group that reports show it in, as `package.class`: `nd21.chapter-9`.
     pub class: String,
-    /// Its verdict.
     pub verdict: Verdict,
     /// What differed, as a text for people.
     pub message: String,

@@ -52,7 +52,6 @@ pub trait Watcher<C: FuzzCase> {
     fn progress(&mut self, progress: &Progress, pool: &Pool<C>);
 }
 
-/// A run.
 #[derive(Debug)]
 pub struct FuzzRun<C: FuzzCase> {
     about: FuzzSettings<C>,

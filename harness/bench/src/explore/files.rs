@@ -12,7 +12,6 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
     regular::write_text(path, text).map_err(|error| ExploreError::unwritten("write", path, &error))
 }
 
-/// Reads a text.
 pub fn read_text(path: &Path) -> Result<String, ExploreError> {
     let read = || {
         let bytes = regular::read(path, Links::Refuse, LONGEST)?;

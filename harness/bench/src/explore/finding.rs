@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 /// The version of the format.
 const SCHEMA: u32 = 1;
 
-/// A finding.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
 pub struct Finding<C: FuzzCase> {

@@ -14,7 +14,6 @@ pub trait Spiced: Copy + Ord + Debug + 'static {
     /// All with their names.
     const ALL: &'static [(&'static str, Self)];
 
-    /// Its name.
     fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, own)| *own == self);
         named.map_or("", |(name, _)| name)
@@ -40,7 +39,6 @@ pub trait Differing: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwn
 /// What came of judging a finding again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JudgedAgain {
-    /// The same.
     Same,
     /// Something else, and what.
     Differs(String),

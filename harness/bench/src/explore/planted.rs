@@ -9,7 +9,6 @@ pub struct Planted {
     /// In which ring, counted from 0.
     #[serde(default, skip_serializing_if = "is_first")]
     pub ring: usize,
-    /// Which drive.
     pub drive: u8,
     /// The name of the deviation.
     pub name: String,

@@ -31,7 +31,6 @@ pub struct FuzzSettings<C: FuzzCase> {
     pub second: Option<u8>,
     /// Whether it has ports.
     pub ports: bool,
-    /// The seed.
     pub seed: u64,
     /// A finding is confirmed when it is seen again this often ...
     pub confirm: u8,
@@ -63,11 +62,9 @@ pub enum LogLine<C: FuzzCase> {
     },
     /// A case is kept.
     Kept {
-        /// Its number.
         number: u64,
         /// How many features are new.
         new: usize,
-        /// The case.
         case: C,
     },
     /// Something was found; its files are in the folder.
@@ -180,7 +177,6 @@ impl FuzzRecord {
         Ok((record, kept))
     }
 
-    /// The folder.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder

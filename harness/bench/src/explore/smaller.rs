@@ -5,7 +5,6 @@ use super::{Differing as _, ExploreError, Finding, FuzzCase};
 
 /// A conversation of acts with times between them.
 pub trait Acts: FuzzCase {
-    /// Its acts.
     fn acts(&mut self) -> &mut Vec<Self::Act>;
 
     /// The time behind an act, in microseconds.
@@ -21,7 +20,6 @@ pub trait Acts: FuzzCase {
 /// What came of making a finding small.
 #[derive(Clone, Debug)]
 pub(crate) struct Smaller<C: FuzzCase> {
-    /// The finding.
     pub finding: Finding<C>,
     /// Whether nothing more can be taken away.
     pub complete: bool,

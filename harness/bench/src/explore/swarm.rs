@@ -44,7 +44,6 @@ impl<S: Spiced> Swarm<S> {
         own.filter(|spice| self.has(*spice)).collect()
     }
 
-    /// The names.
     #[must_use]
     pub fn names(&self) -> Vec<&'static str> {
         self.0.iter().map(|spice| spice.name()).collect()

@@ -25,7 +25,6 @@ pub use harness_socketcan::{class, flag};
 /// A time: seconds and microseconds, since 1970 with the daemon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Stamp {
-    /// Seconds.
     pub seconds: u64,
     /// Microseconds, 0 to 999999.
     pub micros: u32,

@@ -13,7 +13,6 @@ pub enum InputError {
         /// What stands there.
         found: char,
     },
-    /// Half a byte.
     #[error("line {line} ends within a byte; an input is pairs of hexadecimal digits")]
     HalfByte {
         /// Which line, counted from 1.

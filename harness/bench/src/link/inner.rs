@@ -33,7 +33,6 @@ pub struct Delay {
     pub bytes: u64,
     /// All their times together.
     pub total: time::Duration,
-    /// The longest.
     pub longest: time::Duration,
 }
 

@@ -60,7 +60,6 @@ pub enum Capability {
     Reset,
     /// Line errors can be sent, and are shown at their byte.
     LineErrors,
-    /// Two rings.
     TwoRings,
     /// Simulated drives: for what must not be tried on a machine.
     Simulator,

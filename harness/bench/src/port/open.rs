@@ -48,7 +48,6 @@ impl std::fmt::Display for PortAddress {
 /// What to open, and how.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortSettings {
-    /// Where.
     pub address: PortAddress,
     /// The rate and the format of a serial line, with 8 data bits.
     pub format: Format,
@@ -74,7 +73,6 @@ pub enum OpenError {
     /// Another program has it.
     #[error("{port} is in use by another program{}", by(holder.as_ref()))]
     InUse {
-        /// The port.
         port: String,
         /// Which program, where the kernel shows it.
         holder: Option<OtherProgram>,
@@ -88,7 +86,6 @@ pub enum OpenError {
     /// The port does not take the settings.
     #[error("{port}: the adapter refused {what}; the line needs it: use another adapter")]
     Setting {
-        /// The port.
         port: String,
         /// What it does not do.
         what: String,
@@ -99,7 +96,6 @@ pub enum OpenError {
          adapter that makes it (the guide's page on wiring has a list)"
     )]
     Rate {
-        /// The port.
         port: String,
         /// The rate that it was asked for.
         asked: u32,
@@ -125,7 +121,6 @@ pub enum OpenError {
     /// Anything else.
     #[error("failed to open {port}: {error}")]
     Other {
-        /// The port.
         port: String,
         /// Why not.
         error: io::Error,

@@ -38,7 +38,6 @@ pub struct Abilities {
 /// What can be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outgoing {
-    /// A byte.
     Byte(u8),
     /// A byte whose parity bit is wrong.
     WrongParity(u8),

@@ -21,7 +21,6 @@ use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};
 use std::io::Write;
 
-/// The link type.
 pub const LINK_TYPE: u16 = 250;
 /// The length of the header in front of a byte.
 pub const HEADER: usize = 12;

@@ -19,7 +19,6 @@ use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
 use std::io::Write;
 
-/// The link type.
 pub const LINK_TYPE: u16 = 227;
 /// The length of the header in front of the data.
 pub const HEADER: usize = 8;

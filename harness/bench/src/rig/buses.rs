@@ -15,7 +15,6 @@ type CheckInterlock = fn(&Interlock) -> Result<(), Mistake>;
 
 /// What a bus knows of `[port.1]` and of the drives there.
 pub struct PortRow {
-    /// The bus.
     pub bus: PortBus,
     /// The keys of its adapters.
     pub adapters: &'static [&'static str],

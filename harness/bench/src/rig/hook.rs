@@ -18,7 +18,6 @@ const STREAMS: Duration = Duration::from_millis(500);
 /// A program that ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finished {
-    /// How.
     pub status: ExitStatus,
     /// The start of its standard output.
     pub stdout: String,

@@ -166,7 +166,6 @@ impl<D: PortDrives> PortSession<D> {
         self.link.look_at_all();
     }
 
-    /// The rig.
     #[must_use]
     pub const fn rig(&self) -> &Rig {
         &self.rig

@@ -54,7 +54,6 @@ pub struct SettledProperty<S> {
 /// A profile that a rig's file names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KnownProfile {
-    /// Its text.
     pub text: String,
     /// What makes simulated drives behave so.
     pub lines: ProfileLines,

@@ -16,7 +16,6 @@ pub enum SessionError {
         "rig {rig} has drives on the bus {bus}, and this command serves rings only; read, write, watch, info, params, position, go, stop, block, run and rig check serve it"
     )]
     OtherBus {
-        /// Which.
         rig: String,
         /// Their bus.
         bus: &'static str,
@@ -24,7 +23,6 @@ pub enum SessionError {
     /// Its drives do not answer, or its bus is in use.
     #[error("rig {rig}: {why}")]
     Drives {
-        /// Which.
         rig: String,
         /// What is wrong, in a sentence.
         why: String,
@@ -32,7 +30,6 @@ pub enum SessionError {
     /// Another program has its port.
     #[error("rig {rig}: {why}")]
     PortInUse {
-        /// Which.
         rig: String,
         /// Which port, and by which program, in a sentence.
         why: String,
@@ -45,11 +42,9 @@ pub enum SessionError {
         "rig {rig} is in quarantine since {since}: {reason} (`drivebench rig quarantine {rig} --lift`)"
     )]
     Quarantine {
-        /// Which.
         rig: String,
         /// Since when.
         since: String,
-        /// Why.
         reason: String,
     },
     /// The folder of locks.
@@ -61,23 +56,15 @@ pub enum SessionError {
     /// A port.
     #[error("rig {rig}: {error}")]
     Open {
-        /// Which.
         rig: String,
         /// Why not.
         error: Finding,
     },
-    /// A hook.
     #[error("rig {rig}: {error}")]
-    Hook {
-        /// Which.
-        rig: String,
-        /// Why.
-        error: Box<HookError>,
-    },
+    Hook { rig: String, error: Box<HookError> },
     /// The program was interrupted while it opened the rig.
     #[error("rig {rig}: interrupted{}", .end.as_ref().map_or(" before anything was sent".to_owned(), |end| format!("; {end}")))]
     Interrupted {
-        /// Which.
         rig: String,
         /// How it was given back; `None` if nothing had been sent to its drives.
         end: Option<Box<End>>,
@@ -85,7 +72,6 @@ pub enum SessionError {
     /// It is not healthy.
     #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_deref()))]
     Ill {
-        /// Which.
         rig: String,
         /// Which ring, 1 or 2.
         ring: usize,

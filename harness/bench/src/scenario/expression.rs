@@ -75,7 +75,6 @@ impl fmt::Display for Counter {
 /// A number that may depend on N, the number of drives in the ring, and on the counters of loops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Expression {
-    /// A number.
     Number(i64),
     /// `N`: how many drives the ring has.
     Size,

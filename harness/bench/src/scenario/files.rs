@@ -33,7 +33,6 @@ pub enum LibraryError {
     /// A folder cannot be read.
     #[error("failed to read the folder {folder}: {error}")]
     Folder {
-        /// The folder.
         folder: String,
         /// The operating system's error.
         error: std::io::Error,
@@ -42,10 +41,7 @@ pub enum LibraryError {
     #[error(
         "{folder} holds more than {MAX_FILES} scenarios, or folders nest deeper than {MAX_DEPTH}"
     )]
-    TooMany {
-        /// The folder.
-        folder: String,
-    },
+    TooMany { folder: String },
     /// A file is no scenario.
     #[error(transparent)]
     Source(#[from] SourceError),

@@ -31,7 +31,6 @@ pub enum Opening<'w> {
 
 /// The words of a bus: how they are read, settled and written.
 pub trait Language: Copy + Debug + Send + Sync + 'static {
-    /// The bus.
     const BUS: BusName;
     /// Its name in a `bus` line.
     const NAME: &'static str = Self::BUS.name();

@@ -38,7 +38,6 @@ impl From<TextSpan> for SourceSpan {
 /// A value with the place where it stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spanned<T> {
-    /// The value.
     pub value: T,
     /// Its place.
     pub span: TextSpan,
@@ -49,7 +48,6 @@ pub struct Spanned<T> {
 pub struct Problem {
     /// What is wrong.
     pub message: String,
-    /// Where.
     pub span: TextSpan,
     /// What was expected there.
     pub expected: String,

@@ -16,7 +16,6 @@ pub(crate) const MAX_LINE: usize = 10_000;
 pub struct Source {
     /// The path, or the name of a built-in scenario.
     pub name: String,
-    /// The text.
     pub text: Arc<str>,
 }
 
@@ -58,7 +57,6 @@ pub enum SourceError {
     NotText {
         /// The file.
         name: String,
-        /// Where.
         offset: usize,
         /// What stands there.
         byte: u8,

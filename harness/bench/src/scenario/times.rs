@@ -119,7 +119,6 @@ impl fmt::Display for Duration {
 /// A time, or a window between two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// From.
     pub from: Duration,
     /// To; the same as `from` for an exact time.
     pub to: Duration,

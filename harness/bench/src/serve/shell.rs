@@ -85,16 +85,12 @@ pub enum ServeError {
     Listen(#[from] ListenError),
     /// The path exists already.
     #[error("{} exists already; name another path, or remove it if no program serves there", path.display())]
-    Exists {
-        /// The path.
-        path: PathBuf,
-    },
+    Exists { path: PathBuf },
     /// The pseudo terminal cannot be made.
     #[error("failed to open a pseudo terminal at {}: {error}", path.display())]
     Pty {
         /// The path of the link.
         path: PathBuf,
-        /// Why.
         error: io::Error,
     },
     /// Waiting for events or setting up signals failed.

@@ -11,9 +11,7 @@ const MOST: usize = 60;
 pub enum Key {
     /// A character.
     Char(char),
-    /// Enter.
     Enter,
-    /// Escape.
     Escape,
     /// The key that takes the last character away.
     Backspace,
@@ -23,9 +21,7 @@ pub enum Key {
     Up,
     /// A row down.
     Down,
-    /// A page up.
     PageUp,
-    /// A page down.
     PageDown,
     /// To the first row.
     Home,

@@ -68,7 +68,6 @@ pub struct TopRow {
 /// Something that happened on the bench.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TopEvent {
-    /// What.
     pub what: String,
     /// Whether it is an error.
     pub is_error: bool,

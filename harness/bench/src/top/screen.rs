@@ -36,7 +36,6 @@ pub struct Screen {
 /// What came from the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScreenInput {
-    /// A key.
     Key(Key),
     /// Something by which the page changes: another size.
     Redraw,

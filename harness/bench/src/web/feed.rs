@@ -117,7 +117,6 @@ impl Feed {
     }
 }
 
-/// A reader.
 #[derive(Debug)]
 pub(crate) struct FeedReader {
     feed: Arc<Feed>,

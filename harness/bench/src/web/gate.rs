@@ -10,7 +10,6 @@ pub(super) const TOKEN: &str = "drivebench-token";
 /// What is asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Route {
-    /// The page.
     Page,
     /// The stream of events behind this one.
     Events(Option<u64>),

@@ -6,7 +6,6 @@ const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 const BODY: &str = include_str!("page.html");
 
-/// The page.
 pub(super) fn page() -> String {
     BODY.replacen("/*style*/", STYLE, 1)
         .replacen("/*script*/", SCRIPT, 1)

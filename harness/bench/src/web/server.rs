@@ -36,7 +36,6 @@ const STACK: usize = 256 << 10;
 /// An order of a page, and where its answer goes.
 #[derive(Debug)]
 pub(crate) struct AskedOrder {
-    /// What.
     pub order: LiveOrder,
     reply: SyncSender<Result<String, String>>,
 }

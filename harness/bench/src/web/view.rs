@@ -32,11 +32,9 @@ pub struct LiveScene {
 /// The picture of what the bus carries: time goes down.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LivePicture {
-    /// Its heading.
     pub heading: &'static str,
     /// How it is read, in some sentences.
     pub note: &'static str,
-    /// The columns.
     pub columns: Vec<String>,
     /// What a row of its own would stand for, where rows are [folded](LiveRow::fold): one, and many.
     pub folded: [&'static str; 2],
@@ -54,7 +52,6 @@ pub const ARROWS: [(char, &str); 3] = [
 /// A place for faults: a button of the page.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FaultPlace {
-    /// Its name.
     pub name: String,
     /// The column whose head is the button; `None` for a button above the picture.
     pub column: Option<usize>,
@@ -144,16 +141,12 @@ pub struct LiveCell(pub usize, pub String, pub char);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 pub enum LiveOrder {
-    /// A fault.
     Fault {
-        /// Which place.
         place: usize,
-        /// Which fault.
         fault: usize,
     },
     /// A conversation of the bench's own.
     Play {
-        /// Which.
         script: usize,
     },
 }

@@ -166,7 +166,6 @@ impl<'s> Generator<'s> {
         dice.below(usize::from(self.ring.drives)) as u8
     }
 
-    /// All of them.
     pub(crate) fn drives(&self) -> std::ops::Range<u8> {
         0..self.ring.drives
     }

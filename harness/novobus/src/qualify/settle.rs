@@ -251,7 +251,6 @@ fn written(tenths: u64) -> Duration {
 /// How well a model explains the bytes received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Explained {
-    /// All of it.
     Whole,
     /// The bits in the cell by which the drive reports that it is done differ; these are the model's.
     Cell(u8),

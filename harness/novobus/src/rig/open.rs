@@ -21,7 +21,6 @@ use std::sync::atomic::AtomicBool;
 /// Why a rig's ports cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OpenRigError {
-    /// A port.
     #[error(transparent)]
     Port(#[from] OpenError),
     /// No port, or several, fit what the file says of one.
@@ -30,7 +29,6 @@ pub(crate) enum OpenRigError {
     /// Another program uses a port.
     #[error("{port}: {error}")]
     Lock {
-        /// Which port.
         port: String,
         /// Why not.
         error: PortLockError,

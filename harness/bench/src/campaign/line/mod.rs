@@ -35,7 +35,6 @@ pub struct LineOutcome {
     pub case: String,
     /// The frame or telegram, counted from 1.
     pub place: u64,
-    /// The fault.
     pub fault: String,
     /// What was disturbed, as the bus writes it.
     pub disturbed: String,
@@ -52,7 +51,6 @@ pub struct LineOutcome {
 /// A campaign that was played.
 #[derive(Clone, Debug)]
 pub struct PlayedLine {
-    /// Its name.
     pub name: String,
     /// The name of its bus.
     pub bus: &'static str,

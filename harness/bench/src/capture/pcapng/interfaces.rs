@@ -27,7 +27,6 @@ pub(super) enum Packets {
     Serial,
     /// Octets alone.
     Octets,
-    /// A frame.
     Frames,
     /// A frame behind a header of Linux, which names its protocol, as do packets of any other network.
     Cooked,

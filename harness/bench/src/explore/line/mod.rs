@@ -36,9 +36,7 @@ use std::fmt::Debug;
 
 /// A bus whose drives share one line, as fuzz runs explore it.
 pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
-    /// The bus.
     const BUS: BusName;
-    /// Its manual.
     const MANUAL: Manual;
     /// The section whose table the scenario of a finding covers where the section of the finding has none.
     const USUAL_SECTION: &'static str;

@@ -33,7 +33,6 @@ pub struct LineTalk<B: LineBus> {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LineAct<W> {
-    /// What.
     pub what: W,
     /// How many times it happens, each with the time behind it.
     #[serde(default = "once", skip_serializing_if = "is_once")]

@@ -132,7 +132,6 @@ pub enum AdapterError {
         "{port} does not answer {command}: {expected} expected; check that it is one, and the rate of its serial line"
     )]
     Silent {
-        /// The port.
         port: String,
         /// What was asked.
         command: &'static str,
@@ -142,7 +141,6 @@ pub enum AdapterError {
     /// It answers something else.
     #[error("{port} is no {expected}: {received}")]
     Other {
-        /// The port.
         port: String,
         /// What should be there.
         expected: &'static str,
@@ -152,7 +150,6 @@ pub enum AdapterError {
     /// It refuses a command.
     #[error("{port} refuses {what}: {remedy}")]
     Refused {
-        /// The port.
         port: String,
         /// What it refuses.
         what: String,

@@ -16,7 +16,6 @@ const SCRIPT: &str = include_str!("script.js");
 /// A part of a section that is left out where the page would become too long.
 #[derive(Clone, Debug)]
 pub struct FoldedPart {
-    /// Its heading.
     pub heading: String,
     /// What stands below it.
     pub html: Html,
@@ -27,7 +26,6 @@ pub struct FoldedPart {
 /// A section of a page.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Its heading.
     pub heading: String,
     /// Its name in the page's addresses: letters, digits and `-`.
     pub id: String,

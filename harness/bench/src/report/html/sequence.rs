@@ -10,7 +10,6 @@ const COLUMN: usize = 110;
 const ROW: usize = 22;
 const TOP: usize = 34;
 
-/// An arrow.
 #[derive(Clone, Debug)]
 pub struct Arrow {
     /// When it arrived.

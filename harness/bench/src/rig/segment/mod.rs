@@ -111,7 +111,6 @@ pub trait SegmentRun {
 /// An attempt judged again from its record.
 #[derive(Clone, Debug)]
 pub struct RepeatedVerdict {
-    /// Its outcome.
     pub outcome: Outcome,
     /// What was received before the scenario, in words.
     pub before: Option<String>,

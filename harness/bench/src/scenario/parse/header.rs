@@ -20,7 +20,6 @@ pub const WORDS: [&str; 6] = ["title", "source", "bus", "needs", "strict", "dead
 /// How much of a scenario must be there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// All of it.
     Whole,
     /// Any lines of a header; steps may follow.
     Header,

@@ -97,9 +97,7 @@ pub enum PlannedWhen {
 /// A time from, to, and how exact they are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedWindow {
-    /// From.
     pub from: Span,
-    /// To.
     pub to: Span,
     /// Half a unit of the last digit written, for an exact time; zero for a window.
     pub tolerance: Span,

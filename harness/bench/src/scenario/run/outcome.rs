@@ -19,7 +19,6 @@ const NOTHING_JUDGED: &str =
 /// The outcome of a scenario.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The verdict.
     pub verdict: Verdict,
     /// The first thing that was not as a step says; playing stops there.
     pub finding: Option<Mismatch>,

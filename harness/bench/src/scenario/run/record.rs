@@ -11,11 +11,9 @@ pub const MAX_SAMPLES: usize = 1_000_000;
 pub struct CellRecord {
     /// In which ring, counted from 0.
     pub ring: usize,
-    /// Of which drive.
     pub drive: u8,
     /// The cell as the scenario names it.
     pub name: String,
-    /// Its address.
     pub address: u16,
     /// How many bytes.
     pub size: usize,

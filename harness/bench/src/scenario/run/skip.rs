@@ -61,7 +61,6 @@ pub enum Unlock {
     LineErrors,
     /// Rings with these numbers of drives, each from the first to the second.
     Rings(Vec<(u8, u8)>),
-    /// A second ring.
     SecondRing,
     /// Drives that are simulated in the program.
     Simulated,

@@ -14,7 +14,6 @@ pub struct Scenario<L: Language> {
     pub title: String,
     /// The tables of which manuals it pins.
     pub sources: Vec<Citation>,
-    /// Which bus.
     pub bus: BusName,
     /// The header lines of the bus.
     pub header: L::Header,
@@ -65,7 +64,6 @@ pub struct ScenarioHead {
     pub title: String,
     /// The tables of which manuals it pins.
     pub sources: Vec<Citation>,
-    /// Which bus.
     pub bus: BusName,
     /// How many steps are written.
     pub steps: usize,
@@ -82,7 +80,6 @@ pub struct Citation {
     pub span: TextSpan,
 }
 
-/// A step.
 #[derive(Clone, Debug)]
 pub struct Step<L: Language> {
     /// The time in front.
@@ -122,14 +119,12 @@ pub enum Action<L: Language> {
     Send {
         /// On which port of the bench, counted from 0.
         port: usize,
-        /// What.
         message: L::Message,
     },
     /// `<`: the master receives.
     Receive {
         /// On which port of the bench, counted from 0.
         port: usize,
-        /// What.
         message: L::Message,
     },
     /// `wait`: time passes.

@@ -48,7 +48,6 @@ struct Seat {
     leaves: Option<Instant>,
 }
 
-/// A client.
 #[derive(Debug)]
 struct Client {
     session: Session,
@@ -77,7 +76,6 @@ impl<B: SharedBus> FrameServer<B> {
         }
     }
 
-    /// The bus.
     pub const fn bus(&mut self) -> &mut B {
         &mut self.bus
     }

@@ -472,7 +472,6 @@ fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
 struct Before {
     /// In which ring, counted from 0.
     ring: usize,
-    /// Of which drive.
     drive: u8,
     /// Which cell.
     address: u16,
