@@ -30,7 +30,7 @@ impl Spread {
     }
 }
 
-/// A part: number `number` of `of`, with 1 <= `number` <= `of` <= [`MOST_PARTS`].
+/// A part: number `number` of `of`, with 1 <= `number` <= `of` <= `MOST_PARTS`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Partition {
     /// How items are dealt out.

@@ -1,6 +1,6 @@
 //! SLCAN: CAN frames as lines of characters over a serial line, as in the manuals of LAWICEL's CAN232 and CANUSB adapters.
 //!
-//! The host sends [`SlcanCommand`]s, each ended by CR. The adapter answers each with CR (done) or BEL (refused), most reads with a line of
+//! The host sends `SlcanCommand`s, each ended by CR. The adapter answers each with CR (done) or BEL (refused), most reads with a line of
 //! their own, and sends the frames of the bus as [`Report`]s between the answers.
 //!
 //! | command | meaning |
@@ -362,7 +362,7 @@ impl Lines {
     /// Takes a character; gives the line that it ends, and the end.
     ///
     /// # Errors
-    /// The line is longer than [`MAX_LINE`]; it is dropped.
+    /// The line is longer than `MAX_LINE`; it is dropped.
     pub fn push(&mut self, character: u8) -> Option<Result<(Vec<u8>, u8), BadMessage>> {
         match character {
             CR | BEL => {

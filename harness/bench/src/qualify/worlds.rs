@@ -4,7 +4,7 @@
 //! clock stands anywhere against that of the computer, so a world keeps an interval for the difference. Each piece that came removes the
 //! worlds that could not have sent it then. If none is left, no right drive has sent this.
 //!
-//! Worlds that do the same from now on are merged. There are at most [`MOST_WORLDS`]: where that is not enough, nothing is accused.
+//! Worlds that do the same from now on are merged. There are at most `MOST_WORLDS`: where that is not enough, nothing is accused.
 
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, VecDeque};

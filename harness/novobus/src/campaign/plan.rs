@@ -35,7 +35,7 @@ pub struct TooMany(pub u64);
 /// The cases of a campaign, in order of links, bytes and kinds.
 ///
 /// # Errors
-/// There are more than [`MAX_CASES`].
+/// There are more than `MAX_CASES`.
 pub fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults>, TooMany> {
     let singles = singles(file, shape);
     let groups = match file.pairs {

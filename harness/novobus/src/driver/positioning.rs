@@ -25,7 +25,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// [`Error::InReset`], [`Error::DriveError`]; [`Error::Interrupted`] by a stop or a block, then `ps_v0` is as
-    /// before, where the [line permits it](Self::restore_ps_v0); others see [`Error`].
+    /// before, where the line permits it; others see [`Error`].
     #[doc(alias = "NB_Referenzfahrt")]
     pub fn reference(&self, axis: Axis) -> Result<(), Error> {
         self.reference_showing(axis, |_| {})

@@ -1,6 +1,6 @@
 //! What the bytes on one link of a ring are, as the receiver of that link reads them (ND21 9.1 to 9.8, 10).
 //!
-//! An [`Observer`] sees only the bytes of its own link, as a tap does. Its place in the ring follows from the drives at the ends of the
+//! An `Observer` sees only the bytes of its own link, as a tap does. Its place in the ring follows from the drives at the ends of the
 //! link: each drive adds 1 to an address byte (9.3), so behind drive K the byte is `drive - K`. Behind the addressed drive, a command has
 //! become its answer (9.5).
 

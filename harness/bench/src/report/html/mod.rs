@@ -1,7 +1,7 @@
 //! One page of HTML for people: what was played, the outcome, and pictures of it.
 //!
 //! A page is self-contained: it includes its style, script and pictures and loads nothing (its own `Content-Security-Policy`
-//! forbids it). Without scripts, pictures and tables are still shown. It never has more than [`MAX_PAGE`] bytes: if a run has
+//! forbids it). Without scripts, pictures and tables are still shown. It never has more than `MAX_PAGE` bytes: if a run has
 //! more to show, the most serious sections come first, and the page says what was left out.
 //!
 //! | file | what it makes |
