@@ -63,7 +63,7 @@ impl Attempt {
     /// Whether its steps were played: the drives were ready for them.
     #[must_use]
     pub fn was_played(&self) -> bool {
-        self.outcome.unready.is_none()
+        self.outcome.unready.is_none() && self.outcome.verdict != Verdict::Skipped
     }
 
     /// Why the drives could not be made ready, where a drive gave no answer: the computer may have been the cause.

@@ -21,9 +21,29 @@ pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'
 /// A parameter that may have been written: station, number and IND.
 pub(super) type Written = (u8, u16, u16);
 
+/// A telegram of the bench, and what came behind it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Turn {
+    /// The step of the scenario that has sent it; `None` for what made the slaves ready.
+    pub(super) step: Option<usize>,
+    pub(super) octets: Vec<u8>,
+    /// Its last octet has left then, if the computer was not late.
+    pub(super) left: Instant,
+    /// The octets that came, each with bit 8 where it has a line error.
+    pub(super) came: Vec<u16>,
+    /// When the last of them was read.
+    pub(super) read: Option<Instant>,
+}
+
 /// What was noted.
 #[derive(Default)]
 pub(super) struct TelegramNotes {
+    /// The telegrams since the last [`begin_fresh`](Self::begin_fresh), in one time.
+    pub(super) turns: Vec<Turn>,
+    /// The present step of the scenario.
+    step: Option<usize>,
+    /// How long the conversations before this one took since then, and how long this one has.
+    took: [Span; 2],
     /// The parameters that telegrams may have written.
     pub(super) written: BTreeSet<Written>,
     /// The addresses that telegrams may have given to stations: the station, and its new one.
@@ -132,10 +152,17 @@ impl Came {
 
 impl TelegramNotes {
     /// What comes from now on does not depend on what the slaves have done before.
-    pub(super) const fn begin_fresh(&mut self) {
+    pub(super) fn begin_fresh(&mut self) {
         self.fresh = self.kept.len();
         self.sent = 0;
         self.last = None;
+        self.turns = Vec::new();
+        self.step = None;
+    }
+
+    /// This time is reached.
+    pub(super) fn reach(&mut self, now: Instant) {
+        self.took[1] = self.took[1].max(now.since_start());
     }
 
     /// The link ends with the first octet behind the first `behind` ones that is not that of `came`: how far they agree is known then.
@@ -197,6 +224,16 @@ impl LinkNotes for TelegramNotes {
         self.last = Some(end);
         self.asked = Some(end);
         self.reply.clear();
+        if self.kept.len() < MOST_KEPT {
+            self.turns.push(Turn {
+                step: self.step,
+                octets: what.octets().to_vec(),
+                left: end + self.took[0],
+                came: Vec::new(),
+                read: None,
+            });
+        }
+        self.reach(end);
         let telegram = Telegram::decode(what.octets()).value();
         let Some(pdu) = telegram.as_ref().and_then(Telegram::pdu) else {
             return;
@@ -236,6 +273,14 @@ impl LinkNotes for TelegramNotes {
                 bits: u16::from(octet.byte) | error,
             });
             self.compare();
+            if let Some(turn) = self.turns.last_mut() {
+                turn.came.push(u16::from(octet.byte) | error);
+                turn.read = Some(now + self.took[0]);
+            }
+            self.reach(now);
+        } else if self.kept.len() == MOST_KEPT {
+            // Its reply is not whole.
+            let _cut = self.turns.pop();
         }
         self.heard.pieces += 1;
         let bits = u32::from(octet.byte) | u32::from(octet.error.is_some()) << 8;
@@ -254,7 +299,13 @@ impl LinkNotes for TelegramNotes {
         self.differs.as_ref()
     }
 
+    fn step(&mut self, place: usize) {
+        self.step = Some(place);
+    }
+
     fn begin(&mut self) {
+        let took = std::mem::take(&mut self.took[1]);
+        self.took[0] = self.took[0] + took;
         self.last = None;
         self.asked = None;
         self.reply.clear();

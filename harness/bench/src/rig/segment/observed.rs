@@ -17,6 +17,9 @@ pub trait LinkNotes: Default + Send {
     /// Something came over this medium at `at`, and was read at `now`.
     fn heard(&mut self, medium: Medium, at: Instant, now: Instant, heard: Heard);
 
+    /// A step of a scenario begins, at this place of its text.
+    fn step(&mut self, _place: usize) {}
+
     /// A conversation begins.
     fn begin(&mut self);
 
@@ -279,6 +282,7 @@ impl<N: LinkNotes> Link for Observed<'_, N> {
     }
 
     fn step(&mut self, place: usize) {
+        self.noted.step(place);
         self.link.step(place);
     }
 

@@ -150,7 +150,13 @@ impl<L: Language> Runner<'_, L> {
     fn step(&mut self, step: &PlannedStep<L>) -> Result<(), Stop> {
         self.link.step(step.span.start);
         if let PlannedAction::Receive(ring, expected) = &step.action {
-            return self.receive(step, *ring, expected);
+            let received = self.receive(step, *ring, expected);
+            if received.is_err() && self.at_mismatch == AtMismatch::GoOn {
+                // The next line is about what comes behind it.
+                self.settle();
+                self.forget(*ring);
+            }
+            return received;
         }
         let in_time = self.pass_until_due(step);
         if in_time.is_err() && self.at_mismatch == AtMismatch::Stop {

@@ -1,27 +1,22 @@
 //! Whether a line that was not met accuses a slave.
 
+use super::note::kind;
 use super::rehearse::Other;
+use super::worlds::{Differs, right_slaves_send};
 use super::{Left, Own, Player};
 use crate::rig::known::value_of;
-use crate::rig::observed::Came;
+use crate::rig::observed::{Came, Turn};
 use crate::rig::settle::{Assumed, search};
 use crate::rig::talk::TalkError;
-use harness_bench::rig::segment::observed::LinkTimes;
+use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
-use harness_bench::scenario::run::outcome::Unready;
+use harness_bench::scenario::run::outcome::{Mismatch, Unready};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
-
-/// How many of these octets are a telegram; all of them where they do not begin with one.
-fn telegram(octets: &[u8]) -> usize {
-    match Telegram::decode(octets) {
-        Decoded::Value { used, .. } => used,
-        _ => octets.len(),
-    }
-}
+use std::collections::BTreeSet;
 
 impl Player {
     /// The outcome where the slaves could not be made ready.
@@ -56,35 +51,59 @@ impl Player {
         }
     }
 
-    /// Whether a line that was not met accuses the slave.
+    /// Whether a line that was not met accuses the slave; behind an adapter, whether anything that it sent does.
     pub(super) fn judged(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+        let judged = [Verdict::Passed, Verdict::Failed].contains(&outcome.verdict);
+        if left.way.tolerance > Span::ZERO && judged {
+            return self.judged_by_times(own, outcome, left);
+        }
         if outcome.verdict != Verdict::Failed {
             return outcome.judged_by(&own.plan);
         }
-        let way = left.way;
-        let late = way.late.max(way.longest);
-        let why = if way.tolerance == Span::ZERO {
-            self.explained(own, left).map(|with| {
-                format!("a right slave with {with} does the same, and this is not known")
-            })
-        } else if late > way.tolerance {
-            Some(format!(
-                "the computer or the adapter was late by {late}: this may not be the slave's fault"
-            ))
-        } else {
-            self.left_open(own, way, left.switches).map(|property| {
-                format!(
-                    "a right slave with {property} does not meet it either, and this is not known"
-                )
-            })
-        };
-        match why {
+        match self.explained(own, left) {
             None => outcome,
-            Some(why) => Outcome {
+            Some(with) => Outcome {
                 verdict: Verdict::Inconclusive,
-                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
+                remarks: std::iter::once(format!(
+                    "a right slave with {with} does the same, and this is not known"
+                ))
+                .chain(outcome.remarks)
+                .collect(),
                 ..outcome
             },
+        }
+    }
+
+    /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
+    fn judged_by_times(&self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+        let turns = &left.turns;
+        let sent = right_slaves_send(self.known(), self.rate, turns, &self.beats);
+        if let Err(differs) = sent {
+            return accused(outcome, &differs, turns);
+        }
+        let Some(finding) = &outcome.finding else {
+            return outcome;
+        };
+        let late = left.way.late.max(left.way.longest);
+        let other = Other {
+            switches: left.switches,
+            ..Other::default()
+        };
+        let shown = || kinds(turns) == kinds(&self.rehearse(own, &self.limits, other).turns);
+        if late > left.way.tolerance && !shown() {
+            let remark = format!(
+                "the computer or the adapter was late by {late}: the slaves are right in what they sent, and the scenario was not shown"
+            );
+            return Outcome::not_ready(Verdict::Inconclusive, Unready::NoAnswer, remark);
+        }
+        let message = &finding.message;
+        let remark =
+            format!("{message}: a right slave sends this at the time at which it was asked");
+        Outcome {
+            verdict: Verdict::Passed,
+            finding: None,
+            remarks: std::iter::once(remark).chain(outcome.remarks).collect(),
+            ..outcome
         }
     }
 
@@ -136,51 +155,63 @@ impl Player {
         }
         Some(words.join(", "))
     }
+}
 
-    /// A difference from the model with which a right slave does not meet the scenario either: another value of a point that the manual leaves
-    /// open, or times at which telegrams leave.
-    fn left_open(&self, own: &Own, way: LinkTimes, switches: bool) -> Option<String> {
-        let fails = |other: Other<'_>| {
-            let other = Other { switches, ..other };
-            !self.rehearse(own, &self.limits, other).passes()
-        };
-        for slow in way.slow() {
-            let other = Other {
-                slow: Some(slow),
-                ..Other::default()
+/// A reply that no right slave sends.
+fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
+    let turn = turns.get(differs.turn);
+    let came: Vec<u8> = turn.map_or(Vec::new(), |own| {
+        own.came.iter().map(|own| *own as u8).collect()
+    });
+    let asked = turn.map_or(Vec::new(), |own| own.octets.clone());
+    let message = format!(
+        "the slave replies {} to {}, where a right one sends {}, or the same at another time that the record allows",
+        hex(&came),
+        hex(&asked),
+        hex(&differs.wanted)
+    );
+    let finding = match outcome.finding {
+        Some(own) => own,
+        None => {
+            let place = turn.and_then(|own| own.step).unwrap_or_default();
+            let span = TextSpan {
+                start: place,
+                end: place,
             };
-            if fails(other) {
-                return Some(format!(
-                    "an adapter through which telegrams leave {} late",
-                    slow.by
-                ));
+            Mismatch {
+                span,
+                message: message.clone(),
+                difference: None,
+                in_error: String::new(),
             }
         }
-        if let Some(slow) = way.in_parts(telegram) {
-            let other = Other {
-                slow: Some(slow),
-                ..Other::default()
-            };
-            if fails(other) {
-                return Some(
-                    "an adapter or a server that makes a pause behind a telegram".to_owned(),
-                );
-            }
-        }
-        let base: Assumed = self.known().iter().map(|own| own.properties).collect();
-        for (place, known) in self.known().iter().enumerate() {
-            for (words, properties) in &known.open {
-                let mut all = base.clone();
-                all[place] = *properties;
-                let other = Other {
-                    properties: Some(&all),
-                    ..Other::default()
-                };
-                if fails(other) {
-                    return Some(words.clone());
-                }
-            }
-        }
-        None
+    };
+    Outcome {
+        verdict: Verdict::Failed,
+        finding: Some(finding),
+        remarks: std::iter::once(message).chain(outcome.remarks).collect(),
+        ..outcome
     }
+}
+
+/// Octets in words.
+fn hex(octets: &[u8]) -> String {
+    if octets.is_empty() {
+        return "nothing".to_owned();
+    }
+    let all: Vec<_> = octets.iter().map(|own| format!("{own:02X}")).collect();
+    all.join(" ")
+}
+
+/// The kinds of replies in a scenario: who sends what, and the states of the slaves, without what follows a motor or a clock.
+fn kinds(turns: &[Turn]) -> BTreeSet<String> {
+    let played = turns.iter().filter(|own| own.step.is_some());
+    let kinds = played.map(|turn| {
+        let octets: Vec<u8> = turn.came.iter().map(|own| *own as u8).collect();
+        match Telegram::decode(&octets) {
+            Decoded::Value { value, used } if used == octets.len() => kind(&value),
+            _ => hex(&octets),
+        }
+    });
+    kinds.collect()
 }

@@ -10,6 +10,7 @@ mod note;
 mod ready;
 mod rehearse;
 mod unlock;
+mod worlds;
 
 pub(crate) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
 pub(super) use ready::idle;
@@ -17,7 +18,7 @@ pub(super) use rehearse::Begun;
 
 use super::RigSlave;
 use super::known::{INTERFACE, Known};
-use super::observed::{Came, Observed, Written};
+use super::observed::{Came, Observed, Turn, Written};
 use super::profile::Profiled;
 use super::settle;
 use super::talk::{Talk, TalkError};
@@ -90,6 +91,8 @@ struct Left {
     switches: bool,
     /// Whether the slaves sent anything.
     heard: bool,
+    /// The telegrams of the bench, with what came behind each.
+    turns: Vec<Turn>,
 }
 
 /// Plays attempts, on a rig or on a record, and judges them.
@@ -237,6 +240,7 @@ impl Player {
             came: link.noted.came(),
             switches,
             heard: link.noted.len() > 0,
+            turns: std::mem::take(&mut link.noted.turns),
         };
         let outcome = match gone {
             AttemptCourse::Unanswered(error) => self.unanswered(own, &error, &left),
@@ -305,9 +309,15 @@ impl Player {
         if let Err(error) = ready {
             return (AttemptCourse::Unanswered(error), switches);
         }
+        link.noted.reach(link.now());
         link.begin();
         link.take_late();
-        let outcome = play(&own.plan, link, AtMismatch::Stop);
+        // Behind an adapter a line that is not met may be that of a right slave which was asked at another time.
+        let at_mismatch = match link.time_tolerance() {
+            Span::ZERO => AtMismatch::Stop,
+            _ => AtMismatch::GoOn,
+        };
+        let outcome = play(&own.plan, link, at_mismatch);
         (AttemptCourse::Played(Box::new(outcome)), switches)
     }
 

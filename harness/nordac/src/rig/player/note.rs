@@ -3,9 +3,10 @@
 //! Where time is virtual, an attempt is explained by a model that ends it in the same way, at the same line, and sends the same octets at the
 //! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
 
+use super::worlds::{could_send, drive, right_slaves_send};
 use super::{AttemptCourse, Own, Player};
 use crate::rig::known::{INTERFACE, Known, Values, stated};
-use crate::rig::observed::{Agreement, Came, Observed, WHOLE};
+use crate::rig::observed::{Agreement, Came, Observed, Turn, WHOLE};
 use crate::rig::settle::{Assumed, search};
 use crate::rig::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
@@ -16,8 +17,8 @@ use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::nordac::words::zsw;
 use harness_proto::nordac::{Image, Parameter, PpoType};
-use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::Service;
+use harness_proto::profibus::{Pdu, Telegram};
 use harness_proto::time::Span;
 use harness_sim::nordac::deviation::Deviation;
 use std::collections::BTreeMap;
@@ -46,6 +47,8 @@ pub(crate) struct AttemptNote {
     /// Whether the settings of the bus were switched to those of the scenario.
     switches: bool,
     shown: AttemptShown,
+    /// Where time is real, the telegrams of the bench with what came behind each.
+    turns: Vec<Turn>,
     /// The verdict.
     pub(crate) verdict: Verdict,
     /// Whether the slaves did something that no right slave does, as far as is known.
@@ -104,6 +107,34 @@ impl AttemptShown {
     }
 }
 
+/// The kind of a telegram: without what follows a motor or a clock.
+pub(super) fn kind(telegram: &Telegram) -> String {
+    let (head, contents) = meaning(telegram);
+    // The value of a parameter and the direction of a motor.
+    match telegram.pdu().and_then(image) {
+        None => format!("{head} {contents}"),
+        Some(image) => {
+            let state = image.first() & !(FOLLOWS | zsw::CLOCKWISE | zsw::ANTICLOCKWISE);
+            format!(
+                "{head} {:04X} {:04X} {state:04X}",
+                image.pkw.pke, image.pkw.ind
+            )
+        }
+    }
+}
+
+/// What follows a motor in a status word.
+const FOLLOWS: u16 = zsw::AT_SETPOINT | zsw::REFERENCE;
+
+/// The inputs that a reply carries.
+fn image(pdu: &Pdu) -> Option<Image> {
+    let exchanged = Service::of(pdu.ssap()) == Some(Service::DataExchange);
+    let ppo = PpoType::ALL
+        .into_iter()
+        .find(|own| own.octets() == pdu.data().len());
+    Image::decode(ppo.filter(|_| exchanged)?, pdu.data())
+}
+
 /// The addresses and the service of a telegram, and its contents without what follows a motor.
 fn meaning(telegram: &Telegram) -> (String, String) {
     let Some(pdu) = telegram.pdu() else {
@@ -111,19 +142,9 @@ fn meaning(telegram: &Telegram) -> (String, String) {
     };
     let (sa, fc, sap) = (pdu.sa(), pdu.fc().0, pdu.ssap());
     let head = format!("{sa} {fc:02X} {sap:?} {}", pdu.data().len());
-    let exchanged = Service::of(sap) == Some(Service::DataExchange);
-    let ppo = PpoType::ALL
-        .into_iter()
-        .find(|own| own.octets() == pdu.data().len());
-    let image = ppo
-        .filter(|_| exchanged)
-        .and_then(|ppo| Image::decode(ppo, pdu.data()));
-    let contents = match image {
+    let contents = match image(pdu) {
         None => format!("{:02X?}", pdu.data()),
-        Some(image) => {
-            let follows = zsw::AT_SETPOINT | zsw::REFERENCE;
-            format!("{} {:04X}", image.pkw, image.first() & !follows)
-        }
+        Some(image) => format!("{} {:04X}", image.pkw, image.first() & !FOLLOWS),
     };
     (head, contents)
 }
@@ -131,7 +152,11 @@ fn meaning(telegram: &Telegram) -> (String, String) {
 impl AttemptNote {
     /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
-        self.verdict = outcome.verdict;
+        // What was not shown is shown by another attempt, or not at all.
+        self.verdict = match outcome.unready {
+            Some(_) if self.shown.ended.is_some() => Verdict::Skipped,
+            _ => outcome.verdict,
+        };
         let unready = self.shown.unanswered.is_some() && self.telegrams > 0;
         self.accuses = outcome.verdict == Verdict::Failed || unready && !self.exact;
     }
@@ -220,6 +245,9 @@ impl AttemptNote {
 
     /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read.
     pub(crate) fn is_explained_by(&self, other: Other, held: &Values) -> bool {
+        if !self.exact && self.shown.ended.is_some() {
+            return self.could_be_sent_by(other, held);
+        }
         let base: Assumed = self.slaves.iter().map(|own| own.properties).collect();
         if let Other::WrongSlave(..) = other {
             return self.shown_by(other, &base, held) == self.shown;
@@ -241,6 +269,23 @@ impl AttemptNote {
             self.shown_by(other, all, held).agrees(&self.shown)
         });
         !found.is_empty()
+    }
+
+    /// Whether slaves that differ so could have sent what came where time is real.
+    fn could_be_sent_by(&self, other: Other, held: &Values) -> bool {
+        let Other::WrongSlave(place, deviation) = other else {
+            let beats = &self.begun.beats;
+            return right_slaves_send(&self.slaves, self.begun.rate, &self.turns, beats).is_ok();
+        };
+        let slaves = self.slaves.iter().enumerate().map(|(own, known)| {
+            let mut slave = known.model(known.properties);
+            if own == place {
+                slave.deviation = Some(deviation);
+                slave.parameters.extend(stated(held));
+            }
+            drive(&slave)
+        });
+        could_send(slaves.collect(), self.begun.rate, &self.turns).is_ok()
     }
 
     /// What the attempt shows on models.
@@ -321,6 +366,10 @@ impl Player {
             slaves: self.known.as_ref().unwrap_or(&self.partly).clone(),
             switches,
             shown: AttemptShown::of(gone, link, exact),
+            turns: match exact {
+                true => Vec::new(),
+                false => link.noted.turns.clone(),
+            },
             exact,
             verdict: Verdict::Skipped,
             accuses: false,

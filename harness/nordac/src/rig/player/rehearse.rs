@@ -5,7 +5,7 @@ use super::{Own, Player};
 use crate::language::syntax;
 use crate::rig::MASTER;
 use crate::rig::known::value_of;
-use crate::rig::observed::{Came, Observed, Written};
+use crate::rig::observed::{Came, Observed, Turn, Written};
 use crate::rig::settle::Assumed;
 use crate::rig::talk::TalkError;
 use crate::simulate::Bench;
@@ -76,6 +76,8 @@ pub(super) struct Rehearsal {
     written: BTreeSet<Written>,
     /// What came from the first telegram on that makes the slaves ready.
     pub(super) came: Came,
+    /// The telegrams of the bench, with what came behind each.
+    pub(super) turns: Vec<Turn>,
 }
 
 impl Rehearsal {
@@ -317,6 +319,7 @@ impl Player {
             }
         };
         let came = observed.noted.came();
+        let turns = std::mem::take(&mut observed.noted.turns);
         let moved = std::mem::take(&mut observed.noted.moved);
         let written = std::mem::take(&mut observed.noted.written);
         let faulted = self.known().iter().map(|own| own.slave.address);
@@ -339,6 +342,7 @@ impl Player {
             moved,
             written,
             came,
+            turns,
         }
     }
 

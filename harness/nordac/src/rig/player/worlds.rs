@@ -1,0 +1,560 @@
+//! Whether slaves could have sent what came behind an adapter.
+//!
+//! They are played again with every telegram of the bench. When a telegram has reached them is not known exactly: not before it had left the
+//! bench, and not behind the time at which its reply was read. Slaves could have sent what came if for every telegram there is such a time with
+//! which they send these very octets. So nothing is excused because it is late, and where a motor moves the reply says itself when it was asked.
+
+use crate::rig::known::Known;
+use crate::rig::observed::{Agreement, Turn, WHOLE};
+use crate::rig::settle::{Assumed, search};
+use crate::simulate::SlaveSetup;
+use harness_bench::rig::segment::observed::Beats;
+use harness_proto::decode::Decoded;
+use harness_proto::line::Received;
+use harness_proto::nordac::properties::Description;
+use harness_proto::nordac::words::zsw;
+use harness_proto::nordac::{Image, PpoType};
+use harness_proto::profibus::dp::Service;
+use harness_proto::profibus::rate::SYN_BITS;
+use harness_proto::profibus::{BusRate, Pdu, Telegram};
+use harness_proto::time::{Instant, Span};
+use harness_sim::nordac::deviation::Deviant;
+use harness_sim::octet_segment::LineStation;
+
+/// How exact the times of a right inverter are: one may look at its words and move its ramp in a cycle.
+const CYCLE: Span = Span::from_millis(20);
+
+/// How long an actual value stands at most where another one of the same motor changes.
+const MOMENT: Span = Span::from_millis(1);
+
+/// Parameters that follow a motor: the past faults with their frequencies, and the present one (5.7).
+const FOLLOWING: [u16; 6] = [1801, 1802, 1803, 1804, 1805, 1813];
+
+/// The rate at which the slaves hear: a stream may hand a telegram over at once, whatever the rate of the line.
+const HEARD_AT: BusRate = BusRate::K1500;
+
+/// How long before the first telegram the slaves were switched on.
+const SWITCHED_ON: Span = Span::from_millis(10_000);
+
+/// The most times in one window at which slaves do something by themselves that are looked at.
+const MOST_EVENTS: usize = 16;
+
+/// How often a window is halved in search of a time: behind so many halves of an hour a window is shorter than a bit.
+const HALVES: usize = 48;
+
+/// Where the slaves differ from what came.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Differs {
+    /// Behind which telegram, counted from 0.
+    pub(super) turn: usize,
+    /// What they send if the telegram has reached them at once.
+    pub(super) wanted: Vec<u8>,
+    /// How many octets of it came.
+    agreed: usize,
+}
+
+/// Whether right slaves of which this is `known`, with some values of the points that are not settled of them, could have sent what came.
+///
+/// # Errors
+/// Where the slaves as they are known differ.
+pub(super) fn right_slaves_send(
+    known: &[Known],
+    rate: BusRate,
+    turns: &[Turn],
+    beats: &Beats,
+) -> Result<(), Differs> {
+    let send = |all: &Assumed| {
+        beats.beat();
+        let slaves = known.iter().zip(all);
+        let slaves = slaves.map(|(known, own)| drive(&known.model(*own)));
+        could_send(slaves.collect(), rate, turns)
+    };
+    let base: Assumed = known.iter().map(|own| own.properties).collect();
+    let first = send(&base);
+    if first.is_ok() {
+        return first;
+    }
+    let may = |place: usize, property: &Description| !known[place].is_settled(property);
+    match search(&base, may, |all| agreement(&send(all))).is_empty() {
+        true => first,
+        false => Ok(()),
+    }
+}
+
+/// A slave as it is played.
+pub(super) fn drive(slave: &SlaveSetup) -> Deviant {
+    slave.drive(HEARD_AT, Instant::START)
+}
+
+/// How far slaves send what came.
+fn agreement(found: &Result<(), Differs>) -> Agreement {
+    match found {
+        Ok(()) => WHOLE,
+        Err(own) => own.turn * 1024 + own.agreed.min(1023),
+    }
+}
+
+/// Plays slaves that were just switched on with the telegrams of the bench. What came before the scenario is not compared.
+///
+/// # Errors
+/// The first reply that they cannot have sent.
+pub(super) fn could_send(
+    slaves: Vec<Deviant>,
+    rate: BusRate,
+    turns: &[Turn],
+) -> Result<(), Differs> {
+    let mut world = World {
+        slaves,
+        rate,
+        free: Instant::START,
+        ahead: (0, 0),
+        owed: Vec::new(),
+        actual: None,
+    };
+    for (number, turn) in turns.iter().enumerate() {
+        let next = turns.get(number + 1);
+        world = world.takes(number, turn, next)?;
+    }
+    match world.owed.is_empty() {
+        true => Ok(()),
+        false => Err(Differs {
+            turn: turns.len().saturating_sub(1),
+            wanted: world.owed,
+            agreed: 0,
+        }),
+    }
+}
+
+/// Slaves as they may be.
+#[derive(Clone)]
+struct World {
+    slaves: Vec<Deviant>,
+    rate: BusRate,
+    /// When the last octet had passed.
+    free: Instant,
+    /// By how much the time of the slaves is ahead of the bench's, at least and at most, in units.
+    ahead: (i64, i64),
+    /// What they have sent and the bench has not read: a computer that stood still reads it behind its next telegram.
+    owed: Vec<u8>,
+    /// The actual value that came last.
+    actual: Option<i16>,
+}
+
+/// A time that is later by so many units, or earlier.
+fn moved(at: Instant, units: i64) -> Instant {
+    let span = Span::from_units(units.unsigned_abs());
+    if units < 0 { at - span } else { at + span }
+}
+
+/// By how much one time is behind another one, in units.
+fn behind(at: Instant, before: Instant) -> i64 {
+    let units = |span: Span| i64::try_from(span.units()).unwrap_or(i64::MAX);
+    units(at.since(before)) - units(before.since(at))
+}
+
+impl World {
+    /// The slaves behind a telegram and what came to it.
+    fn takes(&self, number: usize, turn: &Turn, next: Option<&Turn>) -> Result<Self, Differs> {
+        let octets = turn.octets.len() as u64;
+        let length = self.rate.octet_time() * octets;
+        let idle = HEARD_AT.bit_time() * SYN_BITS;
+        let least = self.free + idle + HEARD_AT.octet_time() * octets;
+        let left = turn.left + SWITCHED_ON;
+        // A stream is not as slow as a line.
+        let from = left - length;
+        let read = turn.read.or(next.map(|own| own.left));
+        let until = read.map_or(left, |own| (own + SWITCHED_ON).max(left));
+        let soon = left.max(least);
+        let (mut world, reply) = self.hears(&turn.octets, soon);
+        if turn.step.is_none() {
+            world.owed.clear();
+            world.ahead = (behind(soon, until), behind(soon, from));
+            return Ok(world);
+        }
+        let first = moved(from - CYCLE, self.ahead.0).max(least);
+        let last = moved(until + CYCLE, self.ahead.1).max(first);
+        let found = match self.sends(&reply, turn) {
+            true => Some((soon, world.clone())),
+            false => self
+                .at_any_time(turn, [first, soon.clamp(first, last), last], least)
+                .or_else(|| self.in_parts(turn, soon)),
+        };
+        if let Some((at, mut world)) = found {
+            // Times count from the last reply on that does not depend on its time.
+            let (_, late) = self.hears(&turn.octets, last);
+            if self.sends(&late, turn) {
+                world.ahead = (behind(at, until), behind(at, from));
+            }
+            world.owed.clear();
+            world.actual = actual(&turn.came).or(self.actual);
+            return Ok(world);
+        }
+        let sent = [&self.owed[..], &reply].concat();
+        let came: Vec<u8> = turn.came.iter().map(|own| *own as u8).collect();
+        if next.is_some() && sent.starts_with(&came) && turn.came.iter().all(|own| *own < 0x100) {
+            world.owed = sent[came.len()..].to_vec();
+            return Ok(world);
+        }
+        let pairs = sent.iter().zip(&turn.came);
+        let agreed = pairs.take_while(|(own, came)| u16::from(**own) == **came);
+        Err(Differs {
+            turn: number,
+            agreed: agreed.count(),
+            wanted: sent,
+        })
+    }
+
+    /// Whether a reply, behind what is owed, is what came.
+    fn sends(&self, reply: &[u8], turn: &Turn) -> bool {
+        let sent = self.owed.iter().chain(reply);
+        sent.map(|own| u16::from(*own))
+            .eq(turn.came.iter().copied())
+    }
+
+    /// The slaves behind octets of which the last one ends at this time, and what they reply.
+    fn hears(&self, octets: &[u8], end: Instant) -> (Self, Vec<u8>) {
+        let mut world = self.clone();
+        let octet = HEARD_AT.octet_time();
+        let mut reply = Vec::new();
+        world.free = end;
+        for slave in &mut world.slaves {
+            for (place, byte) in octets.iter().enumerate() {
+                let at = end - octet * (octets.len() - 1 - place) as u64;
+                slave.hear(at, Received::good(*byte));
+            }
+            while let Some(wish) = slave.wants() {
+                let at = wish.ready.max(world.free);
+                slave.advance(at);
+                let mut sent = Vec::new();
+                slave.begin(at, &mut sent);
+                world.free = at + octet * sent.len() as u64;
+                slave.sent(world.free);
+                reply.extend(sent.iter().map(|own| own.byte));
+            }
+        }
+        (world, reply)
+    }
+
+    /// A time in a window at which a telegram leads to what came.
+    fn at_any_time(
+        &self,
+        turn: &Turn,
+        [first, soon, last]: [Instant; 3],
+        least: Instant,
+    ) -> Option<(Instant, Self)> {
+        let mut times = vec![first, soon, last];
+        times.extend(self.events(first, last));
+        times.sort_unstable();
+        times.dedup();
+        let mut before: Option<(Instant, Option<i16>)> = None;
+        let wanted = actual(&turn.came);
+        for at in times {
+            let (world, reply) = self.hears(&turn.octets, at);
+            if self.sends(&reply, turn) {
+                return Some((at, world));
+            }
+            let shown = actual(&wide(&reply));
+            if let Some((earlier, start)) = before
+                && let Some(found) = self.between(turn, (earlier, start), (at, shown), wanted)
+            {
+                return Some(found);
+            }
+            before = Some((at, shown));
+        }
+        if first > least {
+            None
+        } else {
+            self.at_once(turn, first)
+        }
+    }
+
+    /// The slaves behind octets of which more stand behind a telegram: a stream may make a pause between them.
+    fn in_parts(&self, turn: &Turn, at: Instant) -> Option<(Instant, Self)> {
+        let used = match Telegram::decode(&turn.octets) {
+            Decoded::Value { used, .. } if used < turn.octets.len() => used,
+            _ => return None,
+        };
+        let (telegram, rest) = turn.octets.split_at(used);
+        let (world, mut reply) = self.hears(telegram, at);
+        let (world, more) = world.hears(rest, world.free + MOMENT);
+        reply.extend(more);
+        self.sends(&reply, turn).then_some((at, world))
+    }
+
+    /// The slaves behind a telegram that has reached them sooner behind the one before than they can be played: the motor has moved in the right
+    /// direction, and not as far.
+    fn at_once(&self, turn: &Turn, first: Instant) -> Option<(Instant, Self)> {
+        let (world, reply) = self.hears(&turn.octets, first);
+        let sent = wide(&reply);
+        let (before, shown, wanted) = (self.actual?, actual(&sent)?, actual(&turn.came)?);
+        let on_the_way = (before.min(shown)..=before.max(shown)).contains(&wanted);
+        let alike = self.nearly_sends(turn, &sent, first);
+        (on_the_way && alike && self.owed.is_empty()).then_some((first, world))
+    }
+
+    /// Whether a reply is what came but for its actual value, as far as this does not follow from the moment in which it has this value.
+    fn nearly_sends(&self, turn: &Turn, sent: &[u16], at: Instant) -> bool {
+        let (Some(own), Some(came)) = (Moving::of(sent), Moving::of(&turn.came)) else {
+            return false;
+        };
+        let mut bits = [at - MOMENT, at + MOMENT].into_iter().filter_map(|at| {
+            let (_, reply) = self.hears(&turn.octets, at.max(self.free));
+            Moving::of(&wide(&reply)).map(|own| own.bits)
+        });
+        own.rest == came.rest
+            && own
+                .numbers
+                .iter()
+                .zip(came.numbers)
+                .all(|(own, came)| own.abs_diff(came) <= 1)
+            && (own.bits == came.bits || bits.any(|own| own == came.bits))
+    }
+
+    /// The times in a window at which slaves do something by themselves, and those right before.
+    fn events(&self, first: Instant, last: Instant) -> Vec<Instant> {
+        let mut times = Vec::new();
+        let mut slaves = self.slaves.clone();
+        for _ in 0..MOST_EVENTS {
+            let due = slaves.iter().filter_map(LineStation::next_action).min();
+            let Some(due) = due.filter(|own| *own <= last) else {
+                break;
+            };
+            slaves.iter_mut().for_each(|own| own.advance(due));
+            let both = [due - Span::from_units(1), due];
+            times.extend(both.into_iter().filter(|own| *own >= first));
+        }
+        times
+    }
+
+    /// A time between two of which one leads to a lower actual value than what came has, and one to a higher one.
+    fn between(
+        &self,
+        turn: &Turn,
+        (mut from, start): (Instant, Option<i16>),
+        (mut to, end): (Instant, Option<i16>),
+        wanted: Option<i16>,
+    ) -> Option<(Instant, Self)> {
+        let (start, end, wanted) = (start?, end?, wanted?);
+        let (low, high) = (start.min(end), start.max(end));
+        if start == end || !(low..=high).contains(&wanted) {
+            return None;
+        }
+        for _ in 0..HALVES {
+            let middle = from + Span::from_units(to.since(from).units() / 2);
+            if middle == from {
+                break;
+            }
+            let (world, reply) = self.hears(&turn.octets, middle);
+            if self.sends(&reply, turn) {
+                return Some((middle, world));
+            }
+            let sent = wide(&reply);
+            let shown = actual(&sent)?;
+            if shown == wanted && self.owed.is_empty() && self.nearly_sends(turn, &sent, middle) {
+                return Some((middle, world));
+            }
+            // Another value beside the actual one differs: it follows the motor in smaller or larger steps.
+            let passed = if start < end {
+                shown > wanted
+            } else {
+                shown < wanted
+            };
+            if passed || shown == wanted && end == wanted {
+                to = middle;
+            } else {
+                from = middle;
+            }
+        }
+        None
+    }
+}
+
+/// The inputs in a reply that carries them.
+fn inputs(octets: &[u16]) -> Option<(Pdu, PpoType)> {
+    let octets: Vec<u8> = octets.iter().map(|own| *own as u8).collect();
+    let Decoded::Value { value, used } = Telegram::decode(&octets) else {
+        return None;
+    };
+    let pdu = value.pdu().filter(|_| used == octets.len())?;
+    let service = Service::of(pdu.ssap())?;
+    let carries = matches!(service, Service::DataExchange | Service::RdInp);
+    let length = pdu.data().len();
+    let ppo = PpoType::ALL.into_iter().find(|own| own.octets() == length);
+    Some((*pdu, ppo.filter(|_| carries)?))
+}
+
+/// The main actual value (HIW) in a reply.
+fn actual(octets: &[u16]) -> Option<i16> {
+    let (pdu, ppo) = inputs(octets)?;
+    let place = ppo.words_begin() + 2;
+    let word = pdu.data().get(place..place + 2)?;
+    Some(i16::from_be_bytes([word[0], word[1]]))
+}
+
+/// What follows a motor in a reply beside its main actual value, and the rest of the reply.
+#[derive(PartialEq, Eq)]
+struct Moving {
+    /// Bits of the status word that compare the frequency.
+    bits: u16,
+    /// The value of a parameter, and the second actual value.
+    numbers: [u16; 2],
+    rest: (u8, Image),
+}
+
+impl Moving {
+    fn of(octets: &[u16]) -> Option<Self> {
+        let (pdu, ppo) = inputs(octets)?;
+        let mut rest = Image::decode(ppo, pdu.data())?;
+        let follows = zsw::AT_SETPOINT | zsw::REFERENCE;
+        let bits = rest.words[0] & follows;
+        let mut numbers = [0, rest.words[3]];
+        if matches!(rest.pkw.ak(), 1 | 4) && FOLLOWING.contains(&rest.pkw.number()) {
+            numbers[0] = rest.pkw.low_word();
+            rest.pkw.pwe = 0;
+        }
+        rest.words[0] &= !follows;
+        (rest.words[1], rest.words[3]) = (0, 0);
+        Some(Self {
+            bits,
+            numbers,
+            rest: (pdu.fc().0, rest),
+        })
+    }
+}
+
+/// Octets as they come without a line error.
+fn wide(octets: &[u8]) -> Vec<u16> {
+    octets.iter().map(|own| u16::from(*own)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rehearse::Other;
+    use super::super::{Own, Player};
+    use super::*;
+    use crate::rig::RigSlave;
+    use harness_bench::scenario::source::Source;
+    use harness_proto::nordac::guard::Limits;
+    use harness_sim::nordac::deviation::deviation;
+
+    /// Up to 25 % in 1.25 s, down by OFF3, a fault by 1625, and a parameter that follows the motor.
+    const RUN: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8\nexchange 8 STW=047F\nexchange 8\n\
+        wait 300ms\nexchange 8\nwait 400ms\nexchange 8\nread 8 1813\nwait 1s\nexchange 8\nexchange 8 STW=045F HSW=50%\nwait 200ms\n\
+        exchange 8\nexchange 8 STW=047F\nwait 300ms\nexchange 8\nexchange 8 STW=047E\nwait 200ms\nexchange 8\nwait 3s\nexchange 8\nexchange 8 STW=047F\n\
+        exchange 8 STW=047E\nexchange 8 STW=047F\nwait 500ms\nexchange 8 STW=047B\nwait 50ms\nexchange 8\nwait 1s\nexchange 8\n\
+        read 8 1801\nread 8 1202\nexchange 8\n";
+
+    fn known(parameters: &[(u16, u32)]) -> Known {
+        let mut known = Known::new(RigSlave {
+            address: 8,
+            ppo: Some(PpoType::One),
+        });
+        let values = parameters.iter().map(|(number, raw)| ((*number, 0), *raw));
+        known.values = [((1621, 0), 2), ((1615, 0), 20)]
+            .into_iter()
+            .chain(values)
+            .collect();
+        known
+    }
+
+    /// The telegrams of a run with a slave.
+    fn turns(slave: &Known) -> Vec<Turn> {
+        let source = Source {
+            name: "x".to_owned(),
+            text: RUN.into(),
+        };
+        let own = Own::read(&source).expect("a scenario");
+        let limits = Limits::unlimited();
+        let patience = Span::from_millis(5);
+        let able = (Vec::new(), false);
+        let mut player = Player::of(vec![slave.slave], BusRate::K500, patience, limits, able);
+        player.known = Some(vec![slave.clone()]);
+        player.rehearse(&own, &limits, Other::default()).turns
+    }
+
+    fn judged(turns: &[Turn]) -> Result<(), Differs> {
+        right_slaves_send(&[known(&[])], BusRate::K500, turns, &Beats::default())
+    }
+
+    /// A right slave is not accused, however late the computer hands over a telegram, or reads what comes to it.
+    #[test]
+    fn a_computer_that_stands_still_accuses_no_slave() {
+        let right = turns(&known(&[]));
+        assert_eq!(judged(&right), Ok(()));
+        for place in 0..right.len() {
+            for millis in [1, 30, 300, 2_000] {
+                let pause = Span::from_millis(millis);
+                // The telegram had left long before it reached the slave.
+                let mut early = right.clone();
+                let before = place.checked_sub(1).and_then(|own| right[own].read);
+                early[place].left = (right[place].left - pause).max(before.unwrap_or_default());
+                assert_eq!(judged(&early), Ok(()), "{place} {millis}");
+                // The reply was read long behind it was there.
+                let mut late = right.clone();
+                late[place].read = late[place].read.map(|own| own + pause);
+                for own in &mut late[place + 1..] {
+                    own.left += pause;
+                    own.read = own.read.map(|own| own + pause);
+                }
+                let moves = |own: &Turn| actual(&own.came).is_some_and(|own| own != 0);
+                // What moves has gone on.
+                let rests = place + 1 >= right.len() || !moves(&right[place + 1]);
+                assert!(
+                    !rests || judged(&late).is_ok(),
+                    "{place} {millis} {:?}",
+                    judged(&late)
+                );
+            }
+        }
+    }
+
+    /// A reply that the computer has read behind its next telegram.
+    #[test]
+    fn a_reply_may_be_read_late() {
+        let mut late = turns(&known(&[]));
+        let place = late.len() - 2;
+        let came = std::mem::take(&mut late[place].came);
+        late[place].read = None;
+        late[place + 1].came.splice(0..0, came);
+        assert_eq!(judged(&late), Ok(()));
+        late[place + 1].came.clear();
+        assert!(judged(&late).is_err());
+    }
+
+    /// NORDAC 3.3, 5.1, 5.5: a ramp in another time, a stop by another ramp, another time of the quick stop.
+    #[test]
+    fn a_ramp_in_another_time_is_found() {
+        for (number, raw) in [
+            (1202, 80),
+            (1202, 120),
+            (1203, 50),
+            (1203, 200),
+            (1615, 10),
+            (1205, 650),
+        ] {
+            let wrong = turns(&known(&[(number, raw)]));
+            assert!(judged(&wrong).is_err(), "{number} = {raw}");
+        }
+    }
+
+    /// What no line of a scenario asks for is compared.
+    #[test]
+    fn deviations_are_found_without_a_line() {
+        let right = turns(&known(&[]));
+        for name in [
+            "directions-exchanged",
+            "values-of-one-more",
+            "answers-without-number",
+            "pzd-low-byte-first",
+        ] {
+            let deviation = deviation(name);
+            assert!(deviation.is_some(), "{name}");
+            let mut slave = known(&[]).model(Default::default());
+            slave.deviation = deviation;
+            assert!(
+                could_send(vec![drive(&slave)], BusRate::K500, &right).is_err(),
+                "{name}"
+            );
+        }
+    }
+}
