@@ -384,7 +384,8 @@ fn a_fault_and_a_pause_accuse_no_slave() {
     let desk = Desk::new("tcp", "");
     desk.permit(&["eeprom", "motor_data"]);
     let pause = desk.run("run --rig desk.toml nordac-en-1-too-long");
-    ended(&pause, 5, "makes a pause behind a telegram");
+    // The server parts the octets, and a right slave answers the first ones.
+    ended(&pause, 0, "passed nordac-en-1-too-long");
     let both = "nordac-open-timeout-exactly-expires nordac-open-zsw8-always";
     let denied = desk.run(&format!("run --rig desk.toml {both}"));
     ended(&denied, 2, "it leaves slave 8 with a fault");

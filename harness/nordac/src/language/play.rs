@@ -61,6 +61,9 @@ pub(super) fn act(
         }
         PlannedAct::Quiet => {
             runner.settle();
+            // What an adapter holds back comes later.
+            let held = runner.link.now() + runner.link.time_tolerance();
+            runner.pass_until(held);
             runner.nothing_unasked(span)?;
         }
         PlannedAct::Parameter(slave, parameter, raw) => {

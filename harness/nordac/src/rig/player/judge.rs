@@ -77,28 +77,40 @@ impl Player {
     /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
     fn judged_by_times(&self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
         let turns = &left.turns;
+        let late = left.way.late.max(left.way.longest);
+        let not_shown = |why: &str| {
+            let remark = format!("{why} (the computer or the adapter was late by {late})");
+            Outcome::not_ready(Verdict::Inconclusive, Unready::NoAnswer, remark)
+        };
         let sent = right_slaves_send(self.known(), self.rate, turns, &self.beats);
-        if let Err(differs) = sent {
-            return accused(outcome, &differs, turns);
+        match sent {
+            Err(differs) if differs.torn => {
+                return not_shown("a stream has parted a telegram, and the next one met the reply");
+            }
+            Err(differs) => return accused(outcome, &differs, turns),
+            Ok(()) => {}
         }
         let Some(finding) = &outcome.finding else {
             return outcome;
         };
-        let late = left.way.late.max(left.way.longest);
         let other = Other {
             switches: left.switches,
             ..Other::default()
         };
-        let shown = || kinds(turns) == kinds(&self.rehearse(own, &self.limits, other).turns);
-        if late > left.way.tolerance && !shown() {
-            let remark = format!(
-                "the computer or the adapter was late by {late}: the slaves are right in what they sent, and the scenario was not shown"
+        let rehearsed = self.rehearse(own, &self.limits, other).turns;
+        let shown = kinds(turns) == kinds(&rehearsed);
+        if late > left.way.tolerance && !shown {
+            return not_shown(
+                "the slaves are right in what they sent, and the scenario was not shown",
             );
-            return Outcome::not_ready(Verdict::Inconclusive, Unready::NoAnswer, remark);
         }
-        let message = &finding.message;
-        let remark =
-            format!("{message}: a right slave sends this at the time at which it was asked");
+        let right = match shown {
+            true => "a right slave sends this at the time at which it was asked",
+            false => {
+                "a right slave sends this to what has reached it, which is not what the scenario is about"
+            }
+        };
+        let remark = format!("{}: {right}", finding.message);
         Outcome {
             verdict: Verdict::Passed,
             finding: None,

@@ -51,6 +51,8 @@ pub(super) struct Differs {
     pub(super) wanted: Vec<u8>,
     /// How many octets of it came.
     agreed: usize,
+    /// A reply before was not read whole, and the bench has not waited for it: it may have sent into it.
+    pub(super) torn: bool,
 }
 
 /// Whether right slaves of which this is `known`, with some values of the points that are not settled of them, could have sent what came.
@@ -109,6 +111,7 @@ pub(super) fn could_send(
         free: Instant::START,
         ahead: (0, 0),
         owed: Vec::new(),
+        torn: false,
         actual: None,
     };
     for (number, turn) in turns.iter().enumerate() {
@@ -121,6 +124,7 @@ pub(super) fn could_send(
             turn: turns.len().saturating_sub(1),
             wanted: world.owed,
             agreed: 0,
+            torn: world.torn,
         }),
     }
 }
@@ -136,6 +140,8 @@ struct World {
     ahead: (i64, i64),
     /// What they have sent and the bench has not read: a computer that stood still reads it behind its next telegram.
     owed: Vec<u8>,
+    /// The bench has not waited for it: more octets than a telegram's had left, which a slave answers where a stream parts them.
+    torn: bool,
     /// The actual value that came last.
     actual: Option<i16>,
 }
@@ -201,6 +207,7 @@ impl World {
             turn: number,
             agreed: agreed.count(),
             wanted: sent,
+            torn: self.torn,
         })
     }
 
@@ -276,9 +283,12 @@ impl World {
         };
         let (telegram, rest) = turn.octets.split_at(used);
         let (world, mut reply) = self.hears(telegram, at);
-        let (world, more) = world.hears(rest, world.free + MOMENT);
+        let (mut world, more) = world.hears(rest, world.free + MOMENT);
         reply.extend(more);
-        self.sends(&reply, turn).then_some((at, world))
+        let whole = self.sends(&reply, turn);
+        let begun = wide(&reply).starts_with(&turn.came);
+        world.torn |= !whole;
+        (whole || begun).then_some((at, world))
     }
 
     /// The slaves behind a telegram that has reached them sooner behind the one before than they can be played: the motor has moved in the right
