@@ -7,6 +7,7 @@ use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{LineByte, Trace};
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 /// What a station sent without a pause.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,23 +87,28 @@ impl TelegramRun {
 /// octets follow each other.
 pub fn octet_time<'t>(octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>) -> Option<Span> {
     let mut last: Option<(Option<u8>, Instant)> = None;
-    let distances = octets.filter_map(|(from, own)| {
-        let before = last.replace((from, own.at));
-        before.and_then(|(sender, at)| (sender == from).then(|| own.at.since(at)))
-    });
-    let distances: Vec<Span> = distances.collect();
+    // Octets are many, and their distances few.
+    let mut distances: BTreeMap<Span, usize> = BTreeMap::new();
+    for (from, own) in octets {
+        if let Some((_, at)) = last
+            .replace((from, own.at))
+            .filter(|before| before.0 == from)
+        {
+            *distances.entry(own.at.since(at)).or_default() += 1;
+        }
+    }
     let at_rate = |rate: BusRate| {
         let octet = rate.octet_time().as_nanos();
-        let near = |own: &&Span| own.as_nanos().abs_diff(octet) <= octet / 50;
-        distances
+        let near = distances
             .iter()
-            .filter(near)
-            .min()
-            .map(|nearest| (distances.iter().filter(near).count(), Reverse(*nearest)))
+            .filter(|(own, _)| own.as_nanos().abs_diff(octet) <= octet / 50);
+        let (nearest, _) = near.clone().next()?;
+        let count: usize = near.map(|(_, count)| count).sum();
+        Some((count, Reverse(*nearest)))
     };
     let most = BusRate::ALL.into_iter().filter_map(at_rate).max();
     most.map(|(_, Reverse(octet))| octet)
-        .or_else(|| distances.into_iter().min())
+        .or_else(|| distances.keys().next().copied())
 }
 
 /// Idle octets behind which a telegram begins in any case: 33 bits (T_SYN).
