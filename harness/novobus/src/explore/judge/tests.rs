@@ -265,7 +265,7 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
 /// is blamed.
 #[test]
 fn no_correct_drive_is_blamed() {
-    not_blamed(60);
+    not_blamed(30);
 }
 
 #[test]

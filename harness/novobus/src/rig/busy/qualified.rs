@@ -213,8 +213,6 @@ fn of_parts(drives: [&str; 2]) -> Qualified {
 /// Parts whose drives are not the same: what one of them shows is never taken back by the other.
 #[test]
 fn parts_that_contradict_each_other_are_never_passed() {
-    let wrong = "drive 1 deviates read-long-reversed";
-    of_a_wrong_part(["", wrong]);
     let other = "drive 0..last property read-long = as-printed";
     let found = of_parts(["", other]);
     let text = &found.deviations;
@@ -227,6 +225,11 @@ fn parts_that_contradict_each_other_are_never_passed() {
         profile.contains("its values differ from part to part"),
         "{profile}"
     );
+}
+
+#[test]
+fn a_wrong_part_is_never_passed() {
+    of_a_wrong_part(["", "drive 1 deviates read-long-reversed"]);
 }
 
 #[test]
@@ -257,6 +260,7 @@ fn a_qualification_on_a_busy_computer_blames_no_drive() {
 
 /// ND21 9.9, 14.3.6: the same of drives that miss their bytes meanwhile.
 #[test]
+#[ignore = "takes seconds; .ci/nightly runs it"]
 fn a_silence_of_a_qualification_blames_no_drive() {
     let [_, _, others] = RIGHT;
     assert_eq!(blamed(others, (1, 60)), NOTHING);
