@@ -136,7 +136,7 @@ fn no_right_drive_is_accused_by_a_cut_anywhere() {
 
 #[test]
 fn no_right_drive_is_accused() {
-    right_drives(5);
+    right_drives(15);
 }
 
 #[test]
@@ -196,8 +196,29 @@ fn right_drives(share: usize) {
 /// frame that is not sent; or they leave it open whether the drive homes since before the first frame.
 const NOT_SHOWN: usize = 33;
 
+/// One of six.
 #[test]
 fn wrong_drives_are_accused() {
+    let not_shown = [
+        "answers-remote-frames",
+        "ignores-eight-bytes",
+        "interval-one-more",
+        "speed-without-sign",
+        "preset-moves",
+        "speed-read-without-sign",
+    ];
+    assert_eq!(missed(6), not_shown);
+}
+
+#[test]
+#[ignore = "every deviation, takes seconds; .ci/nightly runs it"]
+fn all_wrong_drives_but_some_are_accused() {
+    let missed = missed(1);
+    assert!(missed.len() <= NOT_SHOWN, "{} {missed:?}", missed.len());
+}
+
+/// Deviations that no capture shows, of one in `share`.
+fn missed(share: usize) -> Vec<&'static str> {
     let scenarios = scenarios();
     let found = |name: &str| {
         scenarios.iter().any(|source| {
@@ -208,9 +229,6 @@ fn wrong_drives_are_accused() {
                 .is_empty()
         })
     };
-    let missed: Vec<_> = deviations()
-        .map(|own| own.name)
-        .filter(|name| !found(name))
-        .collect();
-    assert!(missed.len() <= NOT_SHOWN, "{} {missed:?}", missed.len());
+    let names = deviations().step_by(share).map(|own| own.name);
+    names.filter(|name| !found(name)).collect()
 }
