@@ -13,13 +13,13 @@ use std::collections::{BTreeMap, VecDeque};
 pub(crate) const MOST_WORLDS: usize = 4_096;
 
 /// The most steps of all worlds together.
-const MOST_STEPS: usize = 1_000_000;
+const MOST_STEPS: usize = 50_000;
 
 /// The clock of a drive may be off by this part of a time: 2 % (UNITEK 5.2; our choice for other buses).
 const DRIFT: i64 = 50;
 
 /// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
-pub trait Model: Clone {
+pub trait RightDrive: Clone {
     /// A frame or a telegram.
     type Piece: Clone;
 
@@ -38,8 +38,18 @@ pub trait Model: Clone {
     /// Takes the next piece that it sends now.
     fn say(&mut self) -> Option<Self::Piece>;
 
+    /// Whether the last piece that was taken may leave later than what the drive says by itself behind it.
+    fn may_wait(&self) -> bool {
+        false
+    }
+
     /// Whether what it says can be what came: the same but for what means nothing, and within the band of what moves.
     fn is(&self, said: &Self::Piece, came: &Self::Piece) -> bool;
+
+    /// Whether what it does from now on is known. Where it is not, anything can come of it.
+    fn knows(&self) -> bool {
+        true
+    }
 
     /// A checksum of all that decides what it does from now on. Times in it count from the present.
     fn state(&self) -> u64;
@@ -63,11 +73,13 @@ pub enum Judged<P> {
     Wrong(usize, Option<P>),
     /// There are more worlds than are kept.
     TooMany,
+    /// A world is left of which nothing more is known.
+    Unknown,
 }
 
 /// A conversation with one drive, as the computer has seen it.
 #[derive(Clone, Debug)]
-pub struct Conversation<P> {
+pub struct Dialogue<P> {
     /// What was sent to it, in order.
     pub sent: Vec<Timed<P>>,
     /// What came from it, in order.
@@ -76,11 +88,15 @@ pub struct Conversation<P> {
     pub end: Instant,
     /// How much later than a right drive says it a piece may be on the bus.
     pub lag: Span,
+    /// Whether a piece that may wait may be overtaken.
+    pub overtakes: bool,
+    /// Whether all that was said has come, so that nothing is on its way any more.
+    pub complete: bool,
 }
 
 /// One right drive.
 #[derive(Clone, Debug)]
-struct World<M: Model> {
+struct World<M: RightDrive> {
     model: M,
     /// Its own clock.
     at: i64,
@@ -88,22 +104,32 @@ struct World<M: Model> {
     ahead: (i64, i64),
     /// How many of the pieces that were sent have reached it.
     heard: usize,
-    /// What it has said that has not come so far, with the time on its own clock.
-    said: VecDeque<(i64, M::Piece)>,
+    /// What it has said that has not come so far.
+    said: VecDeque<Said<M::Piece>>,
 }
 
-/// Worlds that have heard the same number of pieces by the same time and are in the same state are one. The time of one that only waits
-/// does not count.
-type Key = (usize, i64, u64);
+/// A piece that a world has said.
+#[derive(Clone, Debug)]
+struct Said<P> {
+    /// When, on its own clock.
+    at: i64,
+    piece: P,
+    may_wait: bool,
+}
 
-impl<M: Model> World<M> {
+/// Worlds that have heard the same number of pieces by the same time, are in the same state and have said the same are one. The time of
+/// one that only waits does not count.
+type Key = (usize, i64, u64, Vec<i64>);
+
+impl<M: RightDrive> World<M> {
     fn key(&self) -> Key {
         let at = if self.model.due().is_some() {
             self.at
         } else {
             0
         };
-        (self.heard, at, self.model.state())
+        let said = self.said.iter().map(|own| self.at - own.at);
+        (self.heard, at, self.model.state(), said.collect())
     }
 
     /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
@@ -121,7 +147,11 @@ impl<M: Model> World<M> {
 
     fn listen(&mut self) {
         while let Some(piece) = self.model.say() {
-            self.said.push_back((self.at, piece));
+            self.said.push_back(Said {
+                at: self.at,
+                may_wait: self.model.may_wait(),
+                piece,
+            });
         }
     }
 
@@ -143,9 +173,9 @@ fn instant(at: i64) -> Instant {
 }
 
 /// Worlds by what distinguishes them, the earliest first: what follows from one comes behind it.
-struct Worlds<M: Model>(BTreeMap<Key, World<M>>);
+struct Worlds<M: RightDrive>(BTreeMap<Key, World<M>>);
 
-impl<M: Model> Worlds<M> {
+impl<M: RightDrive> Worlds<M> {
     fn insert(&mut self, world: World<M>) {
         match self.0.entry(world.key()) {
             std::collections::btree_map::Entry::Vacant(place) => {
@@ -157,20 +187,35 @@ impl<M: Model> Worlds<M> {
 }
 
 /// Whether one of these right drives, which have just been made and whose clocks begin with that of the conversation, could have sent
-/// what came.
-pub fn judge<M: Model>(drives: Vec<M>, talk: &Conversation<M::Piece>) -> Judged<M::Piece> {
+/// what came. What the first one says stands for all where none could.
+pub fn judge<M: RightDrive>(drives: Vec<M>, talk: &Dialogue<M::Piece>) -> Judged<M::Piece> {
+    judge_alive(drives, talk, &|| ())
+}
+
+/// The same where `alive` is called now and then, since it may take seconds.
+pub fn judge_alive<M: RightDrive>(
+    drives: Vec<M>,
+    talk: &Dialogue<M::Piece>,
+    alive: &dyn Fn(),
+) -> Judged<M::Piece> {
     // Drives of different kinds are never merged: each is judged by itself.
     let mut first = None;
     for drive in drives {
-        match judge_one(drive, talk) {
-            Judged::Right => return Judged::Right,
-            other => first = first.or(Some(other)),
+        match judge_one(drive, talk, alive) {
+            Judged::Wrong(place, expected) => {
+                first.get_or_insert(Judged::Wrong(place, expected));
+            }
+            other => return other,
         }
     }
-    first.unwrap_or(Judged::TooMany)
+    first.unwrap_or(Judged::Unknown)
 }
 
-fn judge_one<M: Model>(model: M, talk: &Conversation<M::Piece>) -> Judged<M::Piece> {
+fn judge_one<M: RightDrive>(
+    model: M,
+    talk: &Dialogue<M::Piece>,
+    alive: &dyn Fn(),
+) -> Judged<M::Piece> {
     let mut steps = 0;
     let mut worlds = Worlds(BTreeMap::new());
     worlds.insert(World {
@@ -184,23 +229,24 @@ fn judge_one<M: Model>(model: M, talk: &Conversation<M::Piece>) -> Judged<M::Pie
         let mut explained = Worlds(BTreeMap::new());
         let mut expected = None;
         while let Some((_, world)) = worlds.0.pop_first() {
-            steps += 1;
+            alive();
             if steps > MOST_STEPS || worlds.0.len() + explained.0.len() > MOST_WORLDS {
                 return Judged::TooMany;
             }
-            match world.said.front() {
-                Some((_, piece)) => {
-                    let piece = piece.clone();
-                    match talk.comes(world, place) {
-                        Some(world) => explained.insert(world),
-                        None => expected = Some(piece),
-                    }
-                }
-                None => {
-                    for next in talk.next(world, place, &mut explained) {
-                        worlds.insert(next);
-                    }
-                }
+            if !world.model.knows() {
+                return Judged::Unknown;
+            }
+            if let Some(said) = world.said.front() {
+                expected = Some(said.piece.clone());
+            }
+            let mut heard = |world| explained.insert(world);
+            let last = talk.say(&world, place, &mut heard);
+            if last {
+                continue;
+            }
+            for next in talk.next(world, place, &mut heard) {
+                steps += 1;
+                worlds.insert(next);
             }
         }
         if explained.0.is_empty() {
@@ -211,28 +257,50 @@ fn judge_one<M: Model>(model: M, talk: &Conversation<M::Piece>) -> Judged<M::Pie
     Judged::Right
 }
 
-impl<P: Clone> Conversation<P> {
-    /// A world that has said something, where that is what came at a place.
-    fn comes<M: Model<Piece = P>>(&self, mut world: World<M>, place: usize) -> Option<World<M>> {
-        let (at, said) = world.said.pop_front()?;
+impl<P: Clone> Dialogue<P> {
+    /// Where what a world has said is what came at a place, the world behind it. Returns whether it can do nothing else before that.
+    fn say<M: RightDrive<Piece = P>>(
+        &self,
+        world: &World<M>,
+        place: usize,
+        explained: &mut impl FnMut(World<M>),
+    ) -> bool {
         let (lag, scan) = (units_of(self.lag), units_of(M::SCAN));
+        let Some(first) = world.said.front() else {
+            return false;
+        };
         let Some(came) = self.came.get(place) else {
             // It may come later than the computer has listened.
-            return world.within(units(self.end) - lag - at, i64::MAX);
+            let own = world.clone();
+            let own = own.within(units(self.end) - lag - first.at, i64::MAX);
+            let comes = own.filter(|_| !self.complete);
+            comes.into_iter().for_each(explained);
+            return true;
         };
-        let fits = world.model.is(&said, &came.piece);
-        let (earliest, latest) = (units(came.earliest), units(came.latest));
-        let world = world.within(earliest - lag - scan - at, latest + scan - at);
-        world.filter(|_| fits)
+        let earliest = units(came.earliest) - lag - scan;
+        for (number, said) in world.said.iter().enumerate() {
+            if world.model.is(&said.piece, &came.piece) {
+                let mut own = world.clone();
+                own.said.remove(number);
+                let latest = units(came.latest) + scan;
+                let own = own.within(earliest - said.at, latest - said.at);
+                own.into_iter().for_each(&mut *explained);
+            }
+            let late = first.at + world.ahead.1 < earliest;
+            if !(said.may_wait && self.overtakes) || late {
+                return true;
+            }
+        }
+        false
     }
 
-    /// What a world that has nothing to say can do next: hear what was sent at one time or another, or do its next step. At the end of
+    /// What a world can do next: hear what was sent at one time or another, or do its next step. At the end of
     /// the conversation it may have done its last one.
-    fn next<M: Model<Piece = P>>(
+    fn next<M: RightDrive<Piece = P>>(
         &self,
         world: World<M>,
         place: usize,
-        ended: &mut Worlds<M>,
+        ended: &mut impl FnMut(World<M>),
     ) -> Vec<World<M>> {
         let mut all = Vec::new();
         let scan = units_of(M::SCAN);
@@ -272,13 +340,22 @@ impl<P: Clone> Conversation<P> {
             }
         }
         let unheard = sent.map_or(i64::MAX, |own| units(own.latest) + scan);
-        if came.is_none() && unheard.min(due.map_or(i64::MAX, |due| due + world.ahead.1)) >= end {
-            ended.insert(world.clone());
+        let may_end = came.is_none() && !(self.complete && sent.is_some());
+        if may_end && unheard.min(due.map_or(i64::MAX, |due| due + world.ahead.1)) >= end {
+            ended(world.clone());
         }
         if let Some(due) = due
             && let Some(mut own) = world.within(i64::MIN, unheard.min(end) - due)
         {
             own.advance(due);
+            // Nothing can happen to it in between.
+            let until = sent.map_or(end, |own| units(own.earliest).min(end)) - scan;
+            while own.said.is_empty()
+                && let Some(due) = own.model.due().map(units)
+                && due + (due - own.at) / DRIFT + own.ahead.1 < until
+            {
+                own.advance(due);
+            }
             all.push(own);
         }
         all
@@ -307,7 +384,7 @@ mod tests {
     }
 
     /// 0 asks, 1 starts, 2 stops; a higher number is set.
-    impl Model for Counter {
+    impl RightDrive for Counter {
         type Piece = u8;
         const SCAN: Span = Span::from_millis(1);
 
@@ -369,11 +446,13 @@ mod tests {
             alarm,
             ..Counter::default()
         };
-        let talk = Conversation {
+        let talk = Dialogue {
             sent: timed(sent, 0, 3),
             came: timed(came, 1, 0),
             end: ms(300),
             lag: Span::from_millis(1),
+            overtakes: false,
+            complete: false,
         };
         judge(vec![drive], &talk)
     }

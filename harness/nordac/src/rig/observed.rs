@@ -303,7 +303,7 @@ impl LinkNotes for TelegramNotes {
         self.step = Some(place);
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, _now: Instant) {
         let took = std::mem::take(&mut self.took[1]);
         self.took[0] = self.took[0] + took;
         self.last = None;

@@ -73,6 +73,21 @@ impl Cycles {
         self.places.iter().flatten()
     }
 
+    /// What decides the frames from millisecond `now` on: by place the register, the interval, the times until the next frame, and how many
+    /// requests have come since.
+    pub fn state(&self, now: u64) -> impl Iterator<Item = impl std::hash::Hash> {
+        let places = self.places.iter().enumerate();
+        places.filter_map(move |(place, cycle)| {
+            let own = (*cycle)?;
+            let times = (
+                own.due.saturating_sub(now),
+                own.late,
+                self.requests - own.order,
+            );
+            Some((place, own.register, own.every, times))
+        })
+    }
+
     fn place_of(&self, register: u8) -> Option<usize> {
         self.places
             .iter()

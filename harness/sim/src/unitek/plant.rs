@@ -106,6 +106,12 @@ impl Plant {
         self.position
     }
 
+    /// What decides how it moves on: speed, and what ramps and torque have not yet used.
+    #[must_use]
+    pub const fn moves(&self) -> (i64, i64, i64) {
+        (self.speed, self.ramp_rest, self.torque_rest)
+    }
+
     /// Sets the position (7A).
     pub fn preset(&mut self, position: i32) {
         self.position = position;

@@ -18,7 +18,11 @@ mod supply;
 mod symptom;
 #[cfg(test)]
 mod tests;
+mod world;
+#[cfg(test)]
+mod world_tests;
 
 pub use drives::{Breach, HeardFrames, JudgedDrives, judge, judge_guessed};
 pub use follower::Follower;
 pub use symptom::FrameSymptom;
+pub use world::World;

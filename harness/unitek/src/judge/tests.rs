@@ -29,7 +29,7 @@ const UNSEEN: [&str; 9] = [
     "no-acknowledge",
 ];
 
-fn scenarios() -> Vec<Source> {
+pub(super) fn scenarios() -> Vec<Source> {
     let all = sources(&[]).expect("built-in scenarios");
     let seen = |own: &Source| {
         UNSEEN
@@ -89,7 +89,7 @@ fn later(frames: &mut [LineFrame], by: Span) {
     }
 }
 
-fn of_all(source: &Source, line: &str) -> String {
+pub(super) fn of_all(source: &Source, line: &str) -> String {
     let lines = source.text.lines();
     let numbers = lines.filter_map(|line| line.strip_prefix("drive ")?.split(' ').next());
     let numbers: BTreeSet<_> = numbers.collect();

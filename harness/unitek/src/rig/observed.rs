@@ -12,6 +12,9 @@ use std::collections::BTreeSet;
 /// The most frames of an attempt that are kept.
 const MOST_KEPT: usize = 100_000;
 
+/// The time of a frame of eight bytes at 100 kbit/s, and some more (UNITEK 3.1).
+const LONGEST_FRAME: Span = Span::from_micros(1_500);
+
 /// A link to drives, observed.
 pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'l, FrameNotes>;
 
@@ -44,6 +47,36 @@ pub(super) struct FrameNotes {
     /// The frames that were received, and how many of them before the last conversation began, all of them if none has; `None` where they are
     /// not kept.
     kept: Option<(Vec<Frame>, usize)>,
+    /// The conversation, from the first frame that makes the drives ready.
+    pub(super) exchange: Exchange,
+}
+
+/// The frames of a conversation and their times, on one clock through all of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Exchange {
+    /// What the clock of the link is behind that of the conversation; `None` before it begins.
+    behind: Option<Span>,
+    /// What was sent, and when its last bit had left at the earliest.
+    pub(super) sent: Vec<(Instant, Frame)>,
+    /// What came: when it was on the bus by its stamp, and when it was read.
+    pub(super) came: Vec<(Instant, Instant, Frame)>,
+    /// Up to when all that came was read.
+    pub(super) read: Instant,
+}
+
+impl Exchange {
+    /// Begins the conversation; or begins the clock of the link again, at `now` of the one before.
+    pub(super) fn begin(&mut self, now: Instant) {
+        self.behind = Some(
+            self.behind
+                .map_or(Span::ZERO, |own| own + now.since_start()),
+        );
+    }
+
+    /// A time of the link.
+    fn at(&self, at: Instant) -> Option<Instant> {
+        self.behind.map(|behind| at + behind)
+    }
 }
 
 impl FrameNotes {
@@ -84,7 +117,11 @@ impl FrameNotes {
 
 impl LinkNotes for FrameNotes {
     fn sent(&mut self, what: Out<'_>, end: Instant) {
-        for frame in what.frames() {
+        let frames = what.frames();
+        for (behind, frame) in (0..frames.len() as u64).rev().zip(frames) {
+            if let Some(at) = self.exchange.at(end - LONGEST_FRAME * behind) {
+                self.exchange.sent.push((at, *frame));
+            }
             let Ok(rx) = u16::try_from(frame.id().number()) else {
                 continue;
             };
@@ -108,11 +145,20 @@ impl LinkNotes for FrameNotes {
         }
     }
 
+    fn quiet(&mut self, until: Instant) {
+        if let Some(until) = self.exchange.at(until) {
+            self.exchange.read = self.exchange.read.max(until);
+        }
+    }
+
     fn heard(&mut self, _: Medium, at: Instant, now: Instant, heard: Heard) {
         let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
             return;
         };
         self.heard.pieces += 1;
+        if let (Some(at), Some(now)) = (self.exchange.at(at), self.exchange.at(now)) {
+            self.exchange.came.push((at, now, frame));
+        }
         if let Some((frames, _)) = self.kept.as_mut().filter(|own| own.0.len() < MOST_KEPT) {
             frames.push(frame);
         }
@@ -129,7 +175,10 @@ impl LinkNotes for FrameNotes {
         }
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, now: Instant) {
+        if self.exchange.behind.is_some() {
+            self.exchange.begin(now);
+        }
         if let Some((frames, begun)) = &mut self.kept {
             *begun = frames.len();
         }

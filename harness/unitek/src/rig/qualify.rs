@@ -7,6 +7,7 @@ use harness_bench::qualify::segment::{Attempted, Attempts, Point, profile, quali
 use harness_bench::rig::Rig;
 use harness_bench::rig::segment::Qualified;
 use harness_bench::scenario::source::Source;
+use harness_bench::scenario::verdict::Verdict;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
@@ -179,8 +180,16 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
+    let notes = notes.concat();
+    // The last attempt at a scenario speaks for those before it that have shown nothing.
+    let again = notes.windows(2).map(|two| {
+        [Verdict::Inconclusive, Verdict::Marginal].contains(&two[0].verdict)
+            && two[0].name() == two[1].name()
+    });
+    let repeats = repeats.into_iter().zip(again.chain([false]));
+    let repeats = repeats.map(|(repeats, again)| repeats || again).collect();
     qualified(
-        &Notes(notes.concat(), repeats),
+        &Notes(notes, repeats),
         profile,
         "frame",
         &named.collect::<Vec<_>>(),

@@ -20,8 +20,11 @@ pub trait LinkNotes: Default + Send {
     /// A step of a scenario begins, at this place of its text.
     fn step(&mut self, _place: usize) {}
 
-    /// A conversation begins.
-    fn begin(&mut self);
+    /// A conversation begins, at this time of the one before.
+    fn begin(&mut self, now: Instant);
+
+    /// All that had come up to this time was read.
+    fn quiet(&mut self, _until: Instant) {}
 
     /// Why nothing more is worth noting; `None` while something is.
     fn ended(&self) -> Option<&Trouble> {
@@ -34,6 +37,8 @@ pub struct Observed<'l, N> {
     link: &'l mut dyn Link,
     /// By how much a wait has ended late, at most.
     late: Span,
+    /// When the last wait began: all that had come by then can be received.
+    looked: Instant,
     /// How the link is made worse; `None` for the link as it is.
     slow: Option<Slow>,
     /// Whether the link makes no queries of its own.
@@ -147,6 +152,7 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
         Self {
             link,
             late: Span::ZERO,
+            looked: Instant::START,
             slow: None,
             unpaused: false,
             sent: 0,
@@ -240,13 +246,17 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
     }
 
     fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
-        let (at, heard) = self.link.receive(port)?;
+        let Some((at, heard)) = self.link.receive(port) else {
+            self.noted.quiet(self.looked);
+            return None;
+        };
         let (medium, now) = (self.link.medium(port), self.link.now());
         self.noted.heard(medium, at, now, heard);
         Some((at, heard))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
+        self.looked = self.link.now();
         let more = self.link.wait(until);
         self.late = self.late.max(self.link.now().since(until));
         more
@@ -277,8 +287,10 @@ impl<N: LinkNotes> Link for Observed<'_, N> {
     }
 
     fn begin(&mut self) {
+        let now = self.link.now();
         self.link.begin();
-        self.noted.begin();
+        self.looked = Instant::START;
+        self.noted.begin(now);
     }
 
     fn step(&mut self, place: usize) {

@@ -19,6 +19,7 @@ use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::{Data, Reply, Request};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 /// A way in which a drive breaks the manual.
 pub struct Deviation {
@@ -210,6 +211,20 @@ impl Deviant {
     #[must_use]
     pub const fn drive(&self) -> &Drive {
         &self.drive
+    }
+
+    /// See [`Drive::state`].
+    #[must_use]
+    pub fn state(&self) -> u64 {
+        let own = self.drive.state();
+        match self.deviation {
+            None => own,
+            Some(_) => {
+                let mut state = DefaultHasher::new();
+                (own, self.part, self.memory.heard, self.memory.sent).hash(&mut state);
+                state.finish()
+            }
+        }
     }
 
     /// The right drive inside.

@@ -7,11 +7,39 @@ use harness_proto::unitek::properties::{EnableAfterLock, StatusBits};
 use harness_proto::unitek::words::{
     ERROR_NO_POWER, ERROR_TIME_OUT, ERRORS_FAULT, ERRORS_NOT_READY, MODE_LOCK, status,
 };
+use std::hash::{DefaultHasher, Hash, Hasher as _};
+use std::sync::Arc;
 
 /// Speeds below this count as standing: 1 % (F5).
 const STANDING: i64 = 328;
 
 impl Drive {
+    /// A checksum of all that decides what it does from now on, but its properties, what its registers hold, and where its axis stands.
+    /// Times in it count from the present.
+    #[must_use]
+    pub fn state(&self) -> u64 {
+        let mut state = DefaultHasher::new();
+        let levels = self
+            .eeprom
+            .each_ref()
+            .map(|own| own.as_ref().map(Arc::as_ptr));
+        (levels, self.identifiers, self.second).hash(&mut state);
+        (self.on_bus, self.control, &self.inputs, self.homing).hash(&mut state);
+        (self.calibrated, self.timed_out, self.released).hash(&mut state);
+        (self.last_status, self.sets_up, self.powered).hash(&mut state);
+        self.plant.moves().hash(&mut state);
+        let waits = self.next.map(|next| next.saturating_sub(self.scans));
+        waits.hash(&mut state);
+        if self.times_out_at().is_some() {
+            let now = self.power_up + super::SCAN * self.scans;
+            now.since(self.last_frame).units().hash(&mut state);
+        }
+        self.cycles
+            .state(self.scans)
+            .for_each(|own| own.hash(&mut state));
+        state.finish()
+    }
+
     /// The contents of a register as a read gives them, with the bits that the register has.
     #[must_use]
     pub fn register(&self, number: u8) -> u32 {

@@ -8,9 +8,13 @@
 mod note;
 mod own;
 mod ready;
+mod verdict;
+mod worlds;
 
 pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
+use verdict::unlike;
+use worlds::{Shown, Told};
 
 use super::Axis;
 use super::known::Known;
@@ -35,9 +39,9 @@ use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::limit::LimitSetting;
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::guard;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
-use harness_proto::unitek::{Register, guard};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -52,6 +56,9 @@ type AtRest = Vec<(u8, u8, u32)>;
 
 /// Where the clock of a drive can stand when a scenario begins, in parts of 32 of a millisecond: cycles, ramps and events go by it.
 const PHASES: std::ops::Range<u64> = 1..32;
+
+/// How many times the tolerance of times is waited for a frame that is missing.
+const STILL_COMES: u64 = 5;
 
 /// What a model is beside what is known of the drives.
 #[derive(Clone, Copy, Default)]
@@ -109,6 +116,8 @@ pub struct Player {
     stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
+    /// The scenarios that are played to their end although a line is not met, since right drives do not meet it either.
+    goes_on: BTreeSet<String>,
     /// Whether the drives are qualified.
     qualifies: bool,
     /// What shows that the program works while it plays on models.
@@ -142,6 +151,7 @@ impl Player {
             levels: BTreeSet::new(),
             stored: false,
             before: None,
+            goes_on: BTreeSet::new(),
             qualifies: false,
             beats: Beats::default(),
             left: NotPutBack::default(),
@@ -280,7 +290,20 @@ impl Player {
             Gone::Unanswered(error) => self.unanswered(&error),
             Gone::Skipped(skip) => Outcome::skipped(skip),
             Gone::Played(outcome, [drives, models]) => {
-                self.judged(own, *outcome, way, &unlike(&drives, &models))
+                let told = Told {
+                    talk: std::mem::take(&mut link.noted.exchange),
+                    way,
+                    unlike: unlike(&drives, &models),
+                };
+                let shown = match way.tolerance > Span::ZERO && link.trouble().is_none() {
+                    true => self.shown(&told),
+                    false => Shown::Unknown,
+                };
+                let outcome = self.judged(own, *outcome, way, (&told.unlike, &shown));
+                if let Some(note) = self.notes.last_mut() {
+                    note.told(told, &shown);
+                }
+                outcome
             }
         };
         if let Some(note) = self.notes.last_mut() {
@@ -313,6 +336,7 @@ impl Player {
             }),
             Err(skip) => return Gone::Skipped(skip),
         };
+        link.noted.exchange.begin(Instant::START);
         let at_rest = self.prepare(own, self.limits.motion, link);
         self.before = Some(link.noted.received());
         self.take_notes(&link.noted);
@@ -325,7 +349,29 @@ impl Player {
         }
         link.begin();
         link.take_late();
-        let outcome = play(&own.plan, link, AtMismatch::Stop);
+        let at_mismatch = match self.goes_on.contains(&own.name) {
+            true => AtMismatch::GoOn,
+            false => AtMismatch::Stop,
+        };
+        let outcome = play(&own.plan, link, at_mismatch);
+        if link.time_tolerance() > Span::ZERO {
+            // What is missing may still be under way.
+            let under_way = match outcome.verdict {
+                Verdict::Failed => link.time_tolerance() * STILL_COMES,
+                _ => Span::ZERO,
+            };
+            let end = link.now() + under_way;
+            loop {
+                link.wait(end);
+                while link.receive(0).is_some() {}
+                if link.now() >= end || link.trouble().is_some() {
+                    break;
+                }
+            }
+            let now = link.now();
+            link.wait(now);
+            while link.receive(0).is_some() {}
+        }
         self.take_notes(&link.noted);
         let settings = link
             .noted
@@ -480,109 +526,6 @@ impl Player {
         }
         self.moved.iter().for_each(|rx| gate.note_moved(*rx));
     }
-
-    /// Whether a line that was not met accuses the drive.
-    fn judged(&self, own: &Own, outcome: Outcome, way: LinkTimes, unlike: &[(u8, u8)]) -> Outcome {
-        if outcome.verdict != Verdict::Failed {
-            return outcome.judged_by(&own.plan);
-        }
-        let asks_for = own.asks_for();
-        let unlike = unlike
-            .iter()
-            .find(|(_, register)| asks_for.contains(register));
-        let real = way.tolerance > Span::ZERO;
-        let why = if real && way.late > way.tolerance {
-            Some(format!(
-                "the computer was late by {}: this may not be the drive's fault",
-                way.late
-            ))
-        } else if real && way.longest > way.tolerance {
-            Some(format!(
-                "a request and its reply took {} over the adapter: this may not be the drive's fault",
-                way.longest
-            ))
-        } else if let Some((node, register)) = unlike {
-            Some(format!(
-                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
-                 another firmware",
-                Register::of(*register).name
-            ))
-        } else {
-            self.left_open(own, way).map(|property| {
-                format!(
-                    "a correct drive with {property} does not meet it either, and this is not known"
-                )
-            })
-        };
-        match why {
-            None => outcome,
-            Some(why) => Outcome {
-                verdict: Verdict::Inconclusive,
-                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
-                ..outcome
-            },
-        }
-    }
-
-    /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
-    /// settled, the place of its clock, or times in which frames leave.
-    fn left_open(&self, own: &Own, way: LinkTimes) -> Option<String> {
-        let fails = |other: Other<'_>| {
-            let played = self.rehearse(own, &self.limits, other);
-            played.denied.is_some() || played.outcome.verdict != Verdict::Passed
-        };
-        for phase in PHASES.map(|own| Span::from_micros(own * 1_000 / 32)) {
-            let other = Other {
-                phase,
-                ..Other::default()
-            };
-            if fails(other) {
-                return Some(format!("its clock of 1 ms ahead by {phase}"));
-            }
-        }
-        for slow in way.slow() {
-            let other = Other {
-                slow: Some(slow),
-                ..Other::default()
-            };
-            if fails(other) {
-                return Some(format!(
-                    "an adapter through which frames leave {} late",
-                    slow.by
-                ));
-            }
-        }
-        for (place, known) in self.known().iter().enumerate() {
-            for (words, other) in known.candidates() {
-                let drives = self.known().iter().enumerate();
-                let all: Vec<_> = drives
-                    .map(|(at, own)| if at == place { other } else { own.properties })
-                    .collect();
-                let other = Other {
-                    properties: Some(&all),
-                    ..Other::default()
-                };
-                if fails(other) {
-                    return Some(words);
-                }
-            }
-        }
-        None
-    }
-}
-
-/// The registers in which drives and their models read differently at rest, by number and register.
-fn unlike(drives: &AtRest, models: &AtRest) -> Vec<(u8, u8)> {
-    let mask = |(node, register, bits): &(u8, u8, u32)| {
-        (*node, *register, bits & Register::of(*register).mask())
-    };
-    let models: BTreeSet<_> = models.iter().map(mask).collect();
-    let drives: BTreeSet<_> = drives.iter().map(mask).collect();
-    let differing = drives.symmetric_difference(&models);
-    let places: BTreeSet<_> = differing
-        .map(|(node, register, _)| (*node, *register))
-        .collect();
-    places.into_iter().collect()
 }
 
 /// Whether the profiles have different values of a property.

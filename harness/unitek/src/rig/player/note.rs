@@ -5,6 +5,7 @@
 
 use super::super::known::Known;
 use super::super::observed::Observed;
+use super::worlds::{Shown as Sent, Told};
 use super::{Gone, Own, PHASES, Player};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
@@ -49,6 +50,10 @@ pub(crate) struct Note {
     /// What was known of the drives in it.
     drives: Vec<Known>,
     shown: Shown,
+    /// Its frames and their times, where time is real.
+    told: Option<Told>,
+    /// Whether no right drive could have sent them then.
+    wrong: bool,
     /// The verdict.
     pub(crate) verdict: Verdict,
     /// Whether the drives did something that no correct drive does, as far as is known.
@@ -131,6 +136,26 @@ impl Note {
         self.accuses = outcome.verdict == Verdict::Failed || unready;
     }
 
+    /// Notes its frames and their times, and what right drives say of them.
+    pub(super) fn told(&mut self, told: Told, shown: &Sent) {
+        self.wrong = matches!(shown, Sent::Wrong(_));
+        self.told = Some(told).filter(|_| !self.exact);
+    }
+
+    /// Whether the frames and their times are those that a drive with a deviation could have sent.
+    fn told_by(&self, place: usize, deviation: &'static Deviation) -> bool {
+        let (Some(told), Some(known)) = (&self.told, self.drives.get(place)) else {
+            return true;
+        };
+        let all = std::iter::once(known.properties);
+        let others = known.candidates().into_iter().map(|own| own.1);
+        let mut all = all.chain(others);
+        all.any(|properties| {
+            let setup = deviant(known, properties, deviation);
+            self.begun.could_deviate(known, &setup, told)
+        })
+    }
+
     /// Whether the scenario was played, or the drives did not become ready for it.
     fn was_tried(&self) -> bool {
         self.shown.unanswered.is_some() || self.shown.ended.is_some()
@@ -169,6 +194,14 @@ impl Note {
 
     /// Whether drives that differ so would have shown the same.
     pub(crate) fn is_explained_by(&self, other: Other) -> bool {
+        let same = self.is_shown_by(other);
+        match other {
+            Other::Deviates(place, deviation) => same && self.told_by(place, deviation),
+            Other::Right => same && !self.wrong,
+        }
+    }
+
+    fn is_shown_by(&self, other: Other) -> bool {
         let known: Vec<_> = self.drives.iter().map(|own| own.properties).collect();
         let each = match other {
             Other::Right => 1,
@@ -322,6 +355,8 @@ impl Player {
             begun,
             drives: drives.collect(),
             shown: Shown::of(gone, link, exact),
+            told: None,
+            wrong: false,
             exact,
             verdict: Verdict::Skipped,
             accuses: false,

@@ -1,11 +1,11 @@
 //! A scenario of this bus, read for a rig.
 
-use super::{AT_REST, Known};
+use super::{AT_REST, CONVERSATION, Known};
 use crate::language::Unitek;
 use crate::language::plan::{Act, WantedFrame};
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::pattern::Expected;
-use harness_bench::scenario::plan::{Plan, PlannedAction, plan};
+use harness_bench::scenario::plan::{Plan, PlannedAction, PlannedStep, plan};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
@@ -30,7 +30,13 @@ impl Own {
     /// Reads a scenario.
     pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Unitek> = parse(source)?;
-        let plan = plan(&scenario, source, None)?;
+        let mut plan = plan(&scenario, source, None)?;
+        // What comes in a conversation of which no line waits for a frame is judged by right drives alone.
+        let waits = |own: &Step| {
+            let receives = matches!(own.action, PlannedAction::Receive(..));
+            receives || matches!(own.action, PlannedAction::Own(Act::Quiet))
+        };
+        plan.strict &= !source.name.starts_with(CONVERSATION) || plan.steps.iter().any(waits);
         Ok(Self {
             name: source.name.clone(),
             scenario,
@@ -60,19 +66,33 @@ impl Own {
 
     /// The registers whose contents its lines ask for.
     pub(super) fn asks_for(&self) -> BTreeSet<u8> {
-        let first = |wanted: &WantedFrame| match wanted.data.first() {
-            Some(Expected::Byte(register)) => Some(*register),
-            _ => None,
-        };
-        let steps = self.plan.steps.iter();
-        let all = steps.flat_map(|step| match &step.action {
-            PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
-            PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
-            PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
-            PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
-            _ => Vec::new(),
-        });
-        all.collect()
+        self.plan.steps.iter().flat_map(asks).collect()
+    }
+
+    /// The registers that the step at a place of the text asks for, and those that the steps behind it ask for.
+    pub(super) fn asks_from(&self, place: usize) -> [Vec<u8>; 2] {
+        let all = self.plan.steps.iter();
+        let (at, behind): (Vec<_>, Vec<_>) = all
+            .filter(|own| own.span.start >= place)
+            .partition(|own| own.span.start == place);
+        [at, behind].map(|own| own.into_iter().flat_map(asks).collect())
+    }
+}
+
+type Step = PlannedStep<Unitek>;
+
+/// The registers whose contents a step asks for.
+fn asks(step: &Step) -> Vec<u8> {
+    let first = |wanted: &WantedFrame| match wanted.data.first() {
+        Some(Expected::Byte(register)) => Some(*register),
+        _ => None,
+    };
+    match &step.action {
+        PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
+        PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
+        PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
+        PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
+        _ => Vec::new(),
     }
 }
 

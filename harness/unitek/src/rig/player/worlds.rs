@@ -1,0 +1,227 @@
+//! What came in an attempt, judged by right drives: whether one of them could have sent it.
+
+use super::super::known::Known;
+use super::super::observed::Exchange;
+use super::Player;
+use crate::judge::World;
+use crate::language::written;
+use crate::simulate::DriveSetup;
+use harness_bench::qualify::worlds::{Dialogue, Judged, Timed, judge_alive};
+use harness_bench::rig::segment::observed::LinkTimes;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::properties::{Dlc4, Properties};
+use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS_NOT_READY, status};
+use harness_proto::unitek::{Reply, Request};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// How far ahead of its time a frame may leave: an adapter takes frames before the bus is free.
+const AHEAD: Span = Span::from_millis(3);
+
+/// How late a frame usually is at most.
+const USUALLY: Span = Span::from_millis(3);
+
+/// How much later than the slowest one that was measured a frame may be.
+const WORSE: u64 = 3;
+
+/// The second pair of identifiers, and the first.
+const IDENTIFIERS: [u8; 4] = [0x68, 0x69, 0x88, 0x89];
+
+/// Bits of D8 that show inputs, and the inputs one by one (UNITEK 4).
+const INPUT_BITS: u32 = 0x003F;
+const INPUTS: std::ops::RangeInclusive<u8> = 0xE4..=0xE8;
+
+/// The frames of an attempt, and what is known of their times.
+#[derive(Clone, Debug)]
+pub(super) struct Told {
+    pub(super) talk: Exchange,
+    pub(super) way: LinkTimes,
+    /// Registers that read something else at rest than those of the model, by drive.
+    pub(super) unlike: Vec<(u8, u8)>,
+}
+
+impl Told {
+    fn measured(&self) -> Span {
+        self.way.late.max(self.way.longest)
+    }
+
+    /// How late a frame may be.
+    fn slowest(&self) -> Span {
+        (self.measured() * WORSE).max(self.way.tolerance)
+    }
+
+    fn unlike(&self, known: &Known) -> Arc<BTreeSet<u8>> {
+        let own = self.unlike.iter().filter(|own| own.0 == known.axis.node);
+        Arc::new(own.map(|own| own.1).collect())
+    }
+}
+
+/// What right drives say of an attempt.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// Something no right drive would have sent, in a sentence.
+    Wrong(String),
+    /// Right drives could have sent all of it, and nothing more.
+    Complete,
+    /// Right drives could have sent all of it.
+    Right,
+    /// It was not compared, or not to its end.
+    Unknown,
+}
+
+impl Shown {
+    /// What several drives come to.
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Wrong(why), _) | (_, Self::Wrong(why)) => Self::Wrong(why),
+            (Self::Unknown, _) | (_, Self::Unknown) => Self::Unknown,
+            (Self::Complete, Self::Complete) => Self::Complete,
+            _ => Self::Right,
+        }
+    }
+}
+
+impl Player {
+    /// Whether right drives could have sent what came.
+    pub(super) fn shown(&self, told: &Told) -> Shown {
+        let each = self.known().iter().map(|known| self.shown_by(known, told));
+        each.reduce(Shown::and).unwrap_or(Shown::Unknown)
+    }
+
+    fn shown_by(&self, known: &Known, told: &Told) -> Shown {
+        let unlike = told.unlike(known);
+        let talk = &told.talk;
+        let Some(came) = self.came_from(known, talk) else {
+            return Shown::Unknown;
+        };
+        let judged = |properties, late: Span, (overtakes, complete)| {
+            let talk = Dialogue {
+                overtakes,
+                complete,
+                ..conversation(talk, &came, late)
+            };
+            let world = self.world(known, properties, &unlike);
+            judge_alive(vec![world], &talk, &|| self.beats.beat())
+        };
+        let slowest = told.slowest();
+        // Few worlds explain most conversations.
+        for (late, overtakes) in [(told.measured() + USUALLY, false), (slowest, true)] {
+            match judged(known.properties, late, (overtakes, true)) {
+                Judged::Right => return Shown::Complete,
+                Judged::TooMany | Judged::Unknown => return Shown::Unknown,
+                Judged::Wrong(..) => {}
+            }
+        }
+        let others = || known.candidates().into_iter().map(|own| own.1);
+        let mut wrong = None;
+        for properties in std::iter::once(known.properties).chain(others()) {
+            match judged(properties, slowest, (true, false)) {
+                Judged::Right => return Shown::Right,
+                Judged::TooMany | Judged::Unknown => return Shown::Unknown,
+                Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
+            }
+        }
+        let words = |(place, expected)| words(known, (&came, place), expected);
+        wrong.map_or(Shown::Unknown, |own| Shown::Wrong(words(own)))
+    }
+
+    /// Whether a drive with a deviation could have sent what came from it in an attempt; true where that is not compared.
+    pub(super) fn could_deviate(&self, known: &Known, setup: &DriveSetup, shown: &Told) -> bool {
+        let Some(came) = self.came_from(known, &shown.talk) else {
+            return true;
+        };
+        let talk = Dialogue {
+            overtakes: true,
+            ..conversation(&shown.talk, &came, shown.slowest())
+        };
+        let drive = setup.drive(self.rate, Instant::START);
+        let world = World::new(drive, shown.unlike(known), false);
+        let judged = judge_alive(vec![world], &talk, &|| self.beats.beat());
+        !matches!(judged, Judged::Wrong(..))
+    }
+
+    fn world(&self, known: &Known, properties: Properties, unlike: &Arc<BTreeSet<u8>>) -> World {
+        let drive = known.model(properties).drive(self.rate, Instant::START);
+        let homing = known.settled.contains("homing-time");
+        World::new(drive, Arc::clone(unlike), homing)
+    }
+
+    /// What came from a drive; `None` where that is not known, or where something beside the bus has changed the drive.
+    fn came_from(&self, known: &Known, talk: &Exchange) -> Option<Vec<(Instant, Instant, Frame)>> {
+        let axis = known.axis;
+        let moved = talk.sent.iter().any(|(_, frame)| {
+            let rx = u16::try_from(frame.id().number()).unwrap_or(0);
+            matches!(Request::decode(frame, rx, Dlc4::As3),
+                Ok(Request::Write { register, .. }) if IDENTIFIERS.contains(&register))
+        });
+        let stands = known.cells.get(&0xF5).is_none_or(|own| own & 1 == 1);
+        let timed_out = known.cell(0x8F) & ERROR_TIME_OUT != 0;
+        if moved || !stands || timed_out || known.cells.is_empty() {
+            return None;
+        }
+        let own = |came: &&(Instant, Instant, Frame)| {
+            came.2.id().number() == u32::from(axis.tx) && !came.2.id().is_extended()
+        };
+        let came: Vec<_> = talk.came.iter().filter(own).copied().collect();
+        let changed = came.iter().any(|(_, _, frame)| {
+            let reply = Reply::decode(frame, axis.tx);
+            let differs = |own: &Reply| own.data.bits() ^ known.cell(own.register);
+            reply.is_ok_and(|own| match own.register {
+                0x40 => {
+                    differs(&own) & (status::LIMIT_PLUS | status::LIMIT_MINUS | status::CONTINUOUS)
+                        != 0
+                }
+                0x8F => differs(&own) & ERRORS_NOT_READY & !ERROR_TIME_OUT != 0,
+                0xD8 => differs(&own) & INPUT_BITS != 0,
+                register => INPUTS.contains(&register) && differs(&own) & 1 != 0,
+            })
+        });
+        (!changed).then_some(came)
+    }
+}
+
+/// A conversation in which each frame may have been this late.
+fn conversation(
+    talk: &Exchange,
+    came: &[(Instant, Instant, Frame)],
+    late: Span,
+) -> Dialogue<Frame> {
+    let sent = talk.sent.iter().map(|(at, piece)| Timed {
+        earliest: *at - AHEAD,
+        latest: *at + late,
+        piece: *piece,
+    });
+    let came = came.iter().map(|(at, read, piece)| Timed {
+        earliest: *at - late,
+        latest: *read,
+        piece: *piece,
+    });
+    Dialogue {
+        sent: sent.collect(),
+        came: came.collect(),
+        end: talk.read,
+        lag: late,
+        overtakes: false,
+        complete: false,
+    }
+}
+
+/// What no right drive would have sent.
+fn words(
+    known: &Known,
+    (came, place): (&[(Instant, Instant, Frame)], usize),
+    expected: Option<Frame>,
+) -> String {
+    let node = known.axis.node;
+    let came = came.get(place).map(|own| written(&own.2));
+    let expected = expected.map(|own| written(&own));
+    match (came, expected) {
+        (Some(came), Some(expected)) => {
+            format!("no right drive {node} sends {came} here, where {expected} is expected")
+        }
+        (Some(came), None) => format!("no right drive {node} sends {came} here"),
+        (None, Some(expected)) => format!("{expected} of drive {node} has not come"),
+        (None, None) => format!("drive {node} does not do what a right one does"),
+    }
+}
