@@ -34,6 +34,12 @@ pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
 /// A campaign that was found and read; or what is wrong with it, with file, place and remedy.
 pub(crate) type ReadCampaign = Result<Box<dyn LineCampaign>, String>;
 
+/// Makes a scenario of traces, with this title and the drives' header.
+type Replayed = fn(&[Trace], &str, Option<&Source>) -> Result<String, String>;
+
+/// Judges traces by the drives' header: the drives that are named, or all; times may be off by as much.
+type JudgedCapture = fn(&[Trace], Option<&Source>, (&[u8], Span)) -> Result<JudgedFrames, String>;
+
 /// A bus.
 pub struct Bus {
     pub name: BusName,
@@ -71,10 +77,10 @@ pub struct SharedLine {
     pub report: &'static dyn SegmentReport,
     /// The file that describes this many drives to other tools.
     pub description: fn(u16) -> String,
-    /// A scenario that replays a capture: its traces, title and the drives' header; or what is missing, in a sentence.
-    pub replayed: fn(&[Trace], &str, Option<&Source>) -> Result<String, String>,
-    /// Judges a capture by the drives' header: the drives that are named, or all; times may be off by as much. Or what is missing.
-    pub judged: fn(&[Trace], Option<&Source>, (&[u8], Span)) -> Result<JudgedFrames, String>,
+    /// A scenario that replays a capture; or what is missing, in a sentence.
+    pub replayed: Replayed,
+    /// Judges a capture; or what is missing.
+    pub judged: JudgedCapture,
     /// The names of the built-in campaigns, in order.
     pub campaigns: fn() -> Vec<String>,
     /// Reads a campaign: a file that names the bus, or a built-in one by its name. `None` where it is neither.

@@ -36,10 +36,8 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::serve::{ServeEnd, ServeError};
 use crate::traffic::SegmentReport;
-pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
 use harness_sim::record::Trace;
-use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -142,18 +140,6 @@ pub(crate) fn report_of(traces: &[Trace]) -> Option<&'static dyn SegmentReport> 
 /// What these are traces of.
 pub(crate) fn carried(traces: &[Trace]) -> &'static str {
     report_of(traces).map_or("bytes of a ring", SegmentReport::carries)
-}
-
-/// Writes traces of a shared line.
-///
-/// # Errors
-/// Those of `out`, and [`std::io::ErrorKind::Unsupported`] for a form that the bus does not have.
-pub(crate) fn write_shared(
-    traces: &[Trace],
-    form: SharedForm,
-    mut out: impl Write,
-) -> std::io::Result<()> {
-    report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
 /// Runs a command on drives, in the words of the bus of its bench.

@@ -64,6 +64,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         let shown = ShownRun {
             title: &title,
             traces: &capture.traces,
+            report: report_of(&capture.traces),
             rate: capture.rate,
             records: &[],
         };

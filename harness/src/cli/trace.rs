@@ -7,7 +7,6 @@ use crate::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
 use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
 use crate::buses::novobus::report::vcd::{self, Signals};
 use crate::buses::novobus::report::{csv, json};
-use crate::buses::{SharedForm, report_of, write_shared};
 use crate::capture::Carries;
 use crate::capture::runs::bits_per_second;
 use crate::command::exit::Exit;
@@ -20,6 +19,7 @@ use crate::report::pcapng;
 use crate::scenario::files::sources;
 use crate::scenario::run::{AtMismatch, CellRecord};
 use crate::scenario::verdict::Verdict;
+use crate::traffic::{SegmentReport, SharedForm};
 use clap::ValueEnum as _;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
@@ -62,6 +62,7 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     let shown = ShownRun {
         title: &entry.scenario.title,
         traces: &played.traces,
+        report: entry.report(),
         rate: entry
             .plan
             .as_ref()
@@ -84,6 +85,8 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
 pub(crate) struct ShownRun<'s> {
     pub(crate) title: &'s str,
     pub(crate) traces: &'s [Trace],
+    /// How the bus shows them; `None` for a ring.
+    pub(crate) report: Option<&'static dyn SegmentReport>,
     pub(crate) rate: Rate,
     pub(crate) records: &'s [CellRecord],
 }
@@ -128,9 +131,9 @@ fn write(
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
-    if Carries::of(shown.traces) != Carries::Link {
+    if let Some(report) = shown.report {
         let signals = signals(showing);
-        return of_shared_line(shown.traces, (format, signals), rows, out);
+        return of_shared_line((report, shown.traces), (format, signals), rows, out);
     }
     match format {
         TraceFormat::Json => json::write(shown.traces, shown.records, out),
@@ -177,22 +180,21 @@ fn signals(showing: &TraceOutput) -> Signals {
 
 /// Writes what a shared line carried. Other forms have been refused by [`fits_bus`].
 fn of_shared_line(
-    traces: &[Trace],
+    (report, traces): (&dyn SegmentReport, &[Trace]),
     (format, signals): (TraceFormat, Signals),
     wanted: Option<Range<usize>>,
     mut out: impl Write,
 ) -> std::io::Result<()> {
+    let mut write = |form| report.write(traces, form, &mut out);
     match format {
         TraceFormat::Vcd => vcd::write_shared(traces, bits_per_second(traces), signals, out),
-        TraceFormat::Json => write_shared(traces, SharedForm::Json, out),
-        TraceFormat::Candump => write_shared(traces, SharedForm::Candump, out),
-        TraceFormat::Csv => write_shared(traces, SharedForm::Csv, out),
-        TraceFormat::Pcapng => write_shared(traces, SharedForm::Pcapng, out),
+        TraceFormat::Json => write(SharedForm::Json),
+        TraceFormat::Candump => write(SharedForm::Candump),
+        TraceFormat::Csv => write(SharedForm::Csv),
+        TraceFormat::Pcapng => write(SharedForm::Pcapng),
         _ => {
             for trace in traces {
-                let report = report_of(std::slice::from_ref(trace));
-                let text = report.map(|own| own.rows(trace, wanted.clone(), None));
-                let text = text.unwrap_or_default();
+                let text = report.rows(trace, wanted.clone(), None);
                 out.write_all(text.as_bytes())?;
             }
             out.flush()

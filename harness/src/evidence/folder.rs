@@ -12,11 +12,11 @@ use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::report::json;
-use crate::buses::{SharedForm, write_shared};
-use crate::capture::Carries;
+use crate::buses::report_of;
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
+use crate::traffic::SharedForm;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -299,9 +299,9 @@ impl Keeper for KeptAttempts<'_> {
 pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
     let mut capture = Vec::new();
     // Writing to a Vec cannot fail.
-    let _infallible = match Carries::of(traces) {
-        Carries::Link => json::write(traces, &outcome.records, &mut capture),
-        Carries::Line | Carries::Frames => write_shared(traces, SharedForm::Json, &mut capture),
+    let _infallible = match report_of(traces) {
+        None => json::write(traces, &outcome.records, &mut capture),
+        Some(report) => report.write(traces, SharedForm::Json, &mut capture),
     };
     String::from_utf8_lossy(&capture).into_owned()
 }
