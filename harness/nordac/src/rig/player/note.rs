@@ -3,7 +3,7 @@
 //! Where time is virtual, an attempt is explained by a model that ends it in the same way, at the same line, and sends the same octets at the
 //! same times. Where time is real, how often a telegram is repeated is not compared, nor what follows a motor; lines of scenarios compare that.
 
-use super::worlds::{could_send, drive, right_slaves_send};
+use super::worlds::{could_send, right_slaves_send};
 use super::{AttemptCourse, Own, Player};
 use crate::rig::known::{INTERFACE, Known, Values, stated};
 use crate::rig::observed::{Agreement, Came, Observed, Turn, WHOLE};
@@ -283,9 +283,10 @@ impl AttemptNote {
                 slave.deviation = Some(deviation);
                 slave.parameters.extend(stated(held));
             }
-            drive(&slave)
+            slave
         });
-        could_send(slaves.collect(), self.begun.rate, &self.turns).is_ok()
+        let slaves: Vec<_> = slaves.collect();
+        could_send(&slaves, self.begun.rate, &self.turns).is_ok()
     }
 
     /// What the attempt shows on models.
