@@ -26,7 +26,11 @@ fn hex(octets: &[u8]) -> String {
 ///
 /// # Errors
 /// No slave sent anything, in a sentence with the remedy.
-pub fn scenario(traces: &[Trace], title: &str, setup: Option<&Source>) -> Result<String, String> {
+pub(crate) fn scenario(
+    traces: &[Trace],
+    title: &str,
+    setup: Option<&Source>,
+) -> Result<String, String> {
     let runs: Vec<TelegramRun> = traces.iter().flat_map(runs).collect();
     let rate = traces.iter().find_map(rate);
     let title: String = title.chars().filter(|c| !c.is_control()).collect();
@@ -60,7 +64,7 @@ pub fn scenario(traces: &[Trace], title: &str, setup: Option<&Source>) -> Result
 
 /// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history. `named` are the slaves that are
 /// judged, where the user names some, and times may be off by `tolerance`.
-pub fn judged(
+pub(crate) fn judged(
     traces: &[Trace],
     setup: Option<&Source>,
     (named, tolerance): (&[u8], Span),

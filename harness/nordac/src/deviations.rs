@@ -4,7 +4,7 @@ use harness_bench::command::deviations::DeviationRow;
 use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, deviations};
 
 /// The deviations of slaves, and those of the bench's own master.
-pub fn rows() -> [Vec<DeviationRow>; 2] {
+pub(crate) fn rows() -> [Vec<DeviationRow>; 2] {
     let slaves = deviations().map(|own| DeviationRow {
         name: own.name,
         section: own.section,

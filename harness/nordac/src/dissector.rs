@@ -29,9 +29,8 @@ const REASONS: [(&str, Reason); 10] = [
     ("finish", Reason::End),
 ];
 
-/// The dissector.
 #[must_use]
-pub fn dissector() -> String {
+pub(crate) fn dissector() -> String {
     let tables = [
         ("SERVICES", rows(Service::ALL.iter().map(service))),
         ("FUNCTIONS", rows(Function::ALL.iter().map(function))),

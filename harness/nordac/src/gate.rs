@@ -11,7 +11,7 @@ use std::any::Any;
 
 /// The gate of one port.
 #[derive(Clone, Debug)]
-pub struct LineGate {
+pub(crate) struct LineGate {
     gate: guard::Gate,
     /// Nothing is sent.
     listen_only: bool,
@@ -20,7 +20,12 @@ pub struct LineGate {
 impl LineGate {
     /// A gate in front of a segment of this rate with these slaves. With `listen_only` it admits nothing.
     #[must_use]
-    pub fn new(limits: Limits, rate: BusRate, slaves: &[GuardedSlave], listen_only: bool) -> Self {
+    pub(crate) fn new(
+        limits: Limits,
+        rate: BusRate,
+        slaves: &[GuardedSlave],
+        listen_only: bool,
+    ) -> Self {
         Self {
             gate: guard::Gate::new(limits, rate, slaves),
             listen_only,
@@ -160,7 +165,7 @@ impl Gate for LineGate {
 }
 
 /// A link to NORDAC inverters behind its gate. What the limits deny is no capability of it.
-pub fn guarded<L: Link>(
+pub(crate) fn guarded<L: Link>(
     inner: L,
     limits: Limits,
     slaves: &[GuardedSlave],

@@ -1,31 +1,31 @@
 //! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
 #![forbid(unsafe_code)]
 
-pub mod campaign;
-pub mod capture;
+mod campaign;
+mod capture;
 #[cfg(test)]
 mod captured_levels_tests;
 #[cfg(test)]
 mod captured_tests;
-pub mod cli;
-pub mod deviations;
-pub mod dissector;
-pub mod driver;
-pub mod explore;
-pub mod gate;
-pub mod judge;
-pub mod language;
+mod cli;
+mod deviations;
+mod dissector;
+mod driver;
+mod explore;
+mod gate;
+mod judge;
+mod language;
 mod live;
-pub mod manual;
-pub mod report;
-pub mod rig;
-pub mod safe_state;
-pub mod serve;
+mod manual;
+mod report;
+mod rig;
+mod safe_state;
+mod serve;
 #[cfg(test)]
 mod serve_tests;
-pub mod simulate;
-pub mod stream;
-pub mod value;
+mod simulate;
+mod stream;
+mod value;
 
 use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;

@@ -5,7 +5,7 @@ use harness_bench::manual::{Manual, Open};
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 
 /// The manual of PROFIBUS DP for NORDAC *vector*.
-pub const MANUAL: Manual = Manual {
+pub(crate) const MANUAL: Manual = Manual {
     bus: BusName::Nordac,
     title: "NORDAC vector PROFIBUS DP manual",
     document: "nordac",

@@ -40,7 +40,7 @@ const OUTPUT: u16 = zsw::READY_TO_START | zsw::READY | zsw::ENABLED;
 /// its motor goes on running (2.6): each slave is therefore taken into the exchange again, and is sent the words once more. A slave of an unknown
 /// PPO type refuses every configuration but its own.
 #[must_use]
-pub fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
+pub(crate) fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
     let telegram = |address, service: Service, data: &[u8]| {
         let mut first = Requests::new(MASTER, address).ok()?;
         let pdu = first.request(service, data).ok()?;
@@ -79,7 +79,7 @@ fn safe_image() -> Image {
 
 /// Takes every inverter to its safe state and reads it back. One that runs is first stopped on its quick-stop ramp (1615), where the rig's
 /// file wants a stop, for as long as the file says; then its output is switched off (OFF2, 047D), until the status word shows it.
-pub fn safe_state<L: Line>(
+pub(crate) fn safe_state<L: Line>(
     line: &mut Guarded<L>,
     slaves: &[RigSlave],
     patience: Span,

@@ -60,7 +60,7 @@ struct Seat {
 
 /// A segment of drives with places for masters.
 #[derive(Debug)]
-pub struct SegmentServer {
+pub(crate) struct SegmentServer {
     pub(super) bench: Bench,
     pub(super) plan: Plan<Nordac>,
     marks: ErrorMarks,
@@ -82,7 +82,10 @@ const USUAL: u8 = 8;
 ///
 /// # Errors
 /// The header has mistakes. Steps behind it are ignored.
-pub fn bench(addresses: Option<&[u8]>, header: Option<&Source>) -> Result<Plan<Nordac>, Problems> {
+pub(crate) fn bench(
+    addresses: Option<&[u8]>,
+    header: Option<&Source>,
+) -> Result<Plan<Nordac>, Problems> {
     let usual = if header.is_none() { &[USUAL][..] } else { &[] };
     let lines = addresses
         .unwrap_or(usual)
@@ -104,7 +107,7 @@ pub fn bench(addresses: Option<&[u8]>, header: Option<&Source>) -> Result<Plan<N
 
 impl SegmentServer {
     /// Serves the slaves of a plan to this number of clients.
-    pub fn new(plan: Plan<Nordac>, clients: usize, marks: ErrorMarks) -> Self {
+    pub(crate) fn new(plan: Plan<Nordac>, clients: usize, marks: ErrorMarks) -> Self {
         let mut bench = Bench::with_guests(&plan.setup, clients.saturating_sub(1));
         bench.line().keep_no_record();
         Self {

@@ -27,27 +27,27 @@ const PPO: u16 = 1622;
 
 /// A slave as it is switched on.
 #[derive(Clone, Debug)]
-pub struct SlaveSetup {
+pub(crate) struct SlaveSetup {
     /// Its address at first, 1 to 126: by it scenarios and records name the slave, whatever address it is given later.
-    pub address: u8,
+    pub(crate) address: u8,
     /// The PPO type that it is set to.
-    pub ppo: PpoType,
+    pub(crate) ppo: PpoType,
     /// Whether it has the PosiCon option.
-    pub posicon: bool,
+    pub(crate) posicon: bool,
     /// What the manual leaves open.
-    pub properties: Properties,
+    pub(crate) properties: Properties,
     /// Parameters that differ from the factory settings, and their values.
-    pub parameters: Vec<(&'static Parameter, Index, i64)>,
+    pub(crate) parameters: Vec<(&'static Parameter, Index, i64)>,
     /// The way in which it breaks the bus standard or the manual, if it does.
-    pub deviation: Option<&'static Deviation>,
+    pub(crate) deviation: Option<&'static Deviation>,
     /// What it keeps of the time before; nothing where it was just switched on and never had a fault.
-    pub history: History,
+    pub(crate) history: History,
 }
 
 impl SlaveSetup {
     /// A slave with factory settings but for its address.
     #[must_use]
-    pub fn new(address: u8) -> Self {
+    pub(crate) fn new(address: u8) -> Self {
         Self {
             address,
             ppo: PpoType::One,
@@ -61,7 +61,7 @@ impl SlaveSetup {
 
     /// The slave, switched on at `power_up`.
     #[must_use]
-    pub fn drive(&self, rate: BusRate, power_up: Instant) -> Deviant {
+    pub(crate) fn drive(&self, rate: BusRate, power_up: Instant) -> Deviant {
         let none = Index::default();
         let own = [
             (ADDRESS, none, self.address.into()),
@@ -88,21 +88,20 @@ impl SlaveSetup {
 
 /// A segment and its slaves.
 #[derive(Clone, Debug)]
-pub struct Setup {
+pub(crate) struct Setup {
     /// The bit rate of all stations.
-    pub rate: BusRate,
-    /// The slaves.
-    pub slaves: Vec<SlaveSetup>,
+    pub(crate) rate: BusRate,
+    pub(crate) slaves: Vec<SlaveSetup>,
     /// The way in which the bench's own master deviates, if it does.
-    pub master: Option<&'static MasterDeviation>,
+    pub(crate) master: Option<&'static MasterDeviation>,
 }
 
 /// A station of the segment: a host, or a slave.
-pub type SegmentStation = Member<Box<Deviant>>;
+pub(crate) type SegmentStation = Member<Box<Deviant>>;
 
 /// A bench on a segment of simulated slaves. Its own host has one port.
 #[derive(Debug)]
-pub struct Bench {
+pub(crate) struct Bench {
     line: OctetSegment<SegmentStation>,
     rate: BusRate,
     /// The slaves as they were set up: slave `k` has place `k + 1` on the line.
@@ -127,7 +126,7 @@ impl Bench {
 
     /// A bench with the slaves of a setup, all just switched on.
     #[must_use]
-    pub fn new(setup: &Setup) -> Self {
+    pub(crate) fn new(setup: &Setup) -> Self {
         Self::with_guests(setup, 0)
     }
 
@@ -190,7 +189,7 @@ impl Bench {
 
     /// A parameter of a slave beside its bus; `None` if the slave does not have it.
     #[must_use]
-    pub fn parameter(
+    pub(crate) fn parameter(
         &self,
         slave: u8,
         parameter: Option<&'static Parameter>,
@@ -201,7 +200,7 @@ impl Bench {
 
     /// A slave, beside its bus.
     #[must_use]
-    pub fn drive(&self, slave: u8) -> Option<&Drive> {
+    pub(crate) fn drive(&self, slave: u8) -> Option<&Drive> {
         let station = self.line.station(self.place(slave)?);
         station.drive().map(|own| own.drive())
     }

@@ -9,14 +9,14 @@ use harness_proto::nordac::words::{STW, State, ZSW, set_bits};
 use harness_proto::nordac::{Image, PARAMETERS, Parameter, ParameterRef};
 
 /// The word that means every parameter.
-pub const ALL: &str = "all";
+pub(crate) const ALL: &str = "all";
 
 /// The word that begins the next step of an exchange.
-pub const THEN: &str = "then";
+pub(crate) const THEN: &str = "then";
 
 /// A process word of a reply (NORDAC 3.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReplyWord {
+pub(crate) enum ReplyWord {
     /// The status word.
     Status,
     /// The main actual value.
@@ -27,22 +27,21 @@ pub enum ReplyWord {
 
 impl ReplyWord {
     /// All of them, with their names.
-    pub const ALL: [(&'static str, Self); 3] = [
+    pub(crate) const ALL: [(&'static str, Self); 3] = [
         ("ZSW", Self::Status),
         ("HIW", Self::Actual),
         ("PZD4", Self::Second),
     ];
 
-    /// The name.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         let own = Self::ALL.iter().find(|(_, word)| *word == self);
         own.map_or("", |(name, _)| name)
     }
 
     /// Its value in a reply.
     #[must_use]
-    pub const fn of(self, image: &Image) -> u16 {
+    pub(crate) const fn of(self, image: &Image) -> u16 {
         match self {
             Self::Status => image.first(),
             Self::Actual => image.main(),
@@ -52,7 +51,7 @@ impl ReplyWord {
 
     /// Its meaning: the state, percent of the maximum frequency, or nothing (what PZD4 means, 1517 says).
     #[must_use]
-    pub fn words(self, value: u16) -> String {
+    pub(crate) fn words(self, value: u16) -> String {
         match self {
             Self::Status => status(value),
             Self::Actual => percentage(value),
@@ -63,7 +62,7 @@ impl ReplyWord {
 
 /// A setpoint or actual value in percent of the maximum frequency, with one decimal place.
 #[must_use]
-pub fn percentage(word: u16) -> String {
+pub(crate) fn percentage(word: u16) -> String {
     // Adding 0 makes -0 positive.
     let tenths = (percent(word) * 10.0).round() / 10.0 + 0.0;
     format!("{tenths:.1} %")
@@ -71,7 +70,7 @@ pub fn percentage(word: u16) -> String {
 
 /// What is read of a slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// A process word of a reply.
     Word(ReplyWord),
     /// A parameter, of one set and element.
@@ -81,7 +80,7 @@ pub enum Cell {
 impl Cell {
     /// How it is called: `ZSW`, `1205.3 Maximum frequ.`
     #[must_use]
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         match self {
             Self::Word(word) => word.name().to_owned(),
             Self::Parameter(own) => format!("{own} {}", own.parameter.name),
@@ -93,7 +92,7 @@ impl Cell {
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn parameter(text: &str) -> Result<ParameterRef, String> {
+pub(crate) fn parameter(text: &str) -> Result<ParameterRef, String> {
     ParameterRef::parse(text).map_err(|error| {
         let names: Vec<_> = PARAMETERS.iter().map(|own| own.name).collect();
         let near = match error {
@@ -111,7 +110,7 @@ pub fn parameter(text: &str) -> Result<ParameterRef, String> {
 ///
 /// # Errors
 /// The first name that is wrong.
-pub fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
+pub(crate) fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
     let mut found: Vec<Cell> = Vec::new();
     for text in texts {
         let word = ReplyWord::ALL
@@ -137,7 +136,7 @@ pub fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
 }
 
 /// Every set and element of the parameters that are wanted.
-pub fn every(wanted: impl Fn(&Parameter) -> bool) -> impl Iterator<Item = ParameterRef> {
+pub(crate) fn every(wanted: impl Fn(&Parameter) -> bool) -> impl Iterator<Item = ParameterRef> {
     PARAMETERS
         .iter()
         .filter(move |own| wanted(own))
@@ -154,18 +153,17 @@ pub fn every(wanted: impl Fn(&Parameter) -> bool) -> impl Iterator<Item = Parame
 
 /// What is to be written into a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Assignment {
-    /// The parameter.
-    pub parameter: ParameterRef,
+pub(crate) struct Assignment {
+    pub(crate) parameter: ParameterRef,
     /// Its value, in steps of its unit.
-    pub number: i64,
+    pub(crate) number: i64,
 }
 
 /// Reads assignments: `1205.3=50Hz`, or in words of their own `Accel. time = 5 s`.
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn assignments(texts: &[String]) -> Result<Vec<Assignment>, String> {
+pub(crate) fn assignments(texts: &[String]) -> Result<Vec<Assignment>, String> {
     // A space can stand anywhere in an assignment: the next one begins behind a value and its unit.
     let mut all: Vec<(String, Option<String>)> = Vec::new();
     for text in texts {
@@ -231,22 +229,22 @@ fn assignment(name: &str, value: &str) -> Result<Assignment, String> {
 
 /// The words of one step of an exchange. What is not given stays as it is in the step before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ExchangeStep {
+pub(crate) struct ExchangeStep {
     /// STW.
-    pub control: Option<u16>,
+    pub(crate) control: Option<u16>,
     /// HSW.
-    pub setpoint: Option<Setpoint>,
+    pub(crate) setpoint: Option<Setpoint>,
     /// PZD3.
-    pub third: Option<u16>,
+    pub(crate) third: Option<u16>,
     /// PZD4.
-    pub fourth: Option<u16>,
+    pub(crate) fourth: Option<u16>,
 }
 
 /// Reads the steps of an exchange: `STW=047E then STW=047F HSW=50%`.
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn steps(texts: &[String]) -> Result<Vec<ExchangeStep>, String> {
+pub(crate) fn steps(texts: &[String]) -> Result<Vec<ExchangeStep>, String> {
     let mut steps = vec![ExchangeStep::default()];
     for text in texts {
         if text == THEN {
@@ -280,7 +278,7 @@ pub fn steps(texts: &[String]) -> Result<Vec<ExchangeStep>, String> {
 
 /// A value of a parameter in words: with its unit, as a fault, or as bits.
 #[must_use]
-pub fn shown(parameter: &ParameterRef, number: i64) -> String {
+pub(crate) fn shown(parameter: &ParameterRef, number: i64) -> String {
     let element = parameter.index.element;
     let fault = matches!(
         (parameter.parameter.number, element),
@@ -302,7 +300,7 @@ fn named<'n>(names: impl Iterator<Item = &'n str>) -> String {
 
 /// The state that a status word shows, and its other bits that are 1 (NORDAC 3.2.2).
 #[must_use]
-pub fn status(zsw: u16) -> String {
+pub(crate) fn status(zsw: u16) -> String {
     // The bits of the state itself, and OFF2 and OFF3, which are named where they are active.
     const STATE: u16 = 0x007F;
     let state = State::of_zsw(zsw).map_or("no state of the manual", State::name);

@@ -3,6 +3,7 @@
 mod captures;
 mod cli;
 mod cli_drive;
+mod crates;
 mod dbc;
 #[path = "../common/debian.rs"]
 mod debian;

@@ -18,11 +18,11 @@ const PINNED: [&str; 5] = ["8.", "9.", "10.", "13.", "14."];
 /// July 1993, which the model, a newer drive, has not got.
 const NOT_IN_BYTES: [&str; 2] = ["nd21 13.1.5.1", "nd21 14.3.3 old"];
 
-fn root() -> &'static Path {
+pub(super) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn files(folder: &str, ending: &str) -> Vec<PathBuf> {
+pub(super) fn files(folder: &str, ending: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root().join(folder)];
     while let Some(folder) = folders.pop() {
@@ -39,7 +39,7 @@ fn files(folder: &str, ending: &str) -> Vec<PathBuf> {
     files
 }
 
-fn read(path: &Path) -> String {
+pub(super) fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
@@ -218,62 +218,6 @@ fn rooms_import_from_rooms_in_front_of_them() {
     seen.insert("counted".to_owned());
     let missing: Vec<_> = ROOMS.iter().filter(|room| !seen.contains(**room)).collect();
     assert!(missing.is_empty(), "no such room: {missing:?}");
-}
-
-/// What each crate of the workspace may depend on, of this workspace: the engine knows no bus, and no bus another.
-#[test]
-fn crates_depend_one_way() {
-    let below: [(&str, &[&str]); 9] = [
-        ("proto", &[]),
-        ("sim", &["proto"]),
-        ("uart", &[]),
-        ("socketcan", &["proto"]),
-        ("bench", &["proto", "sim", "socketcan", "uart"]),
-        ("novobus", &["bench", "proto", "sim"]),
-        ("unitek", &["bench", "proto", "sim"]),
-        ("nordac", &["bench", "proto", "sim"]),
-        ("toy", &["bench", "proto", "sim"]),
-    ];
-    for (name, allowed) in below {
-        let text = read(&root().join(format!("harness/{name}/Cargo.toml")));
-        let lines = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("harness-"));
-        let used = lines.filter_map(|line| line.split(['.', ' ']).next());
-        for other in used {
-            assert!(allowed.contains(&other), "{name} depends on {other}");
-        }
-    }
-}
-
-/// A bus takes nothing from the folders of another one.
-#[test]
-fn no_bus_imports_another() {
-    let buses: [&[&str]; 4] = [
-        &["novobus", "nd21"],
-        &["unitek"],
-        &["nordac", "profibus"],
-        &["toy"],
-    ];
-    for own in buses {
-        for place in ["proto/src/*", "sim/src/*", "*/src"] {
-            let folders = own
-                .iter()
-                .map(|name| format!("harness/{}", place.replace('*', name)));
-            let folders = folders.filter(|folder| root().join(folder).is_dir());
-            for source in folders.flat_map(|folder| files(&folder, "rs")) {
-                for (number, line) in read(&source).lines().enumerate() {
-                    let code = line.split("//").next().unwrap_or_default();
-                    let others = buses.iter().filter(|other| **other != own);
-                    let imported = others.copied().flatten().find(|other| {
-                        let mut paths = ["buses", "harness_proto", "harness_sim", "crate"].iter();
-                        paths.any(|path| code.contains(&format!("{path}::{other}")))
-                    });
-                    assert_eq!(imported, None, "{}:{}", source.display(), number + 1);
-                }
-            }
-        }
-    }
 }
 
 /// The page "A fourth bus" names traits that there are.

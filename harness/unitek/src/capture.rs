@@ -23,7 +23,11 @@ const MOST_NODES: u16 = 127;
 ///
 /// # Errors
 /// A drive has other identifiers, in a sentence with the remedy.
-pub fn scenario(traces: &[Trace], title: &str, setup: Option<&Source>) -> Result<String, String> {
+pub(crate) fn scenario(
+    traces: &[Trace],
+    title: &str,
+    setup: Option<&Source>,
+) -> Result<String, String> {
     let channels = traces.iter().flat_map(|trace| &trace.channels);
     let frames: Vec<&LineFrame> = channels.flat_map(|channel| channel.frames()).collect();
     let title: String = title.chars().filter(|c| !c.is_control()).collect();
@@ -82,7 +86,7 @@ pub fn scenario(traces: &[Trace], title: &str, setup: Option<&Source>) -> Result
 ///
 /// # Errors
 /// A drive has other identifiers and there is no `setup`, in a sentence with the remedy; or the setup has mistakes.
-pub fn judged(
+pub(crate) fn judged(
     traces: &[Trace],
     setup: Option<&Source>,
     (named, tolerance): (&[u8], Span),

@@ -11,9 +11,6 @@ use harness_proto::unitek::words::{self, Bit};
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX, REGISTERS, frame};
 use std::fmt::Write as _;
 
-/// The most drives whose identifiers follow one another from the defaults on: 201 to 27F and 181 to 1FF (section 3.1).
-pub const MAX_DRIVES: u16 = 127;
-
 /// The longest name of a signal.
 const MAX_NAME: usize = 32;
 
@@ -87,9 +84,9 @@ struct Message {
     comment: &'static str,
 }
 
-/// A DBC file of the first `drives` drives, 1 to [`MAX_DRIVES`], with the default identifiers: drive n has 200 + n and 180 + n.
+/// A DBC file of the first `drives` drives, 1 to 127, with the default identifiers: drive n has 200 + n and 180 + n.
 #[must_use]
-pub fn dbc(drives: u16) -> String {
+pub(crate) fn dbc(drives: u16) -> String {
     let messages: Vec<_> = (0..drives)
         .flat_map(|drive| messages(drive, drives))
         .collect();

@@ -16,9 +16,8 @@ const WORDS: [(&str, &[Bit]); 4] = [
     ("mode", MODE),
 ];
 
-/// The dissector.
 #[must_use]
-pub fn dissector() -> String {
+pub(crate) fn dissector() -> String {
     let mut registers = String::new();
     for register in &REGISTERS {
         // Writing to a String cannot fail.

@@ -11,7 +11,7 @@ use std::any::Any;
 
 /// The gate of one port.
 #[derive(Clone, Debug)]
-pub struct SegmentGate {
+pub(crate) struct SegmentGate {
     gate: guard::Gate,
     /// Nothing is sent.
     listen_only: bool,
@@ -21,7 +21,12 @@ impl SegmentGate {
     /// A gate in front of a bus of this rate with drives that receive and send on these identifiers. With `listen_only` it admits
     /// nothing.
     #[must_use]
-    pub fn new(limits: Limits, rate: BitRate, drives: &[(u16, u16)], listen_only: bool) -> Self {
+    pub(crate) fn new(
+        limits: Limits,
+        rate: BitRate,
+        drives: &[(u16, u16)],
+        listen_only: bool,
+    ) -> Self {
         Self {
             gate: guard::Gate::new(limits, rate, drives),
             listen_only,
@@ -30,12 +35,12 @@ impl SegmentGate {
 
     /// What it knows of the drives.
     #[must_use]
-    pub const fn known(&self) -> &guard::Gate {
+    pub(crate) const fn known(&self) -> &guard::Gate {
         &self.gate
     }
 
     /// The same, to tell it what was read.
-    pub const fn known_mut(&mut self) -> &mut guard::Gate {
+    pub(crate) const fn known_mut(&mut self) -> &mut guard::Gate {
         &mut self.gate
     }
 
@@ -166,7 +171,7 @@ impl Gate for SegmentGate {
 }
 
 /// A link to UNITEK drives, which receive and send on these identifiers, behind its gate. What the limits deny is no capability of it.
-pub fn guarded<L: Link>(
+pub(crate) fn guarded<L: Link>(
     inner: L,
     limits: Limits,
     drives: &[(u16, u16)],

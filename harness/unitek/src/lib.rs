@@ -1,26 +1,26 @@
 //! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
 #![forbid(unsafe_code)]
 
-pub mod campaign;
-pub mod capture;
-pub mod cli;
-pub mod dbc;
-pub mod dissector;
-pub mod driver;
-pub mod explore;
-pub mod gate;
-pub mod judge;
-pub mod language;
+mod campaign;
+mod capture;
+mod cli;
+mod dbc;
+mod dissector;
+mod driver;
+mod explore;
+mod gate;
+mod judge;
+mod language;
 mod live;
-pub mod manual;
-pub mod report;
-pub mod rig;
-pub mod safe_state;
-pub mod serve;
+mod manual;
+mod report;
+mod rig;
+mod safe_state;
+mod serve;
 #[cfg(test)]
 mod serve_tests;
-pub mod simulate;
-pub mod value;
+mod simulate;
+mod value;
 mod whereabouts;
 
 use harness_bench::bus::{Bus, SharedLine};

@@ -5,7 +5,7 @@ use harness_bench::manual::{Manual, Open};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 
 /// The UNITEK DS CAN-BUS manual.
-pub const MANUAL: Manual = Manual {
+pub(crate) const MANUAL: Manual = Manual {
     bus: BusName::Unitek,
     title: "UNITEK DS CAN-BUS manual",
     document: "unitek",

@@ -31,7 +31,7 @@ const AGAIN: Span = Span::from_millis(20);
 
 /// The frames that lock a drive and set its commands to 0, without waiting for anything: for a watchdog.
 #[must_use]
-pub fn last_words(axes: &[Axis]) -> Vec<Frame> {
+pub(crate) fn last_words(axes: &[Axis]) -> Vec<Frame> {
     let write = |register, value| Request::Write {
         register,
         data: Data::Short(value),
@@ -54,7 +54,7 @@ pub fn last_words(axes: &[Axis]) -> Vec<Frame> {
 ///
 /// A drive is confirmed if it reads locked, not enabled, with commands 0, and stands, and if it is found where the rig's file says.
 /// `way_back` is what the rig's file says of a drive with another bit rate.
-pub fn safe_state<L: Line>(
+pub(crate) fn safe_state<L: Line>(
     line: &mut Guarded<L>,
     axes: &[Axis],
     patience: Span,

@@ -25,7 +25,7 @@ const STATE: [u8; 6] = [0x51, 0x40, 0x8F, 0xE2, 0x30, 0x6D];
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails.
-pub fn serve(
+pub(crate) fn serve(
     plan: Plan<Unitek>,
     options: &ServeOptions<FramePlace>,
     host: &mut dyn ServeHost,
@@ -37,7 +37,7 @@ pub fn serve(
 ///
 /// # Errors
 /// The header has mistakes. Steps behind it are ignored.
-pub fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<Unitek>, Problems> {
+pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<Unitek>, Problems> {
     let empty = Source {
         name: "setup".to_owned(),
         text: "".into(),

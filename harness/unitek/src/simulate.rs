@@ -14,36 +14,36 @@ use harness_sim::unitek::{Cause, Control, Drive, Inputs, Member, Stimulus};
 use std::any::Any;
 
 /// A station of the simulated segment: a host or a drive, which may deviate.
-pub type Station = Member<Box<Deviant>>;
+pub(crate) type Station = Member<Box<Deviant>>;
 
 /// The bench's own place on its segment.
 const BENCH: usize = 0;
 
 /// A drive as it is switched on.
 #[derive(Clone, Debug)]
-pub struct DriveSetup {
+pub(crate) struct DriveSetup {
     /// Its number, 1 to 127: by it scenarios and records name the drive.
-    pub node: u8,
+    pub(crate) node: u8,
     /// On which it receives (68) and sends (69).
-    pub identifiers: (u16, u16),
+    pub(crate) identifiers: (u16, u16),
     /// What the manual leaves open.
-    pub properties: Properties,
+    pub(crate) properties: Properties,
     /// What is connected to it.
-    pub inputs: Inputs,
+    pub(crate) inputs: Inputs,
     /// Registers that differ from the dump, and their contents.
-    pub registers: Vec<(u8, u32)>,
+    pub(crate) registers: Vec<(u8, u32)>,
     /// What it controls at first; `None` leaves it to its properties.
-    pub control: Option<Control>,
+    pub(crate) control: Option<Control>,
     /// Whether a lock was released after its power-up (`enable-after-lock`).
-    pub released: bool,
+    pub(crate) released: bool,
     /// How it breaks the manual.
-    pub deviation: Option<&'static Deviation>,
+    pub(crate) deviation: Option<&'static Deviation>,
 }
 
 impl DriveSetup {
     /// Node `node` as delivered: identifiers 200 + node and 180 + node (UNITEK 3.1).
     #[must_use]
-    pub fn new(node: u8) -> Self {
+    pub(crate) fn new(node: u8) -> Self {
         let offset = u16::from(node) - 1;
         Self {
             node,
@@ -59,7 +59,7 @@ impl DriveSetup {
 
     /// The drive on a bus of this rate, switched on at `power_up`.
     #[must_use]
-    pub fn drive(&self, rate: BitRate, power_up: Instant) -> Deviant {
+    pub(crate) fn drive(&self, rate: BitRate, power_up: Instant) -> Deviant {
         let (rx, tx) = self.identifiers;
         let mut registers = vec![(0x68, rx.into()), (0x69, tx.into())];
         registers.extend(&self.registers);
@@ -77,26 +77,25 @@ impl DriveSetup {
 
 /// A segment and its drives.
 #[derive(Clone, Debug)]
-pub struct Setup {
+pub(crate) struct Setup {
     /// The bit rate of all stations.
-    pub rate: BitRate,
-    /// The drives.
-    pub drives: Vec<DriveSetup>,
+    pub(crate) rate: BitRate,
+    pub(crate) drives: Vec<DriveSetup>,
     /// The way in which the bench's own master deviates, if it does.
-    pub master: Option<&'static MasterDeviation>,
+    pub(crate) master: Option<&'static MasterDeviation>,
 }
 
 impl Setup {
     /// Nodes 1 to `drives` as delivered, at 500 kbit/s.
     #[must_use]
-    pub fn of(drives: u8) -> Self {
+    pub(crate) fn of(drives: u8) -> Self {
         let drives = (1..=drives).map(DriveSetup::new);
         Self::new(BitRate::K500, drives.collect())
     }
 
     /// These drives, behind a master that does not deviate.
     #[must_use]
-    pub const fn new(rate: BitRate, drives: Vec<DriveSetup>) -> Self {
+    pub(crate) const fn new(rate: BitRate, drives: Vec<DriveSetup>) -> Self {
         Self {
             rate,
             drives,
@@ -106,7 +105,7 @@ impl Setup {
 
     /// A segment with the bench's host, behind it the drives in their order, and behind them hosts for `guests`.
     #[must_use]
-    pub fn segment(&self, guests: usize) -> Segment<Station> {
+    pub(crate) fn segment(&self, guests: usize) -> Segment<Station> {
         let host = || Member::Host(Host::default());
         let drive =
             |own: &DriveSetup| Member::Drive(Box::new(own.drive(self.rate, Instant::START)));
@@ -119,7 +118,7 @@ impl Setup {
 
 /// A bench on a segment of simulated drives. Its own host has one port.
 #[derive(Debug)]
-pub struct Bench {
+pub(crate) struct Bench {
     pub(super) segment: Segment<Station>,
     /// Place `k` is that of the `k`-th drive, counted from 1.
     pub(super) nodes: Vec<u8>,
@@ -141,13 +140,13 @@ impl Bench {
 
     /// A bench with the drives of a setup, all just switched on.
     #[must_use]
-    pub fn new(setup: &Setup) -> Self {
+    pub(crate) fn new(setup: &Setup) -> Self {
         Self::with_guests(setup, 0)
     }
 
     /// The same with hosts for `guests` on the segment.
     #[must_use]
-    pub fn with_guests(setup: &Setup, guests: usize) -> Self {
+    pub(crate) fn with_guests(setup: &Setup, guests: usize) -> Self {
         Self {
             segment: setup.segment(guests),
             nodes: setup.drives.iter().map(|own| own.node).collect(),
@@ -157,7 +156,7 @@ impl Bench {
 
     /// A drive, beside its bus.
     #[must_use]
-    pub fn drive(&self, node: u8) -> Option<&Drive> {
+    pub(crate) fn drive(&self, node: u8) -> Option<&Drive> {
         let drive = self.segment.station(self.place(node)?).drive()?;
         Some(drive.drive())
     }

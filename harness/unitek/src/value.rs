@@ -7,13 +7,13 @@ use harness_proto::unitek::words::{Bit, ERRORS, IO, MODE, STATUS, set_bits};
 use harness_proto::unitek::{ALIASES, Access, BadName, REGISTERS, Register, Unit};
 
 /// The word that means every register.
-pub const ALL: &str = "all";
+pub(crate) const ALL: &str = "all";
 
 /// The register of this name or number.
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn register(text: &str) -> Result<&'static Register, String> {
+pub(crate) fn register(text: &str) -> Result<&'static Register, String> {
     Register::named(text).map_err(|error| match error {
         BadName::Ambiguous { .. } => format!("`{text}`: {error}"),
         BadName::Unknown => {
@@ -32,7 +32,7 @@ pub fn register(text: &str) -> Result<&'static Register, String> {
 ///
 /// # Errors
 /// The first name that is wrong.
-pub fn registers(texts: &[String]) -> Result<Vec<&'static Register>, String> {
+pub(crate) fn registers(texts: &[String]) -> Result<Vec<&'static Register>, String> {
     let mut found: Vec<&'static Register> = Vec::new();
     for text in texts {
         let named = match text.as_str() {
@@ -50,16 +50,14 @@ pub fn registers(texts: &[String]) -> Result<Vec<&'static Register>, String> {
 
 /// What is to be written into a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Assignment {
-    /// The register.
-    pub register: &'static Register,
-    /// Its value.
-    pub value: Value,
+pub(crate) struct Assignment {
+    pub(crate) register: &'static Register,
+    pub(crate) value: Value,
 }
 
 /// A value on a command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Value {
+pub(crate) enum Value {
     /// As it travels.
     Raw(u32),
     /// A number with its unit.
@@ -71,7 +69,7 @@ impl Value {
     ///
     /// # Errors
     /// The register cannot hold it, in a sentence.
-    pub fn data(self, register: &Register, scaling: Scaling) -> Result<Data, String> {
+    pub(crate) fn data(self, register: &Register, scaling: Scaling) -> Result<Data, String> {
         let raw = match self {
             Self::Raw(raw) => raw,
             Self::Given(decimal, given) => {
@@ -86,7 +84,7 @@ impl Value {
 ///
 /// # Errors
 /// What is wrong and what is expected, in a sentence.
-pub fn assignment(text: &str) -> Result<Assignment, String> {
+pub(crate) fn assignment(text: &str) -> Result<Assignment, String> {
     let (name, written) = text
         .split_once('=')
         .ok_or_else(|| format!("`{text}` is no assignment: REGISTER=VALUE expected"))?;
@@ -142,7 +140,7 @@ fn decimal(text: &str) -> Option<Decimal> {
 
 /// The names of the bits of a register; none of a register that holds a number.
 #[must_use]
-pub const fn bits(unit: Unit) -> &'static [Bit] {
+pub(crate) const fn bits(unit: Unit) -> &'static [Bit] {
     match unit {
         Unit::Status => STATUS,
         Unit::Errors => ERRORS,
@@ -154,7 +152,7 @@ pub const fn bits(unit: Unit) -> &'static [Bit] {
 
 /// The value of a reply in words: a number with its unit, names of bits, or nothing where the manual gives no meaning.
 #[must_use]
-pub fn words(reply: &Reply, scaling: Scaling) -> String {
+pub(crate) fn words(reply: &Reply, scaling: Scaling) -> String {
     let register = Register::of(reply.register);
     // A short reply of a wide register keeps its sign.
     let bits = (reply.number() & i64::from(u32::MAX)) as u32;
@@ -176,7 +174,7 @@ pub fn words(reply: &Reply, scaling: Scaling) -> String {
 
 /// The digits of a reply, as many as it carried.
 #[must_use]
-pub fn hex(data: Data) -> String {
+pub(crate) fn hex(data: Data) -> String {
     match data {
         Data::Short(value) => format!("{value:04X}"),
         Data::Long(value) => format!("{value:08X}"),
@@ -185,7 +183,7 @@ pub fn hex(data: Data) -> String {
 
 /// Whether a register keeps what is written.
 #[must_use]
-pub const fn is_parameter(register: &Register) -> bool {
+pub(crate) const fn is_parameter(register: &Register) -> bool {
     matches!(register.access, Access::RW)
 }
 

@@ -43,7 +43,7 @@ const REST: Span = Span::from_millis(50);
 
 /// How a step ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum StepEnd {
+pub(crate) enum StepEnd {
     /// The slave exchanges data.
     Started,
     /// The inputs of an exchange.
@@ -59,13 +59,12 @@ pub enum StepEnd {
 impl StepEnd {
     /// Whether the master reports it as done.
     #[must_use]
-    pub const fn is_well(&self) -> bool {
+    pub(crate) const fn is_well(&self) -> bool {
         !matches!(self, Self::GaveUp(_))
     }
 
-    /// In words.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         match self {
             Self::Started => "started".to_owned(),
             Self::Exchanged(image) => {
@@ -80,7 +79,7 @@ impl StepEnd {
 
 /// What the slave holds at the end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SlaveState {
+pub(crate) struct SlaveState {
     dp: DpState,
     words: Outputs,
     zsw: u16,
@@ -89,24 +88,23 @@ pub struct SlaveState {
 
 /// What a conversation gave.
 #[derive(Clone, Debug)]
-pub struct Conversation {
+pub(crate) struct Conversation {
     /// How each step ended.
-    pub ends: Vec<StepEnd>,
+    pub(crate) ends: Vec<StepEnd>,
     /// Requests that were repeated.
-    pub repeats: u64,
+    pub(crate) repeats: u64,
     /// How often the slave was started again.
-    pub starts: u64,
+    pub(crate) starts: u64,
     /// Telegrams on the line, in order: whether the slave sent it, and its octets.
-    pub telegrams: Vec<(bool, Vec<u8>)>,
+    pub(crate) telegrams: Vec<(bool, Vec<u8>)>,
     /// What the slave holds at the end.
-    pub state: Option<SlaveState>,
+    pub(crate) state: Option<SlaveState>,
     /// What the master sent and received, in order.
     pub(super) log: Vec<MasterOctets>,
     /// How long it took.
     pub(super) end: Instant,
 }
 
-/// Octets at the master.
 #[derive(Clone, Debug)]
 pub(super) enum MasterOctets {
     /// A telegram that was to be sent from this time on.

@@ -20,29 +20,29 @@ const LONGEST: Span = Span::from_millis(10_000);
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct TelegramCampaignFile {
+pub(crate) struct TelegramCampaignFile {
     /// The version of this schema: 1.
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// The bus: `nordac`.
-    pub bus: String,
+    pub(crate) bus: String,
     /// What the campaign shows, in a line.
-    pub title: String,
+    pub(crate) title: String,
     /// The PPO type, 1 to 4; 1 where nothing is said.
     #[serde(default = "one")]
-    pub ppo: u8,
+    pub(crate) ppo: u8,
     /// What the master does, see [`CampaignStep`].
-    pub steps: Vec<String>,
+    pub(crate) steps: Vec<String>,
     /// The kinds of faults.
-    pub faults: Vec<FaultName>,
+    pub(crate) faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
-    pub delays: Vec<Time>,
+    pub(crate) delays: Vec<Time>,
     /// How often a request without a reply is repeated; once where nothing is said.
     #[serde(default = "one")]
-    pub repeats: u8,
+    pub(crate) repeats: u8,
     /// How many cases there must be of each class, and of all `cases`; what is not named is not looked at.
     #[serde(default)]
-    pub expect: BTreeMap<String, u64>,
+    pub(crate) expect: BTreeMap<String, u64>,
 }
 
 const fn one() -> u8 {
@@ -52,7 +52,7 @@ const fn one() -> u8 {
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum FaultName {
+pub(crate) enum FaultName {
     /// Each of the eleven bits of each octet, one at a time.
     Bits,
     /// Two neighbouring data bits of each octet, which parity does not show.
@@ -120,7 +120,7 @@ impl FaultName {
 
 /// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CampaignStep {
+pub(crate) enum CampaignStep {
     /// `start`: Slave_Diag, Set_Prm, Chk_Cfg, Slave_Diag.
     Start,
     /// `exchange 047F 2000`: one Data_Exchange with this control word and setpoint.

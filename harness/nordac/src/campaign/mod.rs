@@ -5,12 +5,12 @@
 
 mod case;
 mod converse;
-pub mod file;
+pub(crate) mod file;
 #[cfg(test)]
 mod tests;
 
-pub use converse::{Conversation, SlaveState, StepEnd};
-pub use file::{CampaignStep, TelegramCampaignFile};
+pub(crate) use converse::{Conversation, StepEnd};
+pub(crate) use file::{CampaignStep, TelegramCampaignFile};
 
 use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
@@ -29,7 +29,7 @@ const FOLDER: &str = "nordac/";
 const SHOWN: usize = 8;
 
 /// The classes, in order.
-pub const CLASSES: [LineClass; 4] = [
+pub(crate) const CLASSES: [LineClass; 4] = [
     LineClass {
         name: "unharmed",
         about: "every step ended as without the fault, and no request was repeated",
@@ -58,25 +58,23 @@ pub const CLASSES: [LineClass; 4] = [
 
 /// A fault at an octet or a telegram of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TelegramCase {
+pub(crate) struct TelegramCase {
     /// The telegram, counted from 1 over both stations.
-    pub telegram: usize,
+    pub(crate) telegram: usize,
     /// Its octet, counted from 1; `None` for a fault of the whole telegram.
-    pub octet: Option<usize>,
-    /// The fault.
+    pub(crate) octet: Option<usize>,
     placed: LineFaultAt,
 }
 
 impl TelegramCase {
-    /// Its name.
     #[must_use]
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         format!("{}:{}", self.telegram, self.fault())
     }
 
     /// The fault, as a scenario writes it, behind the octet that it happens to.
     #[must_use]
-    pub fn fault(&self) -> String {
+    pub(crate) fn fault(&self) -> String {
         let fault = match self.placed.fault {
             LineFault::Octet(own) => own.to_string(),
             LineFault::Telegram(own) => own.to_string(),
@@ -88,9 +86,8 @@ impl TelegramCase {
     }
 }
 
-/// A campaign.
 #[derive(Clone, Debug)]
-pub struct TelegramCampaign {
+pub(crate) struct TelegramCampaign {
     name: String,
     /// The text of its file.
     text: String,
@@ -100,12 +97,12 @@ pub struct TelegramCampaign {
     /// The conversation without a fault.
     sound: Conversation,
     /// The cases, in order of telegrams.
-    pub cases: Vec<TelegramCase>,
+    pub(crate) cases: Vec<TelegramCase>,
 }
 
 /// The names of the built-in campaigns, in order.
 #[must_use]
-pub fn names() -> Vec<String> {
+pub(crate) fn names() -> Vec<String> {
     let files = BUILT_IN.files();
     let mut names: Vec<_> = files
         .filter_map(|file| file.path().to_str()?.strip_suffix(".toml"))
@@ -120,7 +117,7 @@ pub fn names() -> Vec<String> {
 /// # Errors
 /// What is wrong with it, with file, place and remedy.
 #[must_use]
-pub fn find(name: &Path) -> Option<Result<TelegramCampaign, String>> {
+pub(crate) fn find(name: &Path) -> Option<Result<TelegramCampaign, String>> {
     let shown = name.display().to_string();
     if name.is_file() {
         let text = std::fs::read_to_string(name).ok()?;
@@ -136,7 +133,7 @@ impl TelegramCampaign {
     ///
     /// # Errors
     /// A mistake in the text, or a conversation that does not end well without a fault.
-    pub fn new(name: &str, text: &str) -> Result<Self, String> {
+    pub(crate) fn new(name: &str, text: &str) -> Result<Self, String> {
         let wrong = |message: String| format!("{name}: {message}");
         let (file, ppo, steps) = file::read(text).map_err(wrong)?;
         let sound = converse::converse(&file, ppo, &steps, None)
@@ -193,13 +190,13 @@ impl TelegramCampaign {
 
     /// How many telegrams the conversation has without a fault.
     #[must_use]
-    pub fn telegrams(&self) -> usize {
+    pub(crate) fn telegrams(&self) -> usize {
         self.sound.telegrams.len()
     }
 
     /// Plays one case: the place of its class, and what the conversation gave.
     #[must_use]
-    pub fn play(&self, case: TelegramCase) -> Option<(usize, Conversation)> {
+    pub(crate) fn play(&self, case: TelegramCase) -> Option<(usize, Conversation)> {
         let played = converse::converse(&self.file, self.ppo, &self.steps, Some(case.placed))?;
         Some((self.class(&played), played))
     }

@@ -8,7 +8,7 @@ use harness_proto::nordac::parameter::{Flag, Limit};
 use harness_proto::nordac::{PARAMETERS, Parameter};
 
 /// Shows the parameters that have the filter in their number, name, unit or section.
-pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
     if arguments.eeprom {
         output.complain("--eeprom is for the bus novobus; a NORDAC inverter keeps every parameter that can be written in its EEPROM");
         return Ok(Exit::Usage);
@@ -30,7 +30,7 @@ pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result
 }
 
 /// The numbers of all parameters, and the words of a reply: names with spaces need quotes, which a shell does not add.
-pub fn names() -> impl Iterator<Item = String> {
+pub(crate) fn names() -> impl Iterator<Item = String> {
     let words = ReplyWord::ALL.map(|(name, _)| name.to_owned());
     let numbers = PARAMETERS.iter().map(|own| own.number.to_string());
     words.into_iter().chain(numbers)

@@ -1,7 +1,7 @@
 //! Commands on NORDAC inverters: one file a command, over the driver [`crate::driver`].
 
 mod bench;
-pub mod cells;
+pub(crate) mod cells;
 mod check;
 mod control;
 mod held;

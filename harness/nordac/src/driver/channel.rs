@@ -6,7 +6,7 @@ use harness_proto::nordac::{Answer, ParameterRef};
 
 /// What became of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Written {
+pub(crate) enum Written {
     /// The slave answered with the value that it holds now.
     Holds(i64),
     /// The module restarted (NORDAC 2.6): it has left the exchange, and its answer is never seen.
@@ -21,7 +21,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::Refused`], [`Error::WrongAnswer`], [`Error::NoAnswer`], [`Error::NoChannel`], [`Error::Left`], [`Error::Link`].
-    pub fn read(&mut self, slave: u8, parameter: &ParameterRef) -> Result<i64, Error> {
+    pub(crate) fn read(&mut self, slave: u8, parameter: &ParameterRef) -> Result<i64, Error> {
         let place = self.channel(slave)?;
         self.slaves[place].exchange.read(parameter);
         let answer = self.answer(place, parameter)?;
@@ -32,7 +32,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::Differs`] if the answer has another value, and those of [`Self::read`].
-    pub fn write(
+    pub(crate) fn write(
         &mut self,
         slave: u8,
         parameter: &ParameterRef,

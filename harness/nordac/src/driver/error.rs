@@ -9,7 +9,7 @@ use std::fmt;
 
 /// Why a call to a slave came to nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Error {
+pub(crate) enum Error {
     /// No reply came.
     #[error(
         "slave {slave} does not answer {service}: check its address (1624), the bit rate, its power, A and B of the line, and the termination"
@@ -37,7 +37,6 @@ pub enum Error {
     Taken {
         /// Its address.
         slave: u8,
-        /// Its master.
         master: u8,
     },
     /// The slave does not get into the exchange.
@@ -82,7 +81,6 @@ pub enum Error {
     NoChannel {
         /// Its address.
         slave: u8,
-        /// Its PPO type.
         ppo: PpoType,
     },
     /// The parameter channel carries another answer than the one to the task.
@@ -92,7 +90,6 @@ pub enum Error {
     NoAnswer {
         /// Its address.
         slave: u8,
-        /// The parameter.
         parameter: ParameterRef,
     },
     /// The slave answers with an error number (NORDAC 3.4.1).
@@ -102,9 +99,7 @@ pub enum Error {
         slave: u8,
         /// `read` or `change`.
         what: &'static str,
-        /// The parameter.
         parameter: ParameterRef,
-        /// The error.
         error: PkwError,
     },
     /// The answer has another form than the manual prints for the task.
@@ -114,7 +109,6 @@ pub enum Error {
     WrongAnswer {
         /// Its address.
         slave: u8,
-        /// The parameter.
         parameter: ParameterRef,
         /// The answer, as the manual writes it.
         answer: String,
@@ -124,7 +118,6 @@ pub enum Error {
     Differs {
         /// Its address.
         slave: u8,
-        /// The parameter.
         parameter: ParameterRef,
         /// What was written.
         wrote: i64,
@@ -304,7 +297,7 @@ const FAULTS: [&str; 10] = [
 
 /// What a fault number means (NORDAC 5.7); `None` for 0 and for numbers that the manual does not print.
 #[must_use]
-pub fn fault_name(number: i64) -> Option<String> {
+pub(crate) fn fault_name(number: i64) -> Option<String> {
     let printed = usize::try_from(number).ok()?.checked_sub(1)?;
     match (FAULTS.get(printed), number) {
         (Some(name), _) => Some((*name).to_owned()),

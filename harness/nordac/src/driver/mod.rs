@@ -9,10 +9,10 @@ mod error;
 mod motion;
 mod phy;
 
-pub use channel::Written;
-pub use error::{Error, fault_name};
-pub use motion::{Reached, percent};
-pub use phy::Timing;
+pub(crate) use channel::Written;
+pub(crate) use error::{Error, fault_name};
+pub(crate) use motion::{Reached, percent};
+pub(crate) use phy::Timing;
 
 use super::rig::interlock::InverterInterlock;
 use harness_bench::link::{Line, Trouble};
@@ -30,7 +30,7 @@ use profirust::{Baudrate, time};
 use std::fmt;
 
 /// The bench's own address.
-pub const MASTER: u8 = 2;
+pub(crate) const MASTER: u8 = 2;
 
 /// How often a request beside the master is sent until the slave counts as silent.
 const TRIES: u8 = 2;
@@ -42,20 +42,20 @@ const START: Span = Span::from_millis(2_000);
 
 /// How a driver uses its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
+pub(crate) struct Options {
     /// The line.
-    pub timing: Timing,
+    pub(crate) timing: Timing,
     /// The watchdog of the slaves: without a request for this long a slave leaves the exchange (EN 2). In steps of 10 ms, up to 650 s.
-    pub watchdog: Span,
+    pub(crate) watchdog: Span,
 }
 
 impl Options {
     /// The usual watchdog: longer than a busy computer is late.
-    pub const WATCHDOG: Span = Span::from_millis(1_000);
+    pub(crate) const WATCHDOG: Span = Span::from_millis(1_000);
 
     /// Those of a line in virtual time.
-    #[must_use]
-    pub fn simulated(rate: BusRate) -> Self {
+    #[cfg(test)]
+    pub(crate) fn simulated(rate: BusRate) -> Self {
         Self {
             timing: Timing::simulated(rate),
             watchdog: Self::WATCHDOG,
@@ -77,17 +77,17 @@ struct Slave {
 
 /// What a start has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Started {
+pub(crate) struct Started {
     /// The PPO type of the slave.
-    pub ppo: PpoType,
+    pub(crate) ppo: PpoType,
     /// The slave's diagnosis when it began to exchange.
-    pub diagnosis: Option<Diagnosis>,
+    pub(crate) diagnosis: Option<Diagnosis>,
     /// The words of its first replies.
-    pub inputs: Image,
+    pub(crate) inputs: Image,
 }
 
 /// The master of a segment.
-pub struct Driver<'l> {
+pub(crate) struct Driver<'l> {
     wire: Wire<'l>,
     station: FdlActiveStation,
     master: DpMaster<'static>,
@@ -109,7 +109,7 @@ impl fmt::Debug for Driver<'_> {
 impl<'l> Driver<'l> {
     /// The master of a line. Nothing is sent before a slave is started or asked.
     #[must_use]
-    pub fn new(line: Box<dyn Line + 'l>, options: Options) -> Self {
+    pub(crate) fn new(line: Box<dyn Line + 'l>, options: Options) -> Self {
         let (station, master) = masters(options);
         Self {
             wire: Wire::new(line, options.timing, MASTER),
@@ -164,7 +164,7 @@ impl<'l> Driver<'l> {
     /// The same master with all that it knows over another handle of its line: for a session, which lends the line to one request after
     /// another.
     #[must_use]
-    pub fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Driver<'b> {
+    pub(crate) fn onto<'b>(self, line: Box<dyn Line + 'b>) -> Driver<'b> {
         Driver {
             wire: self.wire.onto(line),
             station: self.station,
@@ -179,7 +179,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// See [`Self::start`].
-    pub fn join(&mut self, slave: u8) -> Result<PpoType, Error> {
+    pub(crate) fn join(&mut self, slave: u8) -> Result<PpoType, Error> {
         if let Ok(place) = self.place(slave) {
             return Ok(self.slaves[place].exchange.ppo());
         }
@@ -188,12 +188,12 @@ impl<'l> Driver<'l> {
 
     /// The time of its line.
     #[must_use]
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.wire.line().now()
     }
 
     /// The slaves that were started.
-    pub fn slaves(&self) -> impl Iterator<Item = u8> {
+    pub(crate) fn slaves(&self) -> impl Iterator<Item = u8> {
         self.slaves.iter().map(|own| own.address)
     }
 
@@ -201,7 +201,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NoReply`], [`Error::Configuration`], [`Error::Link`].
-    pub fn ppo(&mut self, slave: u8) -> Result<PpoType, Error> {
+    pub(crate) fn ppo(&mut self, slave: u8) -> Result<PpoType, Error> {
         let configuration = self.ask(slave, Service::GetCfg)?;
         PpoType::from_cfg(&configuration).ok_or_else(|| Error::Configuration {
             slave,
@@ -213,7 +213,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NoReply`], [`Error::NotStarted`] for data that are no diagnosis, [`Error::Link`].
-    pub fn diagnosis(&mut self, slave: u8) -> Result<Diagnosis, Error> {
+    pub(crate) fn diagnosis(&mut self, slave: u8) -> Result<Diagnosis, Error> {
         let data = self.ask(slave, Service::SlaveDiag)?;
         Diagnosis::decode(&data).ok_or(Error::NotStarted {
             slave,
@@ -248,7 +248,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NoReply`], [`Error::OtherDevice`], [`Error::Taken`], [`Error::Configuration`], [`Error::NotStarted`], [`Error::Link`].
-    pub fn start(&mut self, slave: u8, ppo: Option<PpoType>) -> Result<Started, Error> {
+    pub(crate) fn start(&mut self, slave: u8, ppo: Option<PpoType>) -> Result<Started, Error> {
         let found = self.diagnosis(slave)?;
         if found.ident != IDENT {
             let ident = found.ident;
@@ -344,7 +344,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NotRunning`].
-    pub fn inputs(&self, slave: u8) -> Result<Image, Error> {
+    pub(crate) fn inputs(&self, slave: u8) -> Result<Image, Error> {
         let own = &self.slaves[self.place(slave)?];
         own.exchange
             .inputs()
@@ -357,7 +357,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NotRunning`], [`Error::Left`], [`Error::Link`].
-    pub fn exchange(&mut self, slave: u8, words: [u16; 4]) -> Result<Image, Error> {
+    pub(crate) fn exchange(&mut self, slave: u8, words: [u16; 4]) -> Result<Image, Error> {
         let place = self.place(slave)?;
         let under_way = self.wire.awaits() == Some(slave);
         let own = &mut self.slaves[place];
@@ -372,7 +372,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// See [`Self::exchange`].
-    pub fn cycle(&mut self, slave: u8) -> Result<Image, Error> {
+    pub(crate) fn cycle(&mut self, slave: u8) -> Result<Image, Error> {
         let place = self.place(slave)?;
         self.cycles(place, 1)
     }
@@ -381,7 +381,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::Left`], [`Error::Link`].
-    pub fn run(&mut self, time: Span) -> Result<(), Error> {
+    pub(crate) fn run(&mut self, time: Span) -> Result<(), Error> {
         let end = self.now() + time;
         while self.now() < end {
             self.look()?;
@@ -395,7 +395,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NotRunning`].
-    pub fn denied(&self, slave: u8, outputs: &Image) -> Result<Option<String>, Error> {
+    pub(crate) fn denied(&self, slave: u8, outputs: &Image) -> Result<Option<String>, Error> {
         let own = &self.slaves[self.place(slave)?];
         let data = outputs.encode(own.exchange.ppo());
         let silent = |_: BadTelegram| Error::NotRunning(slave);

@@ -14,23 +14,23 @@ const STANDS: Span = Span::from_millis(2_000);
 
 /// The state that a call has led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reached {
+pub(crate) struct Reached {
     /// The control words that were sent, one for each step.
-    pub steps: [u16; 3],
+    pub(crate) steps: [u16; 3],
     /// The last inputs.
-    pub inputs: Image,
+    pub(crate) inputs: Image,
 }
 
 impl Reached {
     /// The control words that were sent.
-    pub fn words(&self) -> impl Iterator<Item = u16> {
+    pub(crate) fn words(&self) -> impl Iterator<Item = u16> {
         self.steps.into_iter().filter(|word| *word != 0)
     }
 }
 
 /// What a setpoint or actual value is in percent of the maximum frequency (NORDAC 3.2.3).
 #[must_use]
-pub fn percent(word: u16) -> f64 {
+pub(crate) fn percent(word: u16) -> f64 {
     f64::from(word.cast_signed()) * 100.0 / f64::from(FULL)
 }
 
@@ -39,7 +39,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::Fault`], [`Error::Local`], [`Error::NotReached`], [`Error::Left`], [`Error::Link`].
-    pub fn on(&mut self, slave: u8, setpoint: u16) -> Result<Reached, Error> {
+    pub(crate) fn on(&mut self, slave: u8, setpoint: u16) -> Result<Reached, Error> {
         self.look()?;
         let seen = self.cycle(slave)?;
         self.ready_for_words(slave, &seen)?;
@@ -61,7 +61,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::NotReached`], [`Error::Left`], [`Error::Link`].
-    pub fn off(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn off(&mut self, slave: u8) -> Result<Reached, Error> {
         self.stopped(slave, stw::READY, is_off)
     }
 
@@ -69,7 +69,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// See [`Self::off`].
-    pub fn block(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn block(&mut self, slave: u8) -> Result<Reached, Error> {
         self.stopped(slave, stw::SAFE, is_off)
     }
 
@@ -77,7 +77,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// See [`Self::off`].
-    pub fn quick_stop(&mut self, slave: u8) -> Result<Reached, Error> {
+    pub(crate) fn quick_stop(&mut self, slave: u8) -> Result<Reached, Error> {
         self.stopped(slave, stw::QUICK_STOP, |image| {
             is_off(image) && bits(image) & (zsw::START_DISABLE | zsw::FAULT) != 0
         })
@@ -88,7 +88,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`Error::NotReached`] while the cause of the fault is there. [`Error::Local`], [`Error::Left`], [`Error::Link`].
-    pub fn acknowledge(&mut self, slave: u8) -> Result<(Option<i64>, Reached), Error> {
+    pub(crate) fn acknowledge(&mut self, slave: u8) -> Result<(Option<i64>, Reached), Error> {
         let seen = self.exchange(slave, [stw::SAFE, 0, 0, 0])?;
         if seen.first() & zsw::BUS_CONTROL == 0 {
             return Err(Error::Local { slave });
@@ -111,7 +111,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// See [`Driver::read`].
-    pub fn fault(&mut self, slave: u8) -> Result<Option<i64>, Error> {
+    pub(crate) fn fault(&mut self, slave: u8) -> Result<Option<i64>, Error> {
         let Ok(parameter) = ParameterRef::parse("1800") else {
             return Ok(None);
         };

@@ -19,24 +19,24 @@ use profirust::time;
 
 /// What a driver needs to know of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// The rate of the segment.
-    pub rate: BusRate,
+    pub(crate) rate: BusRate,
     /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it.
-    pub patience: Span,
+    pub(crate) patience: Span,
     /// How much later a reply may still come. So long passes behind a request without a reply, or the next one would be given that reply.
-    pub late: Span,
+    pub(crate) late: Span,
     /// How often the master looks at the line while nothing arrives; a line in virtual time needs no more than the default.
-    pub step: Span,
+    pub(crate) step: Span,
 }
 
 impl Timing {
     /// The longest slot time that the master counts. Where the patience is longer, its clock runs slower while it waits for a reply.
-    pub const MOST_BITS: u16 = u16::MAX;
+    pub(crate) const MOST_BITS: u16 = u16::MAX;
 
     /// That of a line in virtual time: the slave's longest delay and its longest reply.
     #[must_use]
-    pub fn simulated(rate: BusRate) -> Self {
+    pub(crate) fn simulated(rate: BusRate) -> Self {
         let longest = rate.max_tsdr_bits() + SYN_BITS + OCTET_BITS * LONGEST_REPLY;
         Self {
             rate,
@@ -125,7 +125,6 @@ impl<'l> Wire<'l> {
         self.line.as_mut()
     }
 
-    /// The line.
     pub(super) fn line(&self) -> &dyn Line {
         &*self.line
     }

@@ -17,15 +17,15 @@ use std::collections::BTreeMap;
 const LONGEST_GAP: u16 = 10_000;
 
 /// A conversation of telegrams.
-pub type TelegramTalk = LineTalk<Nordac>;
+pub(crate) type TelegramTalk = LineTalk<Nordac>;
 
 /// An act of one.
-pub type TelegramAct = LineAct<TelegramActKind>;
+pub(crate) type TelegramAct = LineAct<TelegramActKind>;
 
 /// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum TelegramActKind {
+pub(crate) enum TelegramActKind {
     /// A master sends a request.
     Ask(Request),
     /// A master sends these octets without a gap, whatever they are.
@@ -39,14 +39,12 @@ pub enum TelegramActKind {
     },
     /// Inverter and module lose each other, or find each other again.
     Link {
-        /// The slave.
         slave: u8,
         /// Whether they find each other.
         found: bool,
     },
     /// The cause of a fault comes, or goes.
     Fault {
-        /// The slave.
         slave: u8,
         /// The fault, 1 to 25.
         number: u8,
@@ -54,40 +52,37 @@ pub enum TelegramActKind {
         on: bool,
     },
     /// A slave is switched off and on.
-    Restart {
-        /// The slave.
-        slave: u8,
-    },
+    Restart { slave: u8 },
 }
 
 /// A request of a master.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Request {
+pub(crate) struct Request {
     /// To which station.
-    pub da: u8,
+    pub(crate) da: u8,
     /// From which master.
-    pub sa: u8,
+    pub(crate) sa: u8,
     /// Bits 3 to 0 of FC.
-    pub function: u8,
+    pub(crate) function: u8,
     /// How it is counted.
     #[serde(default, skip_serializing_if = "Count::is_next")]
-    pub count: Count,
+    pub(crate) count: Count,
     /// DSAP and SSAP.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub saps: Option<(u8, u8)>,
+    pub(crate) saps: Option<(u8, u8)>,
     /// The data.
     #[serde(with = "hex", default, skip_serializing_if = "Vec::is_empty")]
-    pub data: Vec<u8>,
+    pub(crate) data: Vec<u8>,
     /// What is wrong with it on the line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub harm: Option<Harm>,
+    pub(crate) harm: Option<Harm>,
 }
 
 /// How a request is counted (EN 1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Count {
+pub(crate) enum Count {
     /// As the next new request of its master to its station: 6x, 5x, 7x, 5x, ...
     #[default]
     Next,
@@ -108,7 +103,7 @@ impl Count {
 /// What is wrong with a telegram on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Harm {
+pub(crate) enum Harm {
     /// The parity bit of the octet at a place is wrong; places are counted from 0, beyond the last one from the start again.
     Parity(u8),
     /// Its stop bit is 0.
@@ -125,11 +120,10 @@ pub enum Harm {
 
 /// A telegram that goes out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct OutgoingTelegram {
-    /// Its octets.
-    pub octets: Vec<u8>,
+pub(crate) struct OutgoingTelegram {
+    pub(crate) octets: Vec<u8>,
     /// What happens to one of them on the line, and its place.
-    pub bad: Option<(usize, LinkFault)>,
+    pub(crate) bad: Option<(usize, LinkFault)>,
 }
 
 /// The counts of every master towards every station.

@@ -12,7 +12,7 @@ use harness_proto::profibus::fdl::{Function, check_sum};
 
 /// Something that a conversation of telegrams can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum TelegramSpice {
+pub(crate) enum TelegramSpice {
     /// Control words and setpoints that lead through the state machine (3.2, 3.3).
     Motion,
     /// Any control word and setpoint.
@@ -45,7 +45,7 @@ pub enum TelegramSpice {
 
 impl TelegramSpice {
     /// All with their names.
-    pub const NAMES: [(&'static str, Self); 14] = [
+    pub(crate) const NAMES: [(&'static str, Self); 14] = [
         ("motion", Self::Motion),
         ("words", Self::Words),
         ("tasks", Self::Tasks),

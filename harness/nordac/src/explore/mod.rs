@@ -6,7 +6,7 @@ mod generate;
 mod hex;
 mod idiom;
 mod on_adapter;
-pub mod oracle;
+pub(crate) mod oracle;
 mod play;
 mod tasks;
 #[cfg(test)]
@@ -14,7 +14,5 @@ mod tests;
 mod text;
 mod wire;
 
-pub use act::{Count, Harm, OutgoingTelegram, Request, TelegramAct, TelegramActKind, TelegramTalk};
-pub use generate::TelegramSpice;
-pub use oracle::TelegramDifference;
-pub use play::{Done, TelegramsSeen, play};
+pub(crate) use act::TelegramTalk;
+pub(crate) use play::TelegramsSeen;

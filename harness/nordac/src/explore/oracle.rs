@@ -15,23 +15,23 @@ const POSICON: &str = "position-count";
 /// The first reply that no model explains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TelegramDifference {
+pub(crate) struct TelegramDifference {
     /// How it differs.
-    pub what: Symptom,
+    pub(crate) what: Symptom,
     /// The service, and the part of its data.
-    pub part: String,
+    pub(crate) part: String,
     /// The section that says most about it, such as `3.2.2`, or `EN 2`.
-    pub section: String,
+    pub(crate) section: String,
     /// The slave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub slave: Option<u8>,
+    pub(crate) slave: Option<u8>,
     /// The number of the telegram among those of the slaves, counted from 1.
-    pub telegram: usize,
+    pub(crate) telegram: usize,
     /// The values of open points with which the model explains most, as header lines; defaults are not listed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub under: Vec<String>,
+    pub(crate) under: Vec<String>,
     /// The whole difference, as a sentence.
-    pub about: String,
+    pub(crate) about: String,
 }
 
 /// Every property with every value.

@@ -15,22 +15,22 @@ use harness_sim::nordac::Stimulus;
 const TAIL: Span = Span::from_millis(20);
 
 /// What a case has shown: what the slaves sent, and each act as often as it happened.
-pub type TelegramsSeen = LineSeen<HeardTelegram, Done>;
+pub(crate) type TelegramsSeen = LineSeen<HeardTelegram, Done>;
 
 /// An act that has happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Done {
+pub(crate) struct Done {
     /// When it began.
-    pub at: Instant,
+    pub(crate) at: Instant,
     /// Its place in the case.
-    pub act: usize,
+    pub(crate) act: usize,
     /// What was sent; `None` for what happens to a slave.
-    pub sent: Option<OutgoingTelegram>,
+    pub(crate) sent: Option<OutgoingTelegram>,
 }
 
 /// Plays a case on fresh slaves.
 #[must_use]
-pub fn play(setup: &Setup, case: &TelegramTalk) -> TelegramsSeen {
+pub(crate) fn play(setup: &Setup, case: &TelegramTalk) -> TelegramsSeen {
     let mut bench = Bench::new(setup);
     let mut counts = Counts::default();
     let mut done = Vec::new();

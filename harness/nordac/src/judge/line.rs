@@ -30,35 +30,34 @@ const NO_REQUEST: &str = "octets that are no request";
 
 /// Something that a slave does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Breach {
+pub(crate) struct Breach {
     /// How it differs.
-    pub what: Symptom,
+    pub(crate) what: Symptom,
     /// The number of the telegram where it shows, counted from 1 over all stations.
-    pub telegram: usize,
-    /// The slave.
-    pub slave: u8,
+    pub(crate) telegram: usize,
+    pub(crate) slave: u8,
     /// The service, or what it was that asked for the reply.
-    pub part: String,
+    pub(crate) part: String,
     /// The section, such as `EN 2` or `3.4.1`.
-    pub section: &'static str,
+    pub(crate) section: &'static str,
     /// What was expected and what has come.
-    pub about: String,
+    pub(crate) about: String,
 }
 
 /// What came of judging telegrams.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct JudgedSlaves {
+pub(crate) struct JudgedSlaves {
     /// What differs, in order.
-    pub breaches: Vec<Breach>,
+    pub(crate) breaches: Vec<Breach>,
     /// Replies of slaves that were compared.
-    pub compared: usize,
+    pub(crate) compared: usize,
     /// Replies that could be compared: those, and those that are damaged or that follow octets which are no single request.
-    pub replies: usize,
+    pub(crate) replies: usize,
     /// What was not compared, in sentences.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
     /// What differs and may have another cause than a wrong slave, in sentences with their places: it accuses no slave, and nothing has
     /// passed.
-    pub doubts: Vec<String>,
+    pub(crate) doubts: Vec<String>,
 }
 
 /// A request that was understood, and its number.
@@ -77,7 +76,7 @@ struct Asked {
 /// `named` are the slaves that are judged; where there are none, those that are no other device's. Times may be off by
 /// `tolerance`.
 #[must_use]
-pub fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
+pub(crate) fn judge(trace: &Trace, named: &[u8], tolerance: Span) -> JudgedSlaves {
     let mut runs = runs(trace);
     let senders = Sender::of_all(&runs);
     // A telegram that the end of the capture has cut.

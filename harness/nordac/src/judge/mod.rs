@@ -17,5 +17,5 @@ mod symptom;
 mod tests;
 
 pub(crate) use line::judge_runs;
-pub use line::{Breach, JudgedSlaves, judge};
-pub use symptom::{ReplySubject, Symptom};
+pub(crate) use line::{Breach, judge};
+pub(crate) use symptom::{ReplySubject, Symptom};

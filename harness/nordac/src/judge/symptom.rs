@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// How slaves differ from the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Symptom {
+pub(crate) enum Symptom {
     /// A reply has other data.
     Value,
     /// A reply is of another kind, or has other addresses, SAPs or length.
@@ -29,9 +29,8 @@ pub enum Symptom {
 }
 
 impl Symptom {
-    /// In words.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Value => "other data",
             Self::Form => "another reply",
@@ -47,17 +46,17 @@ impl Symptom {
 
 /// What a reply is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReplySubject {
+pub(crate) struct ReplySubject {
     /// The service, and the part of its data.
-    pub part: String,
+    pub(crate) part: String,
     /// The section that says most about it.
-    pub section: &'static str,
+    pub(crate) section: &'static str,
 }
 
 impl ReplySubject {
     /// The service of a request.
     #[must_use]
-    pub fn of(request: Option<&Telegram>) -> Self {
+    pub(crate) fn of(request: Option<&Telegram>) -> Self {
         let pdu = request.and_then(Telegram::pdu);
         let function = pdu.and_then(|own| own.fc().function());
         let (part, section) = match (pdu, function) {
@@ -78,7 +77,12 @@ impl ReplySubject {
 
     /// The part of a reply's data that differs.
     #[must_use]
-    pub fn of_data(request: Option<&Telegram>, ppo: PpoType, wanted: &Pdu, came: &Pdu) -> Self {
+    pub(crate) fn of_data(
+        request: Option<&Telegram>,
+        ppo: PpoType,
+        wanted: &Pdu,
+        came: &Pdu,
+    ) -> Self {
         let whole = Self::of(request);
         let exchange = wanted.dsap().is_none() && whole.part == Service::DataExchange.name();
         let both = [wanted, came].map(|own| Image::decode(ppo, own.data()));

@@ -1,6 +1,7 @@
 //! Right slaves are never accused, whatever the value of an open point; wrong ones are.
 
-use super::{JudgedSlaves, judge};
+use super::judge;
+use super::line::JudgedSlaves;
 use crate::language::Nordac;
 use harness_bench::capture::runs::{octet_time, octets, runs};
 use harness_bench::scenario::files::sources;

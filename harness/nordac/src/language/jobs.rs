@@ -40,7 +40,7 @@ const FAULT: u16 = 0x0008;
 
 /// What the master keeps of its slaves while a scenario is played.
 #[derive(Debug, Default)]
-pub struct KnownSlaves {
+pub(crate) struct KnownSlaves {
     slaves: BTreeMap<u8, Known>,
 }
 

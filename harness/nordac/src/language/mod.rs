@@ -3,12 +3,12 @@
 mod jobs;
 pub(crate) mod now;
 mod parse;
-pub mod plan;
+pub(crate) mod plan;
 mod play;
-pub mod syntax;
+pub(crate) mod syntax;
 mod write;
 
-pub use jobs::KnownSlaves;
+pub(crate) use jobs::KnownSlaves;
 
 use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, TelegramStep};
@@ -29,7 +29,7 @@ use harness_proto::time::{Instant, Span};
 
 /// The language of scenarios with the words of this bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Nordac;
+pub(crate) struct Nordac;
 
 impl Language for Nordac {
     const BUS: BusName = BusName::Nordac;

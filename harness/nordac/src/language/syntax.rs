@@ -13,29 +13,29 @@ use harness_sim::octet_segment::TelegramFault;
 
 /// The header lines of this bus.
 #[derive(Clone, Debug, Default)]
-pub struct Header {
+pub(crate) struct Header {
     /// `rate 500`, in kbit/s.
-    pub rate: Option<BusRate>,
+    pub(crate) rate: Option<BusRate>,
     /// `master deviates NAME`.
-    pub master: Option<Spanned<&'static MasterDeviation>>,
+    pub(crate) master: Option<Spanned<&'static MasterDeviation>>,
     /// Lines about slaves, in order.
-    pub slaves: Vec<SlaveLine>,
+    pub(crate) slaves: Vec<SlaveLine>,
 }
 
 /// A header line about a slave.
 #[derive(Clone, Debug)]
-pub struct SlaveLine {
+pub(crate) struct SlaveLine {
     /// The slave's address.
-    pub slave: Located,
+    pub(crate) slave: Located,
     /// What the line says.
-    pub what: SetupKind,
+    pub(crate) what: SetupKind,
     /// The whole line.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// What a header line says about a slave.
 #[derive(Clone, Debug)]
-pub enum SetupKind {
+pub(crate) enum SetupKind {
     /// `slave 8`, `slave 8 ppo 2`, `slave 8 posicon`: it is there.
     There {
         /// The PPO type that it is set to.
@@ -53,18 +53,18 @@ pub enum SetupKind {
 
 /// A parameter and its index.
 #[derive(Clone, Debug)]
-pub struct ParameterName {
+pub(crate) struct ParameterName {
     /// Which parameter.
-    pub which: Which,
+    pub(crate) which: Which,
     /// What stands behind it: `.3` is set 3 or sub-index 3, `.5.2` element 5 in set 2.
-    pub index: Vec<Located>,
+    pub(crate) index: Vec<Located>,
     /// Where it stands.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// How a parameter is given.
 #[derive(Clone, Debug)]
-pub enum Which {
+pub(crate) enum Which {
     /// `1205`.
     Numbered(u16),
     /// `"Maximum frequ."`: one of the table.
@@ -75,16 +75,16 @@ pub enum Which {
 
 /// A value as written.
 #[derive(Clone, Debug)]
-pub struct WrittenValue {
+pub(crate) struct WrittenValue {
     /// What is written.
-    pub kind: ValueKind,
+    pub(crate) kind: ValueKind,
     /// Where it stands.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// A raw number, or a number with a unit.
 #[derive(Clone, Debug)]
-pub enum ValueKind {
+pub(crate) enum ValueKind {
     /// `700`: a raw decimal number.
     Raw(i64),
     /// `70.0Hz`: a number with its unit, as written.
@@ -95,25 +95,24 @@ pub enum ValueKind {
 
 /// A telegram behind `>` or `<`.
 #[derive(Clone, Debug)]
-pub struct Message {
-    /// Its octets.
-    pub octets: Pattern,
+pub(crate) struct Message {
+    pub(crate) octets: Pattern,
     /// What is wrong with some of them.
-    pub bad: Vec<Bad>,
+    pub(crate) bad: Vec<Bad>,
 }
 
 /// `bad 3`: an octet of a telegram that goes out damaged.
 #[derive(Clone, Debug)]
-pub struct Bad {
+pub(crate) struct Bad {
     /// Which octet, counted from 1.
-    pub octet: Located,
+    pub(crate) octet: Located,
     /// What is wrong with it.
-    pub how: Damage,
+    pub(crate) how: Damage,
 }
 
 /// What is wrong with an octet of a telegram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Damage {
+pub(crate) enum Damage {
     /// `bad 3`: its parity bit is wrong.
     Parity,
     /// `bad 3 stop`: its stop bit is 0.
@@ -126,7 +125,7 @@ pub enum Damage {
 
 /// A step of this bus.
 #[derive(Clone, Debug)]
-pub enum TelegramStep {
+pub(crate) enum TelegramStep {
     /// `! slave 8 byte 3: flip 0`.
     Octet(Sender, Located, OctetHarm),
     /// `! slave 8 telegram 3: lost`.
@@ -145,7 +144,7 @@ pub enum TelegramStep {
 
 /// Whose octets or telegrams are counted.
 #[derive(Clone, Debug)]
-pub enum Sender {
+pub(crate) enum Sender {
     /// Those of all stations.
     Any,
     /// `master`.
@@ -156,7 +155,7 @@ pub enum Sender {
 
 /// What happens to an octet on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OctetHarm {
+pub(crate) enum OctetHarm {
     /// One that says all that there is to say.
     Plain(LinkFault),
     /// `delay 3ms`: it leaves later, and those behind it too.
@@ -165,7 +164,7 @@ pub enum OctetHarm {
 
 /// What happens to a telegram on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TelegramHarm {
+pub(crate) enum TelegramHarm {
     /// `lost`, `doubled` or `former`.
     Plain(TelegramFault),
     /// `delay 3ms`: it begins later.
@@ -174,7 +173,7 @@ pub enum TelegramHarm {
 
 /// What happens to a slave from outside its bus.
 #[derive(Clone, Debug)]
-pub enum Outside {
+pub(crate) enum Outside {
     /// `link lost`, `link found`: whether inverter and module have each other.
     Link(bool),
     /// `fault on`, `fault 3 on`, `fault off`: a cause of a fault comes or goes.
@@ -190,16 +189,15 @@ pub enum Outside {
 
 /// A job of the master.
 #[derive(Clone, Debug)]
-pub struct JobStep {
-    /// The slave.
-    pub slave: Located,
+pub(crate) struct JobStep {
+    pub(crate) slave: Located,
     /// What is to be done.
-    pub what: JobKind,
+    pub(crate) what: JobKind,
 }
 
 /// What a job does.
 #[derive(Clone, Debug)]
-pub enum JobKind {
+pub(crate) enum JobKind {
     /// `start 8 ppo 1 watchdog 300ms`.
     Start {
         /// The PPO type that the master configures; that of the slave where it is left out.
@@ -230,7 +228,7 @@ pub enum JobKind {
 
 /// What a `read` must give.
 #[derive(Clone, Debug)]
-pub enum Wanted {
+pub(crate) enum Wanted {
     /// `= 5s`.
     Value(WrittenValue),
     /// `error 3`: the number of the error.
@@ -239,7 +237,7 @@ pub enum Wanted {
 
 /// A word of the process data, or the parameter channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WordName {
+pub(crate) enum WordName {
     /// STW or ZSW.
     Control,
     /// HSW or HIW.
@@ -254,16 +252,16 @@ pub enum WordName {
 
 /// The contents of a word as written.
 #[derive(Clone, Debug)]
-pub struct WordValue {
+pub(crate) struct WordValue {
     /// What is written.
-    pub kind: WordKind,
+    pub(crate) kind: WordKind,
     /// Where it stands.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// How a word is written.
 #[derive(Clone, Debug)]
-pub enum WordKind {
+pub(crate) enum WordKind {
     /// `047F`, `0Fxx`: hexadecimal digits, `xx` for any byte.
     Bytes(Vec<Option<u8>>),
     /// `50%` of 4000h, as its digits and how many of them stand behind the point.

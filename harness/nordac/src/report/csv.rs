@@ -17,7 +17,7 @@ use std::io::Write;
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     writeln!(out, "t_ns,from,to,bytes,error,service,meaning")?;
     for trace in traces {
         let mut reader = Reader::default();

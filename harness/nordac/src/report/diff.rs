@@ -9,7 +9,7 @@ use harness_sim::record::Trace;
 
 /// How two traces differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TraceDifference {
+pub(crate) struct TraceDifference {
     /// How many telegrams each side has.
     counts: [usize; 2],
     /// The first place, counted from 1, at which the telegrams differ, and what stands there on each side.
@@ -21,7 +21,7 @@ pub struct TraceDifference {
 
 /// Compares the telegrams of two runs in their order. Their times may differ by `tolerance`.
 #[must_use]
-pub fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TraceDifference {
+pub(crate) fn difference(left: &[Trace], right: &[Trace], tolerance: Span) -> TraceDifference {
     let sides = [left, right].map(|traces| traces.iter().flat_map(said).collect::<Vec<_>>());
     let [left, right] = &sides;
     let same = |one: &HeardTelegram, other: &HeardTelegram| {
@@ -63,13 +63,13 @@ fn words(all: &[HeardTelegram], place: usize) -> String {
 impl TraceDifference {
     /// Whether the telegrams are the same, and their times within the tolerance.
     #[must_use]
-    pub fn is_none(&self) -> bool {
+    pub(crate) fn is_none(&self) -> bool {
         self.first.is_none() && self.late <= self.tolerance
     }
 
     /// The comparison in words.
     #[must_use]
-    pub fn show(&self, names: [&str; 2]) -> String {
+    pub(crate) fn show(&self, names: [&str; 2]) -> String {
         let [left, right] = self.counts;
         let mut text = match &self.first {
             None => format!("the same: {}\n", counted(left, "telegram")),

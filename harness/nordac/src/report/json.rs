@@ -21,7 +21,7 @@ use serde::{Serialize, Serializer};
 use std::io::Write;
 
 /// The version of the form.
-pub const SCHEMA: u32 = 2;
+pub(crate) const SCHEMA: u32 = 2;
 
 #[derive(Serialize)]
 struct Object {
@@ -60,7 +60,7 @@ fn sender<S: Serializer>(from: &Option<u8>, serializer: S) -> Result<S::Ok, S::E
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let bytes = traces
         .iter()
         .flat_map(octets)

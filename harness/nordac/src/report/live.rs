@@ -8,7 +8,7 @@ use harness_bench::capture::runs::TelegramRun;
 
 /// Text of the telegrams of one line.
 #[derive(Debug, Default)]
-pub struct TelegramText {
+pub(crate) struct TelegramText {
     reader: Reader,
 }
 

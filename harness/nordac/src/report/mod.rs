@@ -1,17 +1,17 @@
 //! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a capture, a picture.
 
-pub mod csv;
+pub(crate) mod csv;
 pub(crate) mod curves;
-pub mod diff;
-pub mod json;
-pub mod live;
-pub mod pcapng;
+pub(crate) mod diff;
+pub(crate) mod json;
+pub(crate) mod live;
+pub(crate) mod pcapng;
 pub(crate) mod sequence;
-pub mod table;
+pub(crate) mod table;
 mod words;
 
+pub(crate) use words::Reader;
 pub(super) use words::{CONTROL, PRM};
-pub use words::{ProcessImage, Reader};
 
 use harness_bench::bus_name::BusName;
 use harness_bench::capture::runs::said;
@@ -24,7 +24,7 @@ use std::ops::Range;
 
 /// How telegrams are shown.
 #[derive(Clone, Copy, Debug)]
-pub struct TelegramReport;
+pub(crate) struct TelegramReport;
 
 impl SegmentReport for TelegramReport {
     fn carries(&self) -> &'static str {

@@ -9,7 +9,7 @@ use std::io::Write;
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(traces: &[Trace], out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(traces: &[Trace], out: impl Write) -> std::io::Result<()> {
     let runs: Vec<_> = traces.iter().flat_map(runs).collect();
     let telegrams: Vec<_> = runs
         .iter()

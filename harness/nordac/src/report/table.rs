@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// The table. Of a table longer than `at_most` the middle is left out.
 #[must_use]
-pub fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
+pub(crate) fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
     let mut reader = Reader::default();
     let rows = said(trace)
         .into_iter()

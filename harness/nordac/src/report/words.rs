@@ -28,7 +28,7 @@ pub(crate) const CONTROL: [(u8, &str); 5] = [
 
 /// Reads telegrams one after another: a reply has the service of its request, and the PPO type is that of the last Chk_Cfg.
 #[derive(Clone, Debug, Default)]
-pub struct Reader {
+pub(crate) struct Reader {
     /// The PPO types, by the slave's address.
     types: BTreeMap<u8, PpoType>,
     /// The service of the last request, and the slave that was asked.
@@ -37,29 +37,28 @@ pub struct Reader {
 
 /// The process data of a Data_Exchange, in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ProcessImage {
-    /// The slave.
-    pub slave: u8,
+pub(crate) struct ProcessImage {
+    pub(crate) slave: u8,
     /// Whether they are the slave's inputs, rather than what the master sent.
-    pub of_slave: bool,
+    pub(crate) of_slave: bool,
     /// The words.
-    pub image: Image,
+    pub(crate) image: Image,
 }
 
 /// A telegram in words.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Words {
+pub(crate) struct Words {
     /// The station that it is for.
-    pub to: Option<u8>,
+    pub(crate) to: Option<u8>,
     /// The service, or the kind of telegram.
-    pub service: String,
+    pub(crate) service: String,
     /// What it says.
-    pub meaning: String,
+    pub(crate) meaning: String,
 }
 
 impl Reader {
     /// Reads the next telegram.
-    pub fn read(&mut self, said: &HeardTelegram) -> Words {
+    pub(crate) fn read(&mut self, said: &HeardTelegram) -> Words {
         if let Some((place, error)) = said.error {
             return Words {
                 service: "damaged".to_owned(),
@@ -93,7 +92,7 @@ impl Reader {
 
     /// The process data of the telegram that was read last, if it was one of a Data_Exchange.
     #[must_use]
-    pub fn exchanged(&self, said: &HeardTelegram) -> Option<ProcessImage> {
+    pub(crate) fn exchanged(&self, said: &HeardTelegram) -> Option<ProcessImage> {
         let telegram = said.telegram()?;
         let pdu = telegram.pdu()?;
         let (asked, service) = self.asked?;

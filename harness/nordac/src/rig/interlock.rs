@@ -27,7 +27,6 @@ const STATUS_WORD: u16 = 968;
 /// The longest reply of an exchange: 20 octets of PPO type 2, and 9 around them.
 const LONGEST: usize = 29;
 
-/// An interlock.
 #[derive(Clone, Debug)]
 pub(crate) struct InverterInterlock {
     pub(crate) slave: u8,

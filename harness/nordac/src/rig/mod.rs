@@ -13,9 +13,9 @@ mod session;
 mod settle;
 pub(crate) mod talk;
 
-pub use permitted::limits;
+pub(crate) use permitted::limits;
 pub(crate) use player::Player;
-pub use session::{Inverters, OfNordac, Session};
+pub(crate) use session::{Inverters, OfNordac, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
@@ -38,13 +38,13 @@ use harness_proto::profibus::BusRate;
 use std::collections::BTreeSet;
 
 /// The address of the bench's own master.
-pub const MASTER: u8 = 2;
+pub(crate) const MASTER: u8 = 2;
 
 /// The address of the first simulated slave.
 const FIRST: u8 = 8;
 
 /// Rigs of this bus.
-pub const PORT: PortRow = PortRow {
+pub(crate) const PORT: PortRow = PortRow {
     bus: PortBus::Nordac,
     adapters: &["serial", "tcp", "port"],
     keys: &["transport", "marks", "echo"],
@@ -71,7 +71,7 @@ pub const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub const COMMANDS: PortCommands = PortCommands {
+pub(crate) const COMMANDS: PortCommands = PortCommands {
     bus: PortBus::Nordac,
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: |rig, allow_motion, qualifies| {
@@ -107,11 +107,11 @@ const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
 
 /// A slave of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RigSlave {
+pub(crate) struct RigSlave {
     /// Its address, 1 to 126.
-    pub address: u8,
+    pub(crate) address: u8,
     /// The PPO type that it is set to, as far as it is known.
-    pub ppo: Option<PpoType>,
+    pub(crate) ppo: Option<PpoType>,
 }
 
 impl From<RigSlave> for GuardedSlave {
@@ -125,7 +125,7 @@ impl From<RigSlave> for GuardedSlave {
 
 /// The slaves of a port, as its file lists them.
 #[must_use]
-pub fn slaves(port: &Port) -> Vec<RigSlave> {
+pub(crate) fn slaves(port: &Port) -> Vec<RigSlave> {
     let all = port.drives.iter();
     all.map(|node| RigSlave {
         address: node.address.unwrap_or_default(),
@@ -136,7 +136,7 @@ pub fn slaves(port: &Port) -> Vec<RigSlave> {
 
 /// The bit rate of a port.
 #[must_use]
-pub fn rate(port: &Port) -> BusRate {
+pub(crate) fn rate(port: &Port) -> BusRate {
     // The file was checked.
     BusRate::from_bits_per_second(port.rate.bits_per_second()).unwrap_or_default()
 }
@@ -146,7 +146,7 @@ pub fn rate(port: &Port) -> BusRate {
 ///
 /// # Errors
 /// The lines have mistakes, or name a slave that the port does not have.
-pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
+pub(crate) fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
     let slaves = slaves(port);
     let lines = slaves.iter().map(|slave| {
         let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default().number());

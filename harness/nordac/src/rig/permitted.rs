@@ -6,7 +6,7 @@ use harness_proto::nordac::words::FULL;
 
 /// What a rig's file and the command line allow together.
 #[must_use]
-pub fn limits(rig: &Rig, allow_motion: bool) -> Limits {
+pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let own = &rig.file.limits;
     let more = &own.port;
     // Rounded down.

@@ -27,7 +27,6 @@ const FCS: &str = "{fcs}";
 /// What a probe needs that is not permitted by default.
 #[derive(Clone, Copy)]
 enum ProbeNeeds {
-    /// Nothing.
     Nothing,
     /// Parameters may be written.
     Eeprom,

@@ -25,7 +25,7 @@ use harness_proto::time::Span;
 
 /// The inverters of a rig.
 #[derive(Clone, Debug)]
-pub struct Inverters {
+pub(crate) struct Inverters {
     slaves: Vec<RigSlave>,
     patience: Span,
     /// The master, between two requests of a session.
@@ -33,7 +33,7 @@ pub struct Inverters {
 }
 
 /// A rig in use.
-pub type Session = PortSession<Inverters>;
+pub(crate) type Session = PortSession<Inverters>;
 
 impl PortDrives for Inverters {
     const WORDS: [&'static str; 2] = ["slave", "PROFIBUS segment"];
@@ -94,7 +94,7 @@ impl PortDrives for Inverters {
 }
 
 /// What a session of these drives has beside what all have.
-pub trait OfNordac {
+pub(crate) trait OfNordac {
     /// Its slaves. Their PPO types are those that they were found with.
     fn slaves(&self) -> &[RigSlave];
 

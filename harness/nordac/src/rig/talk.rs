@@ -17,7 +17,7 @@ const TRIES: u8 = 3;
 
 /// Why a slave did not do as it was asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TalkError {
+pub(crate) enum TalkError {
     /// The line carries nothing more.
     #[error("{0}")]
     Line(Trouble),
@@ -31,7 +31,6 @@ pub enum TalkError {
     OtherThanProfile {
         /// Its address.
         slave: u8,
-        /// The property.
         property: &'static str,
         /// What the profile says.
         says: String,
@@ -41,7 +40,6 @@ pub enum TalkError {
     NoReply {
         /// Its address.
         slave: u8,
-        /// The service.
         service: &'static str,
     },
     /// Its reply is none to this service.
@@ -49,7 +47,6 @@ pub enum TalkError {
     Unexpected {
         /// Its address.
         slave: u8,
-        /// The service.
         service: &'static str,
         /// What it replies, in words.
         found: String,
@@ -67,7 +64,6 @@ pub enum TalkError {
     Exchange {
         /// Its address.
         slave: u8,
-        /// Why.
         why: ExchangeError,
     },
     /// It has a fault.
@@ -83,7 +79,7 @@ pub enum TalkError {
 }
 
 /// The bench's own master, which asks one slave at a time.
-pub struct Talk<'l> {
+pub(crate) struct Talk<'l> {
     line: Box<dyn Line + 'l>,
     /// How long a reply may take, beside its own time on the line.
     patience: Span,
@@ -93,7 +89,7 @@ pub struct Talk<'l> {
 impl<'l> Talk<'l> {
     /// A master on a line.
     #[must_use]
-    pub fn new(line: Box<dyn Line + 'l>, patience: Span) -> Self {
+    pub(crate) fn new(line: Box<dyn Line + 'l>, patience: Span) -> Self {
         Self {
             line,
             patience,
@@ -103,7 +99,7 @@ impl<'l> Talk<'l> {
 
     /// The time.
     #[must_use]
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.line.now()
     }
 
@@ -111,7 +107,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError::Line`].
-    pub fn pass(&mut self, span: Span) -> Result<(), TalkError> {
+    pub(crate) fn pass(&mut self, span: Span) -> Result<(), TalkError> {
         let end = self.now() + span;
         while self.now() < end {
             self.sound()?;
@@ -130,7 +126,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError::Line`]: the gate denies them, among others.
-    pub fn send(&mut self, octets: &[u8]) -> Result<Instant, TalkError> {
+    pub(crate) fn send(&mut self, octets: &[u8]) -> Result<Instant, TalkError> {
         while self.line.receive(0).is_some() {}
         let end = self.line.send_octets(0, octets);
         self.sound()?;
@@ -229,13 +225,18 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError::Line`].
-    pub fn raw(&mut self, slave: u8, service: Service, data: &[u8]) -> Result<String, TalkError> {
+    pub(crate) fn raw(
+        &mut self,
+        slave: u8,
+        service: Service,
+        data: &[u8],
+    ) -> Result<String, TalkError> {
         let reply = self.ask(slave, service, data)?;
         Ok(format!("{reply:?}"))
     }
 
     /// Begins a new sequence of requests, as after the bench was opened.
-    pub fn restart(&mut self, slave: u8) {
+    pub(crate) fn restart(&mut self, slave: u8) {
         self.requests(slave).restart();
     }
 
@@ -243,7 +244,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError::Line`].
-    pub fn status(&mut self, slave: u8) -> Result<bool, TalkError> {
+    pub(crate) fn status(&mut self, slave: u8) -> Result<bool, TalkError> {
         let Ok(pdu) = self.requests(slave).status() else {
             return Ok(false);
         };
@@ -255,7 +256,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError`].
-    pub fn diagnose(&mut self, slave: u8) -> Result<Diagnosis, TalkError> {
+    pub(crate) fn diagnose(&mut self, slave: u8) -> Result<Diagnosis, TalkError> {
         let data = self.data(slave, Service::SlaveDiag)?;
         Diagnosis::decode(&data).ok_or_else(|| TalkError::Unexpected {
             slave,
@@ -268,7 +269,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError`].
-    pub fn configuration(&mut self, slave: u8) -> Result<Option<PpoType>, TalkError> {
+    pub(crate) fn configuration(&mut self, slave: u8) -> Result<Option<PpoType>, TalkError> {
         let data = self.data(slave, Service::GetCfg)?;
         Ok(PpoType::from_cfg(&data))
     }
@@ -277,7 +278,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError`].
-    pub fn start(
+    pub(crate) fn start(
         &mut self,
         slave: u8,
         ppo: PpoType,
@@ -300,7 +301,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError`]; [`ExchangeError::Left`] where the slave is not in the exchange.
-    pub fn exchange(
+    pub(crate) fn exchange(
         &mut self,
         slave: u8,
         ppo: PpoType,
@@ -326,7 +327,7 @@ impl<'l> Talk<'l> {
     ///
     /// # Errors
     /// [`TalkError::Line`].
-    pub fn command(&mut self, slave: u8, command: u8) -> Result<(), TalkError> {
+    pub(crate) fn command(&mut self, slave: u8, command: u8) -> Result<(), TalkError> {
         let command = GlobalControl { command, group: 0 };
         let data = command.encode();
         if let Ok(pdu) = self.requests(slave).request(Service::GlobalControl, &data) {

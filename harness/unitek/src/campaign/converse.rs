@@ -22,7 +22,7 @@ const REST: Span = Span::from_millis(300);
 
 /// How a step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JobEnd {
+pub(crate) enum JobEnd {
     /// A job, by its outcome; the stuff byte of a reply is left out.
     Job(Outcome),
     /// A wait has passed.
@@ -34,7 +34,7 @@ pub enum JobEnd {
 impl JobEnd {
     /// Whether the master reports it as done.
     #[must_use]
-    pub const fn is_well(&self) -> bool {
+    pub(crate) const fn is_well(&self) -> bool {
         match self {
             Self::Waited => true,
             Self::Open => false,
@@ -45,9 +45,8 @@ impl JobEnd {
         }
     }
 
-    /// In words.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         match self {
             Self::Waited => "waited".to_owned(),
             Self::Open => "not ended".to_owned(),
@@ -69,7 +68,7 @@ impl JobEnd {
 
 /// What the drive holds at the end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DriveState {
+pub(crate) struct DriveState {
     cells: [u32; 256],
     control: Control,
     enabled: bool,
@@ -86,17 +85,17 @@ impl DriveState {
 
 /// What a conversation gave.
 #[derive(Clone, Debug)]
-pub struct Conversation {
+pub(crate) struct Conversation {
     /// How each step ended.
-    pub ends: Vec<JobEnd>,
+    pub(crate) ends: Vec<JobEnd>,
     /// What the master reported besides, in its words.
-    pub disturbances: Vec<String>,
+    pub(crate) disturbances: Vec<String>,
     /// Frames that the master sent.
-    pub sent: u64,
+    pub(crate) sent: u64,
     /// The frames on the bus, in order; a repetition by a controller is left out.
-    pub frames: Vec<Frame>,
+    pub(crate) frames: Vec<Frame>,
     /// What the drive holds at the end.
-    pub state: Option<DriveState>,
+    pub(crate) state: Option<DriveState>,
     /// What the master sent and received, in order.
     pub(super) log: Vec<MasterFrame>,
     /// How long it took.

@@ -17,33 +17,33 @@ const LONGEST: u64 = 10_000;
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct FrameCampaignFile {
+pub(crate) struct FrameCampaignFile {
     /// The version of this schema: 1.
-    pub schema: u32,
+    pub(crate) schema: u32,
     /// The bus: `unitek`.
-    pub bus: String,
+    pub(crate) bus: String,
     /// What the campaign shows, in a line.
-    pub title: String,
+    pub(crate) title: String,
     /// What the master does, see [`CampaignStep`].
-    pub steps: Vec<String>,
+    pub(crate) steps: Vec<String>,
     /// The kinds of faults.
-    pub faults: Vec<FaultName>,
+    pub(crate) faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
-    pub delays: Vec<Time>,
+    pub(crate) delays: Vec<Time>,
     /// How often a request without a reply is repeated; 2 where nothing is said.
-    pub repeats: Option<u8>,
+    pub(crate) repeats: Option<u8>,
     /// Whether writes are read back; they are where nothing is said.
-    pub read_back: Option<bool>,
+    pub(crate) read_back: Option<bool>,
     /// How many cases there must be of each class; what is not named is not looked at.
     #[serde(default)]
-    pub expect: FrameExpect,
+    pub(crate) expect: FrameExpect,
 }
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum FaultName {
+pub(crate) enum FaultName {
     /// No station receives it, and its sender does not notice.
     Lost,
     /// It arrives twice.
@@ -61,23 +61,23 @@ pub enum FaultName {
 /// The figures that a campaign pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct FrameExpect {
+pub(crate) struct FrameExpect {
     /// All cases together.
-    pub cases: Option<u64>,
+    pub(crate) cases: Option<u64>,
     /// See [`FrameClass::Answered`].
-    pub answered: Option<u64>,
+    pub(crate) answered: Option<u64>,
     /// See [`FrameClass::Retried`].
-    pub retried: Option<u64>,
+    pub(crate) retried: Option<u64>,
     /// See [`FrameClass::Noticed`].
-    pub noticed: Option<u64>,
+    pub(crate) noticed: Option<u64>,
     /// See [`FrameClass::Unnoticed`].
-    pub unnoticed: Option<u64>,
+    pub(crate) unnoticed: Option<u64>,
 }
 
 impl FrameExpect {
     /// How many cases of a class are expected.
     #[must_use]
-    pub const fn of(&self, class: FrameClass) -> Option<u64> {
+    pub(crate) const fn of(&self, class: FrameClass) -> Option<u64> {
         match class {
             FrameClass::Answered => self.answered,
             FrameClass::Retried => self.retried,
@@ -89,7 +89,7 @@ impl FrameExpect {
 
 /// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CampaignStep {
+pub(crate) enum CampaignStep {
     /// `read REGISTER`, `write REGISTER = HEX`, `cycle REGISTER MS`, `stop REGISTER`, `start-up`: a job, to its end.
     Job(Job),
     /// `wait MS`.

@@ -5,10 +5,10 @@
 
 mod case;
 mod converse;
-pub mod file;
+pub(crate) mod file;
 
-pub use converse::{Conversation, JobEnd};
-pub use file::{CampaignStep, FrameCampaignFile};
+pub(crate) use converse::{Conversation, JobEnd};
+pub(crate) use file::{CampaignStep, FrameCampaignFile};
 
 use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
@@ -25,7 +25,7 @@ const FOLDER: &str = "unitek/";
 
 /// What came of a fault; the least serious class comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FrameClass {
+pub(crate) enum FrameClass {
     /// Nothing is different, and the master sent nothing again.
     Answered,
     /// The master sent a request again, and nothing else is different.
@@ -38,7 +38,7 @@ pub enum FrameClass {
 
 impl FrameClass {
     /// All of them, in order.
-    pub const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 4] = [
         Self::Answered,
         Self::Retried,
         Self::Noticed,
@@ -76,11 +76,10 @@ const CLASSES: [LineClass; 4] = [
 
 /// A fault at a frame of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameCase {
+pub(crate) struct FrameCase {
     /// The frame, counted from 1 over both stations.
-    pub frame: u64,
-    /// The fault.
-    pub fault: FrameFault,
+    pub(crate) frame: u64,
+    pub(crate) fault: FrameFault,
 }
 
 impl fmt::Display for FrameCase {
@@ -91,36 +90,34 @@ impl fmt::Display for FrameCase {
 
 /// A case that was played.
 #[derive(Clone, Debug)]
-pub struct FrameOutcome {
-    /// The case.
-    pub case: FrameCase,
+pub(crate) struct FrameOutcome {
+    pub(crate) case: FrameCase,
     /// The disturbed frame, as candump writes it.
-    pub disturbed: String,
+    pub(crate) disturbed: String,
     /// The class of the outcome.
-    pub class: FrameClass,
+    pub(crate) class: FrameClass,
     /// What the conversation gave.
-    pub conversation: Conversation,
+    pub(crate) conversation: Conversation,
 }
 
-/// A campaign.
 #[derive(Clone, Debug)]
-pub struct FrameCampaign {
+pub(crate) struct FrameCampaign {
     /// Its name, for messages: a path, or the name of a built-in one.
-    pub name: String,
+    pub(crate) name: String,
     /// The text of its file.
     text: String,
     /// What its file says.
-    pub file: FrameCampaignFile,
+    pub(crate) file: FrameCampaignFile,
     steps: Vec<CampaignStep>,
     /// The conversation without a fault.
     sound: Conversation,
     /// The cases, in order of frames.
-    pub cases: Vec<FrameCase>,
+    pub(crate) cases: Vec<FrameCase>,
 }
 
 /// The names of the built-in campaigns, in order.
 #[must_use]
-pub fn names() -> Vec<String> {
+pub(crate) fn names() -> Vec<String> {
     let files = BUILT_IN.files();
     let mut names: Vec<_> = files
         .filter_map(|file| file.path().to_str()?.strip_suffix(".toml"))
@@ -135,7 +132,7 @@ pub fn names() -> Vec<String> {
 /// # Errors
 /// What is wrong with it, with file, place and remedy.
 #[must_use]
-pub fn find(name: &Path) -> Option<Result<FrameCampaign, String>> {
+pub(crate) fn find(name: &Path) -> Option<Result<FrameCampaign, String>> {
     let shown = name.display().to_string();
     if name.is_file() {
         let text = std::fs::read_to_string(name).ok()?;
@@ -151,7 +148,7 @@ impl FrameCampaign {
     ///
     /// # Errors
     /// A mistake in the text, or a conversation that does not end well without a fault.
-    pub fn new(name: &str, text: &str) -> Result<Self, String> {
+    pub(crate) fn new(name: &str, text: &str) -> Result<Self, String> {
         let wrong = |message: String| format!("{name}: {message}");
         let (file, steps) = file::read(text).map_err(wrong)?;
         let sound = converse::converse(&file, &steps, None);
@@ -189,13 +186,13 @@ impl FrameCampaign {
 
     /// How many frames the conversation has without a fault.
     #[must_use]
-    pub fn frames(&self) -> usize {
+    pub(crate) fn frames(&self) -> usize {
         self.sound.frames.len()
     }
 
     /// Plays one case.
     #[must_use]
-    pub fn play(&self, case: FrameCase) -> FrameOutcome {
+    pub(crate) fn play(&self, case: FrameCase) -> FrameOutcome {
         let placed = Placed {
             station: None,
             frame: case.frame,

@@ -7,12 +7,12 @@ use harness_proto::unitek::units::usual;
 use harness_proto::unitek::{ALIASES, REGISTERS, Register};
 
 /// The names of all registers.
-pub fn names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     REGISTERS.iter().map(|register| register.name)
 }
 
 /// Shows the registers that have the filter in their name, number or meaning.
-pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
     if arguments.eeprom {
         output.complain(
             "--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM",

@@ -4,7 +4,7 @@ use harness_bench::command::deviations::DeviationRow;
 use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, deviations};
 
 /// The deviations of drives, and those of the bench's own driver.
-pub fn rows() -> [Vec<DeviationRow>; 2] {
+pub(crate) fn rows() -> [Vec<DeviationRow>; 2] {
     let drives = deviations().map(|own| DeviationRow {
         name: own.name,
         section: own.section,

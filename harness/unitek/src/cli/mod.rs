@@ -1,10 +1,10 @@
 //! Commands on UNITEK drives: one file a command, over the driver [`crate::driver`].
 
 mod bench;
-pub mod cells;
+pub(crate) mod cells;
 mod check;
 mod control;
-pub mod deviations;
+pub(crate) mod deviations;
 mod held;
 mod info;
 mod params;

@@ -9,7 +9,7 @@ use harness_proto::unitek::master::{Outcome, Refused};
 
 /// Why a call to a drive came to nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Error {
+pub(crate) enum Error {
     /// No reply came. A drive sends no error reply, so nothing tells why.
     #[error(
         "drive {node} does not answer for register {register:02X} ({}): {}, no reply; check its identifiers, the bit rate and its power",
@@ -19,7 +19,6 @@ pub enum Error {
     NoReply {
         /// Which drive.
         node: u8,
-        /// The register.
         register: u8,
         /// How often it was asked.
         tries: u8,
@@ -32,7 +31,6 @@ pub enum Error {
     Differs {
         /// Which drive.
         node: u8,
-        /// The register.
         register: u8,
         /// What was written.
         wrote: Data,
@@ -57,7 +55,6 @@ pub enum Error {
     OtherThanProfile {
         /// Which drive.
         node: u8,
-        /// The property.
         property: &'static str,
         /// What the profile says.
         says: String,

@@ -5,12 +5,12 @@
 
 mod error;
 
-pub use error::Error;
+pub(crate) use error::Error;
 
 use super::rig::Axis;
 use harness_bench::link::Line;
 use harness_bench::medium::{Heard, Out};
-use harness_proto::can::{self, CanError, Frame};
+use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
 use harness_proto::unitek::master::{Event, Job, JobId, Master, Options, Outcome};
@@ -32,7 +32,7 @@ const MODE: u8 = 0x51;
 
 /// How a drive was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stopped {
+pub(crate) enum Stopped {
     /// Its speed command is 0: it stops on its ramp.
     OnRamp,
     /// It is locked, and its commands are 0: it coasts. The rig's file does not permit a speed command.
@@ -40,12 +40,10 @@ pub enum Stopped {
 }
 
 /// The drives of a segment.
-pub struct Driver<'l> {
+pub(crate) struct Driver<'l> {
     line: Box<dyn Line + 'l>,
     drives: Vec<Drive>,
     events: VecDeque<(Instant, Axis, Event)>,
-    /// What went wrong on the bus.
-    errors: Vec<CanError>,
 }
 
 struct Drive {
@@ -66,7 +64,7 @@ impl fmt::Debug for Driver<'_> {
 impl<'l> Driver<'l> {
     /// A driver of these drives; nothing is sent. A reply may take `patience`.
     #[must_use]
-    pub fn new(line: Box<dyn Line + 'l>, axes: &[Axis], patience: Span) -> Self {
+    pub(crate) fn new(line: Box<dyn Line + 'l>, axes: &[Axis], patience: Span) -> Self {
         let options = Options {
             time_out: patience,
             ..Options::default()
@@ -80,18 +78,17 @@ impl<'l> Driver<'l> {
             line,
             drives: axes.iter().map(drive).collect(),
             events: VecDeque::new(),
-            errors: Vec::new(),
         }
     }
 
     /// Its drives.
-    pub fn axes(&self) -> impl Iterator<Item = Axis> {
+    pub(crate) fn axes(&self) -> impl Iterator<Item = Axis> {
         self.drives.iter().map(|drive| drive.axis)
     }
 
     /// The time of its line.
     #[must_use]
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.line.now()
     }
 
@@ -99,7 +96,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NoReply`], [`Error::Link`].
-    pub fn read(&mut self, axis: Axis, register: u8) -> Result<Reply, Error> {
+    pub(crate) fn read(&mut self, axis: Axis, register: u8) -> Result<Reply, Error> {
         match self.run_job(axis, Job::Read { register })? {
             Outcome::Read(reply) => Ok(reply),
             other => Err(Error::of(axis, register, other)),
@@ -110,7 +107,12 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::Differs`] where the register reads differently, [`Error::NoReply`], [`Error::Link`].
-    pub fn write(&mut self, axis: Axis, register: u8, data: Data) -> Result<Option<Reply>, Error> {
+    pub(crate) fn write(
+        &mut self,
+        axis: Axis,
+        register: u8,
+        data: Data,
+    ) -> Result<Option<Reply>, Error> {
         match self.run_job(axis, Job::Write { register, data })? {
             Outcome::Written(reply) => Ok(Some(reply)),
             Outcome::Sent => Ok(None),
@@ -122,7 +124,8 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::Refused`] for a ninth cycle or another interval, [`Error::NoReply`], [`Error::Link`].
-    pub fn every(&mut self, axis: Axis, register: u8, millis: u8) -> Result<Reply, Error> {
+    #[cfg(test)]
+    pub(crate) fn every(&mut self, axis: Axis, register: u8, millis: u8) -> Result<Reply, Error> {
         let every = millis;
         match self.run_job(axis, Job::Cycle { register, every })? {
             Outcome::Started(reply) => Ok(reply),
@@ -134,7 +137,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::Link`].
-    pub fn stop_every(&mut self, axis: Axis, register: u8) -> Result<(), Error> {
+    pub(crate) fn stop_every(&mut self, axis: Axis, register: u8) -> Result<(), Error> {
         self.run_job(axis, Job::Stop { register }).map(|_| ())
     }
 
@@ -142,7 +145,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// See [`Self::write`].
-    pub fn stop(&mut self, axis: Axis) -> Result<Stopped, Error> {
+    pub(crate) fn stop(&mut self, axis: Axis) -> Result<Stopped, Error> {
         if self.permits_write(axis, COMMANDS[0], 0) {
             self.write(axis, COMMANDS[0], Data::Short(0))?;
             Ok(Stopped::OnRamp)
@@ -156,7 +159,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// See [`Self::write`].
-    pub fn lock(&mut self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn lock(&mut self, axis: Axis) -> Result<(), Error> {
         self.write(axis, MODE, Data::Short(MODE_LOCK))?;
         for register in COMMANDS {
             self.write(axis, register, Data::Short(0))?;
@@ -168,7 +171,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::NotReady`]: it is locked then. [`Error::Differs`], [`Error::NoReply`], [`Error::Link`].
-    pub fn release(&mut self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn release(&mut self, axis: Axis) -> Result<(), Error> {
         match self.run_job(axis, Job::StartUp { patience: START_UP })? {
             Outcome::Released => Ok(()),
             other => Err(Error::of(axis, MODE, other)),
@@ -179,7 +182,7 @@ impl<'l> Driver<'l> {
     ///
     /// # Errors
     /// [`Error::Link`].
-    pub fn run(&mut self, time: Span) -> Result<(), Error> {
+    pub(crate) fn run(&mut self, time: Span) -> Result<(), Error> {
         let end = self.now() + time;
         while self.now() < end {
             self.pause();
@@ -202,25 +205,21 @@ impl<'l> Driver<'l> {
     }
 
     /// Cyclic frames, events and disturbances that were received since the last call, with their times.
-    pub fn events(&mut self) -> impl Iterator<Item = (Instant, Axis, Event)> {
+    #[cfg(test)]
+    pub(crate) fn events(&mut self) -> impl Iterator<Item = (Instant, Axis, Event)> {
         self.events.drain(..)
-    }
-
-    /// What went wrong on the bus since the last call.
-    pub fn bus_errors(&mut self) -> Vec<CanError> {
-        std::mem::take(&mut self.errors)
     }
 
     /// Whether the line lets a write of 16 bits pass now.
     #[must_use]
-    pub fn permits_write(&self, axis: Axis, register: u8, value: u16) -> bool {
+    pub(crate) fn permits_write(&self, axis: Axis, register: u8, value: u16) -> bool {
         let data = Data::Short(value);
         self.permits(axis, Job::Write { register, data })
     }
 
     /// Whether the line lets the first frame of a job pass now.
     #[must_use]
-    pub fn permits(&self, axis: Axis, job: Job) -> bool {
+    pub(crate) fn permits(&self, axis: Axis, job: Job) -> bool {
         let Some(drive) = self.drives.iter().find(|drive| drive.axis == axis) else {
             return false;
         };
@@ -236,7 +235,7 @@ impl<'l> Driver<'l> {
     /// Why the first of some jobs that the line denies is denied; `None` if the line lets all of them pass, one behind the other. Nothing is
     /// sent.
     #[must_use]
-    pub fn denied(&self, jobs: &[(Axis, Job)]) -> Option<String> {
+    pub(crate) fn denied(&self, jobs: &[(Axis, Job)]) -> Option<String> {
         let mut frames = Vec::new();
         for (axis, job) in jobs {
             let drive = self.drives.iter().find(|drive| drive.axis == *axis)?;
@@ -290,9 +289,6 @@ impl<'l> Driver<'l> {
         while let Some((at, heard)) = self.line.receive(0) {
             match heard {
                 Heard::Frame(can::CanEvent::Frame(frame)) => self.hear(at, &frame),
-                Heard::Frame(can::CanEvent::Error(error)) if self.errors.len() < MOST_EVENTS => {
-                    self.errors.push(error);
-                }
                 Heard::Frame(can::CanEvent::Error(_)) | Heard::Octet(_) => {}
             }
         }

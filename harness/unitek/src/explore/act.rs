@@ -7,21 +7,20 @@ use harness_sim::unitek::Inputs;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// A conversation of frames.
-pub type FrameTalk = LineTalk<Unitek>;
+pub(crate) type FrameTalk = LineTalk<Unitek>;
 
 /// An act of one.
-pub type FrameAct = LineAct<FrameActKind>;
+pub(crate) type FrameAct = LineAct<FrameActKind>;
 
 /// What can happen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum FrameActKind {
+pub(crate) enum FrameActKind {
     /// The host sends a frame, as candump writes it.
     #[serde(serialize_with = "write", deserialize_with = "read")]
     Send(Frame),
     /// An input is switched.
     Input {
-        /// The drive.
         drive: u8,
         /// One of [`Inputs::SWITCHES`].
         name: String,
@@ -30,7 +29,6 @@ pub enum FrameActKind {
     },
     /// A value of plant or sensors is overruled, or no longer.
     Force {
-        /// The drive.
         drive: u8,
         /// One of [`Inputs::FORCED`].
         name: String,
@@ -38,10 +36,7 @@ pub enum FrameActKind {
         raw: Option<u32>,
     },
     /// A drive is switched off and on.
-    Restart {
-        /// The drive.
-        drive: u8,
-    },
+    Restart { drive: u8 },
 }
 
 fn write<S: Serializer>(frame: &Frame, serializer: S) -> Result<S::Ok, S::Error> {
@@ -57,7 +52,7 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Frame, D::Error> {
 impl FrameActKind {
     /// The name of an input or a value, as the simulation knows it.
     #[must_use]
-    pub fn name(&self) -> Option<&'static str> {
+    pub(crate) fn name(&self) -> Option<&'static str> {
         let all = Inputs::SWITCHES.iter().chain(&Inputs::FORCED);
         match self {
             Self::Input { name, .. } | Self::Force { name, .. } => {

@@ -13,7 +13,7 @@ pub(super) const LONGEST_WAIT: u64 = 2_000_000;
 
 /// Something that a conversation of frames can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FrameSpice {
+pub(crate) enum FrameSpice {
     /// Single requests (UNITEK 5.2 item 1).
     Read,
     /// Writes of variables and ramps.
@@ -44,7 +44,7 @@ pub enum FrameSpice {
 
 impl FrameSpice {
     /// All with their names.
-    pub const NAMES: [(&'static str, Self); 13] = [
+    pub(crate) const NAMES: [(&'static str, Self); 13] = [
         ("read", Self::Read),
         ("write", Self::Write),
         ("write-any", Self::WriteAny),

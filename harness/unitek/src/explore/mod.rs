@@ -5,14 +5,11 @@ mod bus;
 mod generate;
 mod idiom;
 mod on_adapter;
-pub mod oracle;
+pub(crate) mod oracle;
 mod play;
 #[cfg(test)]
 mod tests;
 mod text;
 
-pub use act::{FrameAct, FrameActKind, FrameTalk};
-pub use generate::FrameSpice;
-pub use on_adapter::Left;
-pub use oracle::FrameDifference;
-pub use play::{FramesSeen, play};
+pub(crate) use act::FrameTalk;
+pub(crate) use play::FramesSeen;

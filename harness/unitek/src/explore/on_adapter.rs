@@ -31,7 +31,7 @@ const BURST: usize = 16;
 
 /// What a run has to put right.
 #[derive(Debug)]
-pub struct Left {
+pub(crate) struct Left {
     /// Registers with cycles that earlier cases may have left; all of them before the first case.
     cycles: Vec<u8>,
     /// What the drives held before the run, and what cases may have written.

@@ -22,23 +22,22 @@ const INTERMISSION_BITS: u32 = 3;
 /// The first frame that no model explains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FrameDifference {
+pub(crate) struct FrameDifference {
     /// How it differs.
-    pub what: FrameSymptom,
+    pub(crate) what: FrameSymptom,
     /// The section, example, appendix item or dump that says most about it, such as `ex 9`.
-    pub section: String,
-    /// The register.
-    pub register: u8,
+    pub(crate) section: String,
+    pub(crate) register: u8,
     /// The drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drive: Option<u8>,
+    pub(crate) drive: Option<u8>,
     /// The number of the frame among those of the drives, counted from 1.
-    pub frame: usize,
+    pub(crate) frame: usize,
     /// The values of open points with which the model explains most, as header lines; those of the profile `ds` are not listed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub under: Vec<String>,
+    pub(crate) under: Vec<String>,
     /// The whole difference, as a sentence.
-    pub about: String,
+    pub(crate) about: String,
 }
 
 /// What was measured of a drive: the points that can have any value.

@@ -13,11 +13,11 @@ use harness_sim::unitek;
 const TAIL: Span = Span::from_millis(20);
 
 /// What a case has shown: frames of the drives, and when each act began.
-pub type FramesSeen = LineSeen<LineFrame, Instant>;
+pub(crate) type FramesSeen = LineSeen<LineFrame, Instant>;
 
 /// Plays a case on fresh drives.
 #[must_use]
-pub fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
+pub(crate) fn play(setup: &Setup, case: &FrameTalk) -> FramesSeen {
     let mut bench = Bench::new(setup);
     let bench = &mut bench;
     let begin = bench.now();

@@ -1,7 +1,8 @@
 //! What may have been set before the first frame of a log or in a gap of it: each of it explains frames of a right drive, and excuses no wrong
 //! one. Times that go back or leap forward, and times that are off.
 
-use super::{FrameSymptom, HeardFrames, JudgedDrives, judge, judge_guessed};
+use super::drives::JudgedDrives;
+use super::{FrameSymptom, HeardFrames, judge, judge_guessed};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::sender_of;

@@ -14,38 +14,36 @@ pub(super) const MOST_BREACHES: usize = 50;
 
 /// Something that a drive does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Breach {
+pub(crate) struct Breach {
     /// How it differs.
-    pub what: FrameSymptom,
+    pub(crate) what: FrameSymptom,
     /// The number of the frame where it shows, counted from 1.
-    pub frame: usize,
-    /// The drive.
-    pub drive: u8,
-    /// The register.
-    pub register: u8,
+    pub(crate) frame: usize,
+    pub(crate) drive: u8,
+    pub(crate) register: u8,
     /// The section, example or appendix item, such as `ex 9`.
-    pub section: &'static str,
+    pub(crate) section: &'static str,
     /// What was expected and what has come.
-    pub about: String,
+    pub(crate) about: String,
 }
 
 /// What came of judging frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct JudgedDrives {
+pub(crate) struct JudgedDrives {
     /// What differs, in order.
-    pub breaches: Vec<Breach>,
+    pub(crate) breaches: Vec<Breach>,
     /// Frames of drives that were compared.
-    pub compared: usize,
+    pub(crate) compared: usize,
     /// Those that could be: the same, and frames that may be of another station.
-    pub replies: usize,
+    pub(crate) replies: usize,
     /// The drives of which a frame was compared.
-    pub heard: BTreeSet<u8>,
+    pub(crate) heard: BTreeSet<u8>,
     /// Values that were compared with what had been written.
-    pub values: usize,
+    pub(crate) values: usize,
     /// What was not compared, in sentences.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
     /// What differs and may have another cause than a wrong drive, in sentences with their places: it accuses no drive, and nothing has passed.
-    pub doubts: Vec<String>,
+    pub(crate) doubts: Vec<String>,
 }
 
 impl JudgedDrives {
@@ -59,19 +57,19 @@ impl JudgedDrives {
 
 /// What was heard on a bus.
 #[derive(Clone, Copy, Debug)]
-pub struct HeardFrames<'f> {
+pub(crate) struct HeardFrames<'f> {
     /// The frames, in order.
-    pub frames: &'f [LineFrame],
+    pub(crate) frames: &'f [LineFrame],
     /// Where their times do not go on.
-    pub seams: &'f [Seam],
+    pub(crate) seams: &'f [Seam],
     /// How far the time of each may be off.
-    pub tolerance: Span,
+    pub(crate) tolerance: Span,
 }
 
 impl<'f> HeardFrames<'f> {
     /// Frames with the times of the bus.
-    #[must_use]
-    pub const fn exact(frames: &'f [LineFrame]) -> Self {
+    #[cfg(test)]
+    pub(crate) const fn exact(frames: &'f [LineFrame]) -> Self {
         Self {
             frames,
             seams: &[],
@@ -128,13 +126,13 @@ impl Recording {
 
 /// Judges frames with these drives: number, and the identifiers on which each receives and sends.
 #[must_use]
-pub fn judge(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+pub(crate) fn judge(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
     judge_with(heard, drives, Follower::new)
 }
 
 /// The same of drives whose identifiers are guessed from their frames.
 #[must_use]
-pub fn judge_guessed(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+pub(crate) fn judge_guessed(heard: HeardFrames<'_>, drives: &[(u8, (u16, u16))]) -> JudgedDrives {
     judge_with(heard, drives, Follower::guessed)
 }
 

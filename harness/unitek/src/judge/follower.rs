@@ -57,7 +57,7 @@ pub(super) enum Homing {
 
 /// What the frames show of one drive.
 #[derive(Debug)]
-pub struct Follower {
+pub(crate) struct Follower {
     pub(super) drive: u8,
     /// On which it may receive and send: after a change the old and the new ones, since it is open when a drive changes.
     pub(super) rx: Vec<u16>,
@@ -116,7 +116,7 @@ pub struct Follower {
 impl Follower {
     /// A drive of which nothing is known but its identifiers.
     #[must_use]
-    pub fn new(drive: u8, (rx, tx): (u16, u16)) -> Self {
+    pub(crate) fn new(drive: u8, (rx, tx): (u16, u16)) -> Self {
         let mut held = vec![Held::any(); REGISTERS.len()];
         held[0x68] = Held::one(rx.into());
         held[0x69] = Held::one(tx.into());
@@ -156,7 +156,7 @@ impl Follower {
 
     /// The same for a drive of which the identifiers are guessed from its frames.
     #[must_use]
-    pub fn guessed(drive: u8, identifiers: (u16, u16)) -> Self {
+    pub(crate) fn guessed(drive: u8, identifiers: (u16, u16)) -> Self {
         Self {
             guessed: true,
             held: vec![Held::any(); REGISTERS.len()],
@@ -166,7 +166,7 @@ impl Follower {
 
     /// The same for a drive on which no cycle runs, and of which a busy computer stamps the frames.
     #[must_use]
-    pub fn settled(drive: u8, identifiers: (u16, u16)) -> Self {
+    pub(crate) fn settled(drive: u8, identifiers: (u16, u16)) -> Self {
         Self {
             cycles: [Cycle::Off(Instant::START); 256],
             timed: false,
@@ -179,7 +179,7 @@ impl Follower {
 
     /// The same where the time of each frame may be off.
     #[must_use]
-    pub fn with_tolerance(self, tolerance: Span) -> Self {
+    pub(crate) fn with_tolerance(self, tolerance: Span) -> Self {
         Self {
             patience: self.patience + tolerance,
             tolerance,
@@ -207,12 +207,12 @@ impl Follower {
 
     /// Whether a request waits for its reply.
     #[must_use]
-    pub fn waits(&self) -> bool {
+    pub(crate) fn waits(&self) -> bool {
         self.asked.iter().any(|own| own.sure)
     }
 
     /// A frame of the bus.
-    pub fn hear(&mut self, number: usize, own: &LineFrame) {
+    pub(crate) fn hear(&mut self, number: usize, own: &LineFrame) {
         let sends = self.sent_it(own) && !matches!(own.ended, FrameEnd::Error(_));
         if sends && self.supply.may_have_failed(own.start + self.tolerance) {
             let restarted = self.restarted(own.start);
@@ -257,7 +257,7 @@ impl Follower {
 
     /// The judgement, after the last frame.
     #[must_use]
-    pub fn end(mut self, number: usize, frames: &[LineFrame]) -> JudgedDrives {
+    pub(crate) fn end(mut self, number: usize, frames: &[LineFrame]) -> JudgedDrives {
         if let Some(last) = frames.last() {
             self.missing(number, last.at);
             self.owes_at_the_end(number);

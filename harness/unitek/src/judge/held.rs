@@ -38,7 +38,6 @@ impl Held {
         Self(None)
     }
 
-    /// This or that.
     pub(super) fn or(&self, other: &Self) -> Self {
         let (Some(own), Some(others)) = (&self.0, &other.0) else {
             return Self::any();

@@ -22,7 +22,7 @@ mod world;
 #[cfg(test)]
 mod world_tests;
 
-pub use drives::{Breach, HeardFrames, JudgedDrives, judge, judge_guessed};
-pub use follower::Follower;
-pub use symptom::FrameSymptom;
-pub use world::World;
+pub(crate) use drives::{Breach, HeardFrames, judge, judge_guessed};
+pub(crate) use follower::Follower;
+pub(crate) use symptom::FrameSymptom;
+pub(crate) use world::World;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// How drives differ from the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum FrameSymptom {
+pub(crate) enum FrameSymptom {
     /// A frame has other contents.
     Value,
     /// A frame has another length.
@@ -21,9 +21,8 @@ pub enum FrameSymptom {
 }
 
 impl FrameSymptom {
-    /// In words.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Value => "other contents",
             Self::Length => "another length",

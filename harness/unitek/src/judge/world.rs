@@ -60,7 +60,7 @@ enum Compared {
 
 /// A drive, right or with a known deviation.
 #[derive(Clone, Debug)]
-pub struct World {
+pub(crate) struct World {
     drive: Deviant,
     /// Registers that are not compared: they read something else at rest.
     unlike: Arc<BTreeSet<u8>>,
@@ -79,7 +79,7 @@ pub struct World {
 impl World {
     /// Whether a register is compared in every state of a drive, and all of it.
     #[must_use]
-    pub fn compares(number: u8) -> bool {
+    pub(crate) fn compares(number: u8) -> bool {
         let known =
             CONSTANT.contains(&number) || LOGIC.contains(&number) || SPEEDS.contains(&number);
         known || is_parameter(number)
@@ -87,7 +87,7 @@ impl World {
 
     /// A drive that stands, of which these registers are not compared. Its clock begins at the start.
     #[must_use]
-    pub fn new(drive: Deviant, unlike: Arc<BTreeSet<u8>>, homing_is_known: bool) -> Self {
+    pub(crate) fn new(drive: Deviant, unlike: Arc<BTreeSet<u8>>, homing_is_known: bool) -> Self {
         Self {
             drive,
             unlike,

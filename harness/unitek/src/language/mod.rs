@@ -2,12 +2,12 @@
 
 pub(crate) mod now;
 mod parse;
-pub mod plan;
+pub(crate) mod plan;
 mod play;
-pub mod syntax;
+pub(crate) mod syntax;
 mod write;
 
-pub use play::State;
+pub(crate) use play::State;
 pub(crate) use play::written;
 pub(crate) use write::identifier;
 
@@ -31,7 +31,7 @@ use harness_proto::time::{Instant, Span};
 
 /// The language of scenarios with the words of this bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unitek;
+pub(crate) struct Unitek;
 
 impl Language for Unitek {
     const BUS: BusName = BusName::Unitek;

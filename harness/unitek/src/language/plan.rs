@@ -32,29 +32,28 @@ const MOST_NODES: i64 = 127;
 
 /// A frame that the master must receive.
 #[derive(Clone, Debug)]
-pub struct WantedFrame {
+pub(crate) struct WantedFrame {
     /// Its identifier.
-    pub id: Id,
+    pub(crate) id: Id,
     /// The length that it asks for, if it is a remote frame.
-    pub remote: Option<u8>,
+    pub(crate) remote: Option<u8>,
     /// Its data bytes.
-    pub data: Vec<Expected>,
+    pub(crate) data: Vec<Expected>,
 }
 
 /// What a register must read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WantedValue {
-    /// The register.
-    pub register: u8,
+pub(crate) struct WantedValue {
+    pub(crate) register: u8,
     /// Its contents.
-    pub raw: u32,
+    pub(crate) raw: u32,
     /// How far its number may be off.
-    pub tolerance: u64,
+    pub(crate) tolerance: u64,
 }
 
 /// A step of this bus, settled.
 #[derive(Clone, Debug)]
-pub enum Act {
+pub(crate) enum Act {
     /// This happens to a frame of the segment, counted from 1.
     Frame(u64, FrameFault),
     /// This happens to a drive.
@@ -71,11 +70,9 @@ pub enum Act {
     Send(Frame),
     /// A request and its reply.
     Read {
-        /// The request.
         request: Frame,
         /// The identifier of the reply.
         tx: u16,
-        /// The register.
         register: u8,
         /// What it must read, if that matters.
         wanted: Option<WantedValue>,
@@ -86,8 +83,7 @@ pub enum Act {
 
 /// How a job of the driver must end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WantedOutcome {
-    /// It is done.
+pub(crate) enum WantedOutcome {
     Done,
     /// It has read this.
     Reads(WantedValue),
@@ -97,7 +93,7 @@ pub enum WantedOutcome {
 
 /// What settles the steps.
 #[derive(Debug)]
-pub struct Planner {
+pub(crate) struct Planner {
     setup: Setup,
     scope: Scope,
 }

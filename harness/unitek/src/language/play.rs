@@ -26,7 +26,7 @@ const LONGEST: Span = Span::from_millis(10_000);
 
 /// What is kept while a scenario is played.
 #[derive(Debug, Default)]
-pub struct State {
+pub(crate) struct State {
     /// What the bench last noticed of the bus.
     error: Option<CanError>,
     /// The reply that a `read` waits for: identifier and register.

@@ -13,29 +13,29 @@ use harness_sim::unitek::deviation::{Deviation, MasterDeviation};
 
 /// The header lines of this bus.
 #[derive(Clone, Debug, Default)]
-pub struct Header {
+pub(crate) struct Header {
     /// `rate 500`, in kbit/s.
-    pub rate: Option<BitRate>,
+    pub(crate) rate: Option<BitRate>,
     /// Lines about drives, in order.
-    pub drives: Vec<DriveLine>,
+    pub(crate) drives: Vec<DriveLine>,
     /// `master deviates NAME`.
-    pub master: Option<Spanned<&'static MasterDeviation>>,
+    pub(crate) master: Option<Spanned<&'static MasterDeviation>>,
 }
 
 /// A header line about a drive.
 #[derive(Clone, Debug)]
-pub struct DriveLine {
+pub(crate) struct DriveLine {
     /// The drive's number.
-    pub drive: Located,
+    pub(crate) drive: Located,
     /// What the line says.
-    pub what: SetupKind,
+    pub(crate) what: SetupKind,
     /// The whole line.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// What a header line says about a drive.
 #[derive(Clone, Debug)]
-pub enum SetupKind {
+pub(crate) enum SetupKind {
     /// `drive 3`, `drive 3 rx 210 tx 190`: it is there.
     There {
         /// The identifier on which it receives.
@@ -57,16 +57,15 @@ pub enum SetupKind {
 
 /// What a property is set to.
 #[derive(Clone, Debug)]
-pub enum PropertyValue {
+pub(crate) enum PropertyValue {
     /// A word, or the two digits of a byte.
     Word(String),
-    /// A time.
     Time(Duration),
 }
 
 /// What happens to a drive from outside its bus.
 #[derive(Clone, Debug)]
-pub enum Outside {
+pub(crate) enum Outside {
     /// `register 52 = 3000`.
     Register(RegisterName, WrittenValue),
     /// `input run low`.
@@ -77,12 +76,10 @@ pub enum Outside {
     Restart,
 }
 
-/// A register.
 #[derive(Clone, Debug)]
-pub enum RegisterName {
+pub(crate) enum RegisterName {
     /// By its number or name.
     Known {
-        /// The register.
         register: &'static Register,
         /// Whether it was given by a name.
         by_name: bool,
@@ -93,16 +90,16 @@ pub enum RegisterName {
 
 /// Contents of a register as written.
 #[derive(Clone, Debug)]
-pub struct WrittenValue {
+pub(crate) struct WrittenValue {
     /// What is written.
-    pub kind: ValueKind,
+    pub(crate) kind: ValueKind,
     /// Where it stands.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// A raw number, or a number with a unit.
 #[derive(Clone, Debug)]
-pub enum ValueKind {
+pub(crate) enum ValueKind {
     /// `0CCD`: hexadecimal digits, and how many.
     Raw(u32, usize),
     /// `10%`.
@@ -113,27 +110,26 @@ pub enum ValueKind {
 
 /// What a register must read.
 #[derive(Clone, Debug)]
-pub struct Expect {
-    /// The value.
-    pub value: WrittenValue,
+pub(crate) struct Expect {
+    pub(crate) value: WrittenValue,
     /// `+-1%`: how far it may be off.
-    pub tolerance: Option<WrittenValue>,
+    pub(crate) tolerance: Option<WrittenValue>,
 }
 
 /// A frame behind `>` or `<`.
 #[derive(Clone, Debug)]
-pub struct Message {
+pub(crate) struct Message {
     /// The identifier.
-    pub id: Id,
+    pub(crate) id: Id,
     /// The data, or the length of a remote frame.
-    pub content: Content,
+    pub(crate) content: Content,
     /// Where it stands.
-    pub span: TextSpan,
+    pub(crate) span: TextSpan,
 }
 
 /// What a frame carries.
 #[derive(Clone, Debug)]
-pub enum Content {
+pub(crate) enum Content {
     /// No data bytes.
     Empty,
     /// Data bytes.
@@ -144,7 +140,7 @@ pub enum Content {
 
 /// A step of this bus.
 #[derive(Clone, Debug)]
-pub enum FrameStep {
+pub(crate) enum FrameStep {
     /// `! frame 3: lost`.
     Frame(Located, FrameHarm),
     /// `! drive 1: off`.
@@ -163,7 +159,7 @@ pub enum FrameStep {
 
 /// What happens to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameHarm {
+pub(crate) enum FrameHarm {
     /// `lost`.
     Lost,
     /// `doubled`.
@@ -180,7 +176,7 @@ pub enum FrameHarm {
 
 /// What happens to a drive as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriveHarm {
+pub(crate) enum DriveHarm {
     /// `off`.
     Off,
     /// `on`.
@@ -191,16 +187,15 @@ pub enum DriveHarm {
 
 /// A job of the master.
 #[derive(Clone, Debug)]
-pub struct JobStep {
-    /// The drive.
-    pub drive: Located,
+pub(crate) struct JobStep {
+    pub(crate) drive: Located,
     /// What is to be done.
-    pub what: JobKind,
+    pub(crate) what: JobKind,
 }
 
 /// What a job does.
 #[derive(Clone, Debug)]
-pub enum JobKind {
+pub(crate) enum JobKind {
     /// `read 1 STATUS = 0181`.
     Read(RegisterName, Option<Expect>),
     /// `write 1 SPEED_CMD = 10%`.

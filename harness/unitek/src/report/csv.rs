@@ -17,7 +17,7 @@ use std::io::Write;
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     writeln!(out, "t_ns,from,id,remote,dlc,data,ended,meaning")?;
     let channels = traces.iter().flat_map(|trace| &trace.channels);
     for own in channels.flat_map(|channel| channel.frames()) {

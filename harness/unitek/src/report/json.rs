@@ -20,7 +20,7 @@ use serde::{Serialize, Serializer};
 use std::io::Write;
 
 /// The version of the form.
-pub const SCHEMA: u32 = 2;
+pub(crate) const SCHEMA: u32 = 2;
 
 #[derive(Serialize)]
 struct Object {
@@ -59,7 +59,7 @@ fn frames(traces: &[Trace]) -> impl Iterator<Item = &LineFrame> {
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let frames = frames(traces).map(|own| FrameObject {
         t_ns: own.at.since_start().as_nanos(),
         id: own.frame.id().number(),
@@ -88,7 +88,7 @@ pub fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Re
 ///
 /// # Errors
 /// Those of `out`.
-pub fn candump(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn candump(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     for own in frames(traces).filter(|own| own.ended == FrameEnd::Good) {
         let micros = own.at.since_start().as_nanos() / 1000;
         let (seconds, rest) = (micros / 1_000_000, micros % 1_000_000);

@@ -1,10 +1,10 @@
 //! How frames of UNITEK drives read: a row a frame, JSON, the log of candump.
 
-pub mod csv;
+pub(crate) mod csv;
 pub(crate) mod curves;
-pub mod json;
+pub(crate) mod json;
 pub(crate) mod sequence;
-pub mod table;
+pub(crate) mod table;
 #[cfg(test)]
 mod tests;
 
@@ -24,7 +24,7 @@ use std::ops::Range;
 
 /// How frames are shown.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameReport;
+pub(crate) struct FrameReport;
 
 impl SegmentReport for FrameReport {
     fn carries(&self) -> &'static str {
@@ -54,7 +54,7 @@ impl SegmentReport for FrameReport {
 
 /// What a frame says: of the bench to a drive, or of a drive.
 #[must_use]
-pub fn meaning(frame: &Frame, of_drive: bool) -> String {
+pub(crate) fn meaning(frame: &Frame, of_drive: bool) -> String {
     let own = u16::try_from(frame.id().number()).unwrap_or(0);
     if of_drive {
         return match Reply::decode(frame, own) {

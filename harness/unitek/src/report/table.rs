@@ -19,7 +19,7 @@ struct Row<'t> {
 /// The table. Frames that an error ended and that were repeated at once stand in one row. Of a table longer than `at_most` the middle is
 /// left out.
 #[must_use]
-pub fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
+pub(crate) fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
     let frames = trace.channels.iter().flat_map(|own| own.frames());
     let mut rows: Vec<Row<'_>> = Vec::new();
     for frame in frames {
@@ -105,7 +105,7 @@ fn text(row: &Row<'_>) -> String {
 }
 
 /// Text of the frames of one bus, while they arrive: the rows of the table.
-pub struct FrameText;
+pub(crate) struct FrameText;
 
 impl LiveText for FrameText {
     fn piece(&mut self, piece: &Piece) -> Vec<LiveLine> {

@@ -12,10 +12,10 @@ mod run;
 mod session;
 mod set_back;
 
-pub use permitted::limits;
+pub(crate) use permitted::limits;
 use permitted::special_register;
 pub(crate) use player::Player;
-pub use session::{OfUnitek, Session, UnitekDrives};
+pub(crate) use session::{OfUnitek, Session, UnitekDrives};
 pub(crate) use set_back::HeldBefore;
 
 use super::language::Unitek;
@@ -35,7 +35,7 @@ use harness_proto::can::BitRate;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 
 /// Rigs of this bus.
-pub const PORT: PortRow = PortRow {
+pub(crate) const PORT: PortRow = PortRow {
     bus: PortBus::Unitek,
     adapters: &["slcan", "socketcand", "socketcan"],
     keys: &["channel"],
@@ -61,7 +61,7 @@ pub const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub const COMMANDS: PortCommands = PortCommands {
+pub(crate) const COMMANDS: PortCommands = PortCommands {
     bus: PortBus::Unitek,
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
     judge: |rig, allow_motion, qualifies| {
@@ -99,18 +99,18 @@ const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
 
 /// A drive of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Axis {
+pub(crate) struct Axis {
     /// Its number, 1 to 127.
-    pub node: u8,
+    pub(crate) node: u8,
     /// The identifier on which it receives.
-    pub rx: u16,
+    pub(crate) rx: u16,
     /// The identifier on which it sends.
-    pub tx: u16,
+    pub(crate) tx: u16,
 }
 
 /// The drive that stands at a place of a port's list: its number, and its identifiers to receive and to send (UNITEK 3.1).
 #[must_use]
-pub fn drive(index: usize, node: Node) -> (u8, (u16, u16)) {
+pub(crate) fn drive(index: usize, node: Node) -> (u8, (u16, u16)) {
     let place = u8::try_from(index + 1).unwrap_or(u8::MAX);
     let number = node.node.unwrap_or(place);
     let offset = u16::from(number) - 1;
@@ -122,7 +122,7 @@ pub fn drive(index: usize, node: Node) -> (u8, (u16, u16)) {
 
 /// The drives of a port.
 #[must_use]
-pub fn axes(port: &Port) -> Vec<Axis> {
+pub(crate) fn axes(port: &Port) -> Vec<Axis> {
     let all = port.drives.iter().enumerate();
     all.map(|(index, node)| {
         let (node, (rx, tx)) = drive(index, *node);
@@ -133,7 +133,7 @@ pub fn axes(port: &Port) -> Vec<Axis> {
 
 /// The bit rate of a port.
 #[must_use]
-pub fn rate(port: &Port) -> BitRate {
+pub(crate) fn rate(port: &Port) -> BitRate {
     // The file was checked.
     BitRate::from_bits_per_second(port.rate.bits_per_second()).unwrap_or(BitRate::K500)
 }
@@ -143,7 +143,7 @@ pub fn rate(port: &Port) -> BitRate {
 ///
 /// # Errors
 /// The lines have mistakes.
-pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
+pub(crate) fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
     let named = serve::bench(Some(0), Some(source))?.setup.drives;
     let axes = axes(port);
     let missing = |drive: &&DriveSetup| axes.iter().all(|axis| axis.node != drive.node);

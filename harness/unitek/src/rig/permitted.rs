@@ -35,7 +35,7 @@ pub(crate) fn special_register(text: &str) -> Result<u8, (String, String)> {
 
 /// What a rig's file and the command line allow together.
 #[must_use]
-pub fn limits(rig: &Rig, allow_motion: bool) -> Limits {
+pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let own = &rig.file.limits;
     let named = own.port.allow_registers.iter();
     Limits {

@@ -28,7 +28,7 @@ const SPEEDS: [u8; 2] = [0xC8, 0x34];
 
 /// The drives of a rig.
 #[derive(Clone, Debug)]
-pub struct UnitekDrives {
+pub(crate) struct UnitekDrives {
     axes: Vec<Axis>,
     patience: Span,
     /// How a drive with another bit rate is reached, by the rig's file.
@@ -36,7 +36,7 @@ pub struct UnitekDrives {
 }
 
 /// A rig in use.
-pub type Session = PortSession<UnitekDrives>;
+pub(crate) type Session = PortSession<UnitekDrives>;
 
 impl PortDrives for UnitekDrives {
     const WORDS: [&'static str; 2] = ["drive", "CAN bus"];
@@ -98,7 +98,7 @@ impl PortDrives for UnitekDrives {
 }
 
 /// What a session of these drives has beside what all have.
-pub trait OfUnitek {
+pub(crate) trait OfUnitek {
     /// Its drives.
     fn axes(&self) -> &[Axis];
 

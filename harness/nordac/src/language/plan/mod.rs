@@ -2,7 +2,7 @@
 
 mod value;
 
-pub use value::{PlannedParameter, PlannedWord};
+pub(crate) use value::{PlannedParameter, PlannedWord};
 
 use self::value::{parameter, raw, up_to, word};
 use super::Nordac;
@@ -36,25 +36,23 @@ pub(super) const MASTER: u8 = 2;
 
 /// A telegram of the master.
 #[derive(Clone, Debug)]
-pub struct SentTelegram {
-    /// Its octets.
-    pub octets: Vec<u8>,
+pub(crate) struct SentTelegram {
+    pub(crate) octets: Vec<u8>,
     /// What is wrong with some of them: the place, counted from 0, and what happens to it.
-    pub bad: Vec<(usize, LinkFault)>,
+    pub(crate) bad: Vec<(usize, LinkFault)>,
 }
 
 /// An octet that the master must receive.
 #[derive(Clone, Copy, Debug)]
-pub struct WantedOctet {
-    /// The octet.
-    pub octet: Expected,
+pub(crate) struct WantedOctet {
+    pub(crate) octet: Expected,
     /// The line error that it must come with.
-    pub error: Option<LineError>,
+    pub(crate) error: Option<LineError>,
 }
 
 /// A step of this bus, settled.
 #[derive(Clone, Debug)]
-pub enum PlannedAct {
+pub(crate) enum PlannedAct {
     /// This happens on the line.
     Fault(LineFaultAt),
     /// A slave loses its supply, or has it again.
@@ -67,13 +65,12 @@ pub enum PlannedAct {
     Quiet,
     /// A slave's parameter, beside the bus where it can be seen.
     Parameter(u8, PlannedParameter, u32),
-    /// A job.
     Job(u8, PlannedJob),
 }
 
 /// A job, settled.
 #[derive(Clone, Debug)]
-pub enum PlannedJob {
+pub(crate) enum PlannedJob {
     /// Parameters, configuration and diagnosis.
     Start {
         /// The PPO type that is configured.
@@ -104,16 +101,15 @@ pub enum PlannedJob {
 
 /// What a read must give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlannedWanted {
+pub(crate) enum PlannedWanted {
     /// This raw value.
     Value(u32),
-    /// This error.
     Error(u16),
 }
 
 /// What settles the steps.
 #[derive(Debug)]
-pub struct Planner {
+pub(crate) struct Planner {
     bench: simulate::Setup,
     scope: Scope,
 }

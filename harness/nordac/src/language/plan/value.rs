@@ -12,17 +12,17 @@ use harness_proto::nordac::pkw::Index;
 const FULL: i128 = 0x4000;
 
 /// The bytes of a word; `None` stands for any.
-pub type PlannedWord = Vec<Option<u8>>;
+pub(crate) type PlannedWord = Vec<Option<u8>>;
 
 /// A parameter, by its number and its index.
 #[derive(Clone, Copy, Debug)]
-pub struct PlannedParameter {
+pub(crate) struct PlannedParameter {
     /// PNU.
-    pub number: u16,
+    pub(crate) number: u16,
     /// Its element or sub-index, and its set (3.4.2).
-    pub index: Index,
+    pub(crate) index: Index,
     /// Its row of the table; `None` for a number that is not in it.
-    pub known: Option<&'static Parameter>,
+    pub(crate) known: Option<&'static Parameter>,
 }
 
 /// A number that must be at most `most`.
@@ -128,7 +128,7 @@ pub(super) fn raw(
 impl PlannedParameter {
     /// The parameter in messages: `parameter 1202 (Accel. time)`.
     #[must_use]
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let number = self.number;
         let name = self.known.map_or("not in the list", |own| own.name);
         format!("parameter {number} ({name})")
@@ -148,14 +148,14 @@ impl PlannedParameter {
 
     /// IND of a task. A number that is not in the table has sub-indices at most.
     #[must_use]
-    pub fn ind(&self) -> u16 {
+    pub(crate) fn ind(&self) -> u16 {
         let known = self.known.map(|own| self.index.ind(own));
         known.unwrap_or(self.index.element << 8)
     }
 
     /// A raw number in messages, with its unit behind it.
     #[must_use]
-    pub fn shown(&self, raw: u32) -> String {
+    pub(crate) fn shown(&self, raw: u32) -> String {
         let Some(known) = self.known else {
             return raw.to_string();
         };
@@ -184,7 +184,7 @@ impl PlannedParameter {
 
     /// Whether its value has two words.
     #[must_use]
-    pub fn is_long(&self) -> bool {
+    pub(crate) fn is_long(&self) -> bool {
         self.known.is_some_and(|own| own.has(Flag::Long))
     }
 }

@@ -52,7 +52,7 @@ use std::sync::Arc;
 
 /// A scenario of this bus.
 #[derive(Clone, Debug)]
-pub struct Own {
+pub(crate) struct Own {
     /// The name of its source.
     name: String,
     scenario: Scenario<Nordac>,
@@ -98,7 +98,7 @@ struct Left {
 
 /// Plays attempts, on a rig or on a record, and judges them.
 #[derive(Clone, Debug)]
-pub struct Player {
+pub(crate) struct Player {
     slaves: Vec<RigSlave>,
     rate: BusRate,
     patience: Span,

@@ -49,7 +49,6 @@ pub(crate) struct AttemptNote {
     shown: AttemptShown,
     /// Where time is real, the telegrams of the bench with what came behind each.
     turns: Vec<Turn>,
-    /// The verdict.
     pub(crate) verdict: Verdict,
     /// Whether the slaves did something that no right slave does, as far as is known.
     pub(crate) accuses: bool,

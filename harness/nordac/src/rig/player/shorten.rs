@@ -15,7 +15,7 @@ const LEAST: Span = Span::from_millis(400);
 /// The sixteenths of a wait that are tried.
 const PARTS: [u64; 9] = [1, 2, 3, 4, 6, 8, 10, 12, 14];
 
-/// With so many hundredths of a part the replies must be the same too: the rig is not exact.
+/// With this many hundredths of a part the replies must be the same too: the rig is not exact.
 const MARGIN: u64 = 85;
 
 impl Player {

@@ -46,7 +46,7 @@ const SWITCHED_ON: Span = Span::from_millis(10_000);
 /// The most times in one window at which slaves do something by themselves that are looked at.
 const MOST_EVENTS: usize = 16;
 
-/// How often a window is halved in search of a time: behind so many halves of an hour a window is shorter than a bit.
+/// How often a window is halved in search of a time: after this number of halvings an hour is shorter than a bit.
 const HALVES: usize = 48;
 
 /// Where the slaves differ from what came.
@@ -156,7 +156,7 @@ struct World {
     actual: Option<i16>,
 }
 
-/// A time that is later by so many units, or earlier.
+/// A time moved by a number of units, later or earlier.
 fn moved(at: Instant, units: i64) -> Instant {
     let span = Span::from_units(units.unsigned_abs());
     if units < 0 { at - span } else { at + span }
@@ -584,7 +584,7 @@ mod tests {
         let came = turns(&faults(&[3, 5, 10]));
         let last = faults(&[10]);
         assert_eq!(
-            right_slaves_send(&[last.clone()], BusRate::K500, &came, &beats),
+            right_slaves_send(std::slice::from_ref(&last), BusRate::K500, &came, &beats),
             Ok(())
         );
         assert!(judged(&came).is_err());

@@ -91,7 +91,7 @@ enum Gone {
 
 /// Plays attempts, on a rig or on a record, and judges them.
 #[derive(Clone, Debug)]
-pub struct Player {
+pub(crate) struct Player {
     axes: Vec<Axis>,
     rate: BitRate,
     patience: Span,

@@ -54,7 +54,6 @@ pub(crate) struct Note {
     told: Option<Told>,
     /// Whether no right drive could have sent them then.
     wrong: bool,
-    /// The verdict.
     pub(crate) verdict: Verdict,
     /// Whether the drives did something that no correct drive does, as far as is known.
     pub(crate) accuses: bool,

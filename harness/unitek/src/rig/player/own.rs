@@ -19,7 +19,7 @@ const TIME_OUT: u8 = 0xD0;
 
 /// A scenario of this bus.
 #[derive(Debug)]
-pub struct Own {
+pub(crate) struct Own {
     /// The name of its source.
     pub(super) name: String,
     pub(super) scenario: Scenario<Unitek>,

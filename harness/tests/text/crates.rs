@@ -1,0 +1,74 @@
+//! The crates: which may depend on which, and what a bus exports.
+
+use super::tidy::{files, read, root};
+
+/// What each crate of the workspace may depend on, of this workspace: the engine knows no bus, and no bus another.
+#[test]
+fn crates_depend_one_way() {
+    let below: [(&str, &[&str]); 9] = [
+        ("proto", &[]),
+        ("sim", &["proto"]),
+        ("uart", &[]),
+        ("socketcan", &["proto"]),
+        ("bench", &["proto", "sim", "socketcan", "uart"]),
+        ("novobus", &["bench", "proto", "sim"]),
+        ("unitek", &["bench", "proto", "sim"]),
+        ("nordac", &["bench", "proto", "sim"]),
+        ("toy", &["bench", "proto", "sim"]),
+    ];
+    for (name, allowed) in below {
+        let text = read(&root().join(format!("harness/{name}/Cargo.toml")));
+        let lines = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("harness-"));
+        let used = lines.filter_map(|line| line.split(['.', ' ']).next());
+        for other in used {
+            assert!(allowed.contains(&other), "{name} depends on {other}");
+        }
+    }
+}
+
+/// A bus takes nothing from the folders of another one.
+#[test]
+fn no_bus_imports_another() {
+    let buses: [&[&str]; 4] = [
+        &["novobus", "nd21"],
+        &["unitek"],
+        &["nordac", "profibus"],
+        &["toy"],
+    ];
+    for own in buses {
+        for place in ["proto/src/*", "sim/src/*", "*/src"] {
+            let folders = own
+                .iter()
+                .map(|name| format!("harness/{}", place.replace('*', name)));
+            let folders = folders.filter(|folder| root().join(folder).is_dir());
+            for source in folders.flat_map(|folder| files(&folder, "rs")) {
+                for (number, line) in read(&source).lines().enumerate() {
+                    let code = line.split("//").next().unwrap_or_default();
+                    let others = buses.iter().filter(|other| **other != own);
+                    let imported = others.copied().flatten().find(|other| {
+                        let mut paths = ["buses", "harness_proto", "harness_sim", "crate"].iter();
+                        paths.any(|path| code.contains(&format!("{path}::{other}")))
+                    });
+                    assert_eq!(imported, None, "{}:{}", source.display(), number + 1);
+                }
+            }
+        }
+    }
+}
+
+/// A bus's crate exports `BUS`. Rooms of NOVOBUS that know rings by type are public for evidence and the commands on rings; there may only be
+/// fewer.
+#[test]
+fn a_bus_exports_itself() {
+    for (name, rooms) in [("unitek", 0), ("nordac", 0), ("toy", 0), ("novobus", 23)] {
+        let text = read(&root().join(format!("harness/{name}/src/lib.rs")));
+        let exported: Vec<_> = text
+            .lines()
+            .filter(|line| line.starts_with("pub "))
+            .collect();
+        assert!(exported.contains(&"pub static BUS: Bus = Bus {"), "{name}");
+        assert_eq!(exported.len(), 1 + rooms, "{name}: {exported:?}");
+    }
+}
