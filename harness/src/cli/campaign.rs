@@ -140,7 +140,9 @@ impl Wholes {
 fn find_all(named: &[PathBuf], output: &mut Output) -> Result<FoundCampaigns, Exit> {
     let built_in = || {
         let on_lines = shared_lines().flat_map(|line| (line.campaigns)());
-        let on_lines = on_lines.map(PathBuf::from);
+        let mut on_lines: Vec<_> = on_lines.collect();
+        on_lines.sort_unstable();
+        let on_lines = on_lines.into_iter().map(PathBuf::from);
         names()
             .into_iter()
             .map(PathBuf::from)
