@@ -12,7 +12,6 @@ use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES};
 use harness_sim::record::FrameEnd;
 use harness_sim::unitek::deviation::deviations;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What happens to a drive beside the bus in a scenario, which no frame shows.
@@ -106,23 +105,47 @@ fn no_right_drive_is_accused_however_late_its_frames_are() {
 }
 
 /// Deviations that lie in inputs, in a position, in a register without a meaning, or in what these scenarios do not ask for.
-const NOT_FOUND: usize = 14;
+const NOT_FOUND: [&str; 13] = [
+    "writes-without-sign",
+    "interval-one-more",
+    "lock-ends-cycles",
+    "mask-is-fixed",
+    "homing-by-any-value",
+    "preset-moves",
+    "no-eeprom",
+    "eeprom-levels-swapped",
+    "limit-switches-swapped",
+    "always-in-tolerance",
+    "position-of-16-bits",
+    "scale-is-not-c8",
+    "unassigned-reads-zero",
+];
 
-/// Which wrong drives sets of worlds find, without any line of the scenarios.
+/// Whether a set of worlds finds a wrong drive, without any line of the scenarios.
+fn is_found(deviation: &str, all: &[Source]) -> bool {
+    all.iter().any(|source| {
+        let wrong = of_all(source, &format!("deviates {deviation}"));
+        let judged = judged(source, "", &wrong, Span::from_millis(2));
+        matches!(judged, Some(Judged::Wrong(..)))
+    })
+}
+
 #[test]
 fn wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
-    let found = deviations().filter(|own| {
-        all.iter().any(|source| {
-            let wrong = of_all(source, &format!("deviates {}", own.name));
-            let judged = judged(source, "", &wrong, Span::from_millis(2));
-            matches!(judged, Some(Judged::Wrong(..)))
-        })
-    });
-    let found: BTreeSet<_> = found.map(|own| own.name).collect();
     let names = deviations().map(|own| own.name);
-    let missed: Vec<_> = names.filter(|own| !found.contains(own)).collect();
-    assert!(missed.len() <= NOT_FOUND, "{} {missed:?}", missed.len());
+    let names = names.filter(|own| !NOT_FOUND.contains(own)).step_by(4);
+    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    assert_eq!(missed, [""; 0]);
+}
+
+#[test]
+#[ignore = "every wrong drive; .ci/nightly runs it"]
+fn which_wrong_drives_are_found_by_what_they_send() {
+    let all = undisturbed();
+    let names = deviations().map(|own| own.name);
+    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    assert_eq!(missed, NOT_FOUND);
 }
 
 /// Ex 10: an event that does not come is missed.
