@@ -7,6 +7,8 @@
 
 mod note;
 mod own;
+#[cfg(test)]
+mod own_tests;
 mod ready;
 mod verdict;
 mod worlds;
@@ -295,7 +297,8 @@ impl Player {
                     way,
                     unlike: unlike(&drives, &models),
                 };
-                let shown = match way.tolerance > Span::ZERO && link.trouble().is_none() {
+                let compared = way.tolerance > Span::ZERO || own.by_frames;
+                let shown = match compared && link.trouble().is_none() {
                     true => self.shown(&told),
                     false => Shown::Unknown,
                 };

@@ -50,7 +50,7 @@ pub(crate) struct Note {
     /// What was known of the drives in it.
     drives: Vec<Known>,
     shown: Shown,
-    /// Its frames and their times, where time is real.
+    /// Its frames and their times, where time is real or they alone judge.
     told: Option<Told>,
     /// Whether no right drive could have sent them then.
     wrong: bool,
@@ -138,7 +138,7 @@ impl Note {
     /// Notes its frames and their times, and what right drives say of them.
     pub(super) fn told(&mut self, told: Told, shown: &Sent) {
         self.wrong = matches!(shown, Sent::Wrong(_));
-        self.told = Some(told).filter(|_| !self.exact);
+        self.told = Some(told).filter(|_| !self.exact || self.own.by_frames);
     }
 
     /// Whether the frames and their times are those that a drive with a deviation could have sent.
@@ -146,13 +146,16 @@ impl Note {
         let (Some(told), Some(known)) = (&self.told, self.drives.get(place)) else {
             return true;
         };
-        let all = std::iter::once(known.properties);
-        let others = known.candidates().into_iter().map(|own| own.1);
-        let mut all = all.chain(others);
-        all.any(|properties| {
+        let could = |(properties, heard)| {
             let setup = deviant(known, properties, deviation);
-            self.begun.could_deviate(known, &setup, told)
-        })
+            self.begun.could_deviate(known, (&setup, heard), told)
+        };
+        let others = known.candidates().into_iter().map(|own| (own.1, 0));
+        let heard = HEARD_BEFORE.map(|heard| (known.properties, heard));
+        let mut all = std::iter::once((known.properties, 0))
+            .chain(others)
+            .chain(heard);
+        all.any(could)
     }
 
     /// Whether the scenario was played, or the drives did not become ready for it.

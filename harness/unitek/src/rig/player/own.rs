@@ -10,8 +10,9 @@ use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_proto::can::Frame;
-use harness_proto::unitek::frame::Request;
+use harness_proto::unitek::frame::{READ, Request};
 use harness_proto::unitek::properties::Dlc4;
+use harness_proto::unitek::words::MODE_EVENT;
 use std::collections::BTreeSet;
 
 /// CAN_TIMEOUT.
@@ -24,6 +25,8 @@ pub(crate) struct Own {
     pub(super) name: String,
     pub(super) scenario: Scenario<Unitek>,
     pub(in super::super) plan: Plan<Unitek>,
+    /// Whether no line waits for a frame: what comes is judged by right drives alone.
+    pub(super) by_frames: bool,
 }
 
 impl Own {
@@ -31,16 +34,19 @@ impl Own {
     pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Unitek> = parse(source)?;
         let mut plan = plan(&scenario, source, None)?;
-        // What comes in a conversation of which no line waits for a frame is judged by right drives alone.
         let waits = |own: &Step| {
             let receives = matches!(own.action, PlannedAction::Receive(..));
             receives || matches!(own.action, PlannedAction::Own(Act::Quiet))
         };
-        plan.strict &= !source.name.starts_with(CONVERSATION) || plan.steps.iter().any(waits);
+        let steps = &plan.steps;
+        let alone = !steps.iter().any(waits) && steps.iter().any(is_answered);
+        let by_frames = alone && source.name.starts_with(CONVERSATION);
+        plan.strict &= !by_frames;
         Ok(Self {
             name: source.name.clone(),
             scenario,
             plan,
+            by_frames,
         })
     }
 
@@ -80,6 +86,18 @@ impl Own {
 }
 
 type Step = PlannedStep<Unitek>;
+
+/// Whether a drive sends something by what a step sends: a request, a cycle (UNITEK 5.2), or events (ex 10).
+fn is_answered(step: &Step) -> bool {
+    let PlannedAction::Send(_, frames) = &step.action else {
+        return false;
+    };
+    frames.iter().any(|frame| match frame.data() {
+        [READ, ..] => true,
+        [0x51, low, ..] => u16::from(*low) & MODE_EVENT != 0,
+        _ => false,
+    })
+}
 
 /// The registers whose contents a step asks for.
 fn asks(step: &Step) -> Vec<u8> {

@@ -36,6 +36,7 @@ impl Player {
                 Some(_) => return right_but_late(outcome),
                 None => {}
             },
+            (Verdict::Passed, Shown::Unknown) if own.by_frames => return not_compared(outcome),
             _ => {}
         }
         if outcome.verdict != Verdict::Failed {
@@ -139,6 +140,18 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
         verdict: Verdict::Failed,
         finding: Some(found),
         remarks: std::iter::once(wrong).chain(outcome.remarks).collect(),
+        ..outcome
+    }
+}
+
+/// An attempt of which only the frames judge, and these were not compared.
+fn not_compared(outcome: Outcome) -> Outcome {
+    let why = "what came was not compared: there are too many worlds, or something beside the bus has changed the drive";
+    Outcome {
+        verdict: Verdict::Inconclusive,
+        remarks: std::iter::once(why.to_owned())
+            .chain(outcome.remarks)
+            .collect(),
         ..outcome
     }
 }

@@ -13,6 +13,7 @@ use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Dlc4, Properties};
 use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS_NOT_READY, status};
 use harness_proto::unitek::{Reply, Request};
+use harness_sim::segment::Station as _;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -24,6 +25,9 @@ const USUALLY: Span = Span::from_millis(3);
 
 /// How much later than the slowest one that was measured a frame may be.
 const WORSE: u64 = 3;
+
+/// FW-VERSION.
+const FIRMWARE: u8 = 0x1B;
 
 /// The second pair of identifiers, and the first.
 const IDENTIFIERS: [u8; 4] = [0x68, 0x69, 0x88, 0x89];
@@ -46,7 +50,16 @@ impl Told {
         self.way.late.max(self.way.longest)
     }
 
-    /// How late a frame may be.
+    /// How late a frame may be, and whether replies may be overtaken: few worlds explain most conversations, and the most are tried last. In
+    /// virtual time nothing is late.
+    fn lateness(&self) -> Vec<(Span, bool)> {
+        match self.way.tolerance {
+            Span::ZERO => vec![(Span::ZERO, false)],
+            _ => vec![(self.measured() + USUALLY, false), (self.slowest(), true)],
+        }
+    }
+
+    /// How late a frame may be at most.
     fn slowest(&self) -> Span {
         (self.measured() * WORSE).max(self.way.tolerance)
     }
@@ -104,9 +117,7 @@ impl Player {
             let world = self.world(known, properties, &unlike);
             judge_alive(vec![world], &talk, &|| self.beats.beat())
         };
-        let slowest = told.slowest();
-        // Few worlds explain most conversations.
-        for (late, overtakes) in [(told.measured() + USUALLY, false), (slowest, true)] {
+        for (late, overtakes) in told.lateness() {
             match judged(known.properties, late, (overtakes, true)) {
                 Judged::Right => return Shown::Complete,
                 Judged::TooMany | Judged::Unknown => return Shown::Unknown,
@@ -116,7 +127,7 @@ impl Player {
         let others = || known.candidates().into_iter().map(|own| own.1);
         let mut wrong = None;
         for properties in std::iter::once(known.properties).chain(others()) {
-            match judged(properties, slowest, (true, false)) {
+            match judged(properties, told.slowest(), (true, false)) {
                 Judged::Right => return Shown::Right,
                 Judged::TooMany | Judged::Unknown => return Shown::Unknown,
                 Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
@@ -126,19 +137,44 @@ impl Player {
         wrong.map_or(Shown::Unknown, |own| Shown::Wrong(words(own)))
     }
 
-    /// Whether a drive with a deviation could have sent what came from it in an attempt; true where that is not compared.
-    pub(super) fn could_deviate(&self, known: &Known, setup: &DriveSetup, shown: &Told) -> bool {
-        let Some(came) = self.came_from(known, &shown.talk) else {
+    /// Whether a drive with a deviation could have sent what came from it in an attempt; true where that is not compared. Before the attempt
+    /// it has answered what the drives were asked at first, and some requests `more`.
+    pub(super) fn could_deviate(
+        &self,
+        known: &Known,
+        (setup, more): (&DriveSetup, u8),
+        shown: &Told,
+    ) -> bool {
+        let Some(mut came) = self.came_from(known, &shown.talk) else {
             return true;
         };
-        let talk = Dialogue {
-            overtakes: true,
-            ..conversation(&shown.talk, &came, shown.slowest())
-        };
-        let drive = setup.drive(self.rate, Instant::START);
+        // A frame that began before the first request had left belongs to what was before.
+        if let Some((first, _)) = shown.talk.sent.first() {
+            let least = |own: &Frame| self.rate.time_of(own.bits_to_acknowledge());
+            let before = came.iter().take_while(|own| own.0 < *first + least(&own.2));
+            let before = before.count();
+            came.drain(..before);
+        }
+        let mut drive = setup.drive(self.rate, Instant::START);
+        let more = std::iter::repeat_n(FIRMWARE, more.into());
+        for register in known.cells.keys().copied().chain(more) {
+            let request = Request::Read { register };
+            if let Ok(frame) = request.encode(known.axis.rx) {
+                drive.hear(Instant::START, &frame);
+            }
+            while drive.wants().is_some() {
+                drive.sent(Instant::START);
+            }
+        }
         let world = World::new(drive, shown.unlike(known), false);
-        let judged = judge_alive(vec![world], &talk, &|| self.beats.beat());
-        !matches!(judged, Judged::Wrong(..))
+        shown.lateness().into_iter().any(|(late, overtakes)| {
+            let talk = Dialogue {
+                overtakes,
+                ..conversation(&shown.talk, &came, late)
+            };
+            let judged = judge_alive(vec![world.clone()], &talk, &|| self.beats.beat());
+            matches!(judged, Judged::Right | Judged::Unknown)
+        })
     }
 
     fn world(&self, known: &Known, properties: Properties, unlike: &Arc<BTreeSet<u8>>) -> World {
@@ -188,7 +224,7 @@ fn conversation(
     late: Span,
 ) -> Dialogue<Frame> {
     let sent = talk.sent.iter().map(|(at, piece)| Timed {
-        earliest: *at - AHEAD,
+        earliest: *at - AHEAD.min(late),
         latest: *at + late,
         piece: *piece,
     });

@@ -1,0 +1,98 @@
+//! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
+
+use super::{CONVERSATION, Own, Player};
+use crate::BUSES;
+use crate::rig::Axis;
+use crate::rig::qualify::conversations;
+use harness_bench::rig::segment::SegmentRun as _;
+use harness_bench::rig::segment::run::PortRun;
+use harness_bench::rig::{UseOptions, parse};
+use harness_bench::scenario::run::Outcome;
+use harness_bench::scenario::source::Source;
+use harness_bench::scenario::verdict::Verdict;
+use std::collections::BTreeSet;
+
+/// A deviation that shows in a conversation, by conversation.
+const WRONG: [(&str, &str); 4] = [
+    ("cycles-and-contents", "cyclic-frames-never-change"),
+    ("events-each-edge", "event-sends-masked-bits"),
+    ("speed-by-torque", "torque-of-150-percent"),
+    ("speed-on-ramps", "speed-without-sign"),
+];
+
+/// A rig with one simulated drive that is set up by lines.
+fn bench(setup: &[&str]) -> PortRun<Player> {
+    let text = format!(
+        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n\
+         [sim]\nbus = \"unitek\"\nsetup = {setup:?}\n\
+         [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n"
+    );
+    let file = Source {
+        name: "desk.toml".to_owned(),
+        text: text.into(),
+    };
+    let rig = parse(&file, &BUSES).expect("a rig's file");
+    let options = UseOptions {
+        allow_motion: true,
+        ill_as_well: true,
+        ..UseOptions::default()
+    };
+    PortRun::open(&rig, &options).expect("a simulated drive")
+}
+
+fn outcome(run: &mut PortRun<Player>, conversation: &Source) -> Outcome {
+    run.play(conversation, None).expect("a rig").outcome
+}
+
+/// The conversations that only what right drives send judges, without what the names begin with.
+fn by_frames() -> Vec<(String, Source)> {
+    let axis = Axis {
+        node: 1,
+        rx: 0x201,
+        tx: 0x181,
+    };
+    let all = conversations(&[axis]).into_iter();
+    let own = all.filter(|source| Own::read(source).expect("a conversation").by_frames);
+    let named = own.map(|source| {
+        let name = source.name.strip_prefix(CONVERSATION);
+        (name.unwrap_or_default().to_owned(), source)
+    });
+    named.collect()
+}
+
+#[test]
+fn wrong_drives_fail_and_right_ones_pass() {
+    let all = by_frames();
+    let names: BTreeSet<&str> = all.iter().map(|own| own.0.as_str()).collect();
+    assert_eq!(names, WRONG.iter().map(|own| own.0).collect());
+    for (name, source) in &all {
+        assert_eq!(
+            outcome(&mut bench(&[]), source).verdict,
+            Verdict::Passed,
+            "{name}"
+        );
+        let wrong = WRONG.iter().filter(|own| own.0 == name);
+        for (_, deviation) in wrong {
+            let line = format!("drive 1 deviates {deviation}");
+            let outcome = outcome(&mut bench(&[&line]), source);
+            assert_eq!(outcome.verdict, Verdict::Failed, "{name}: {deviation}");
+        }
+    }
+}
+
+/// A drive whose error stays is compared with no right one: that nothing was found is not enough for it to pass.
+#[test]
+fn what_is_not_compared_has_not_passed() {
+    let mut bench = bench(&["drive 1 deviates errors-stay"]);
+    let all = by_frames();
+    outcome(&mut bench, &all[0].1);
+    for (name, source) in &all {
+        let outcome = outcome(&mut bench, source);
+        assert_eq!(outcome.verdict, Verdict::Inconclusive, "{name}");
+        let why = outcome.remarks.first().map_or("", String::as_str);
+        assert!(
+            why.starts_with("what came was not compared"),
+            "{name}: {why}"
+        );
+    }
+}
