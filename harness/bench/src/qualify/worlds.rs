@@ -7,7 +7,9 @@
 //! Worlds that do the same from now on are merged. There are at most `MOST_WORLDS`: where that is not enough, nothing is accused.
 
 use harness_proto::time::{Instant, Span};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::hash::Hash;
 
 /// The most worlds at one time.
 pub(crate) const MOST_WORLDS: usize = 4_096;
@@ -21,7 +23,7 @@ const DRIFT: i64 = 50;
 /// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
 pub trait RightDrive: Clone {
     /// A frame or a telegram.
-    type Piece: Clone;
+    type Piece: Clone + Eq + Hash;
 
     /// How long a scan lasts.
     const SCAN: Span;
@@ -117,19 +119,14 @@ struct Said<P> {
     may_wait: bool,
 }
 
-/// Worlds that have heard the same number of pieces by the same time, are in the same state and have said the same are one. The time of
-/// one that only waits does not count.
-type Key = (usize, i64, u64, Vec<i64>);
+/// Worlds that have heard the same number of pieces, are in the same state and have said the same, as long ago, do the same from now on.
+type Same<P> = (usize, u64, Vec<(i64, P)>);
 
 impl<M: RightDrive> World<M> {
-    fn key(&self) -> Key {
-        let at = if self.model.due().is_some() {
-            self.at
-        } else {
-            0
-        };
-        let said = self.said.iter().map(|own| self.at - own.at);
-        (self.heard, at, self.model.state(), said.collect())
+    fn same(&self) -> Same<M::Piece> {
+        let said = self.said.iter();
+        let said = said.map(|own| (self.at - own.at, own.piece.clone()));
+        (self.heard, self.model.state(), said.collect())
     }
 
     /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
@@ -138,11 +135,17 @@ impl<M: RightDrive> World<M> {
         (self.ahead.0 <= self.ahead.1).then_some(self)
     }
 
-    /// Takes another world in of the same key.
-    fn merge(&mut self, other: &Self) {
+    /// Takes another world in that does the same, at another time of its own clock. Returns whether the times of both are one interval: where
+    /// they are not, and where times count, it stays as it is.
+    fn merge(&mut self, other: &Self) -> bool {
         let moved = other.at - self.at;
-        self.ahead.0 = self.ahead.0.min(other.ahead.0 + moved);
-        self.ahead.1 = self.ahead.1.max(other.ahead.1 + moved);
+        let (least, most) = (other.ahead.0 + moved, other.ahead.1 + moved);
+        let apart = least > self.ahead.1 || most < self.ahead.0;
+        if apart && self.model.due().is_some() {
+            return false;
+        }
+        self.ahead = (self.ahead.0.min(least), self.ahead.1.max(most));
+        true
     }
 
     fn listen(&mut self) {
@@ -172,17 +175,46 @@ fn instant(at: i64) -> Instant {
     Instant::START + Span::from_units(at.unsigned_abs())
 }
 
-/// Worlds by what distinguishes them, the earliest first: what follows from one comes behind it.
-struct Worlds<M: RightDrive>(BTreeMap<Key, World<M>>);
+/// The place of a world: how many pieces it has heard, when, and its number.
+type Place = (usize, i64, usize);
+
+/// Worlds of which no two do the same, the earliest first: what follows from one comes behind it.
+struct Worlds<M: RightDrive> {
+    all: BTreeMap<Place, World<M>>,
+    same: HashMap<Same<M::Piece>, Vec<Place>>,
+    numbers: usize,
+}
 
 impl<M: RightDrive> Worlds<M> {
-    fn insert(&mut self, world: World<M>) {
-        match self.0.entry(world.key()) {
-            std::collections::btree_map::Entry::Vacant(place) => {
-                place.insert(world);
-            }
-            std::collections::btree_map::Entry::Occupied(mut own) => own.get_mut().merge(&world),
+    fn new() -> Self {
+        Self {
+            all: BTreeMap::new(),
+            same: HashMap::new(),
+            numbers: 0,
         }
+    }
+
+    fn insert(&mut self, world: World<M>) {
+        let same = self.same.entry(world.same()).or_default();
+        let all = &mut self.all;
+        let merges = |place| all.get_mut(place).is_some_and(|own| own.merge(&world));
+        if !same.iter().any(merges) {
+            let place = (world.heard, world.at, self.numbers);
+            self.numbers += 1;
+            same.push(place);
+            self.all.insert(place, world);
+        }
+    }
+
+    fn pop_first(&mut self) -> Option<World<M>> {
+        let (place, world) = self.all.pop_first()?;
+        if let Entry::Occupied(mut same) = self.same.entry(world.same()) {
+            same.get_mut().retain(|own| *own != place);
+            if same.get().is_empty() {
+                same.remove();
+            }
+        }
+        Some(world)
     }
 }
 
@@ -217,7 +249,7 @@ fn judge_one<M: RightDrive>(
     alive: &dyn Fn(),
 ) -> Judged<M::Piece> {
     let mut steps = 0;
-    let mut worlds = Worlds(BTreeMap::new());
+    let mut worlds = Worlds::new();
     worlds.insert(World {
         model,
         at: 0,
@@ -226,11 +258,11 @@ fn judge_one<M: RightDrive>(
         said: VecDeque::new(),
     });
     for place in 0..=talk.came.len() {
-        let mut explained = Worlds(BTreeMap::new());
+        let mut explained = Worlds::new();
         let mut expected = None;
-        while let Some((_, world)) = worlds.0.pop_first() {
+        while let Some(world) = worlds.pop_first() {
             alive();
-            if steps > MOST_STEPS || worlds.0.len() + explained.0.len() > MOST_WORLDS {
+            if steps > MOST_STEPS || worlds.all.len() + explained.all.len() > MOST_WORLDS {
                 return Judged::TooMany;
             }
             if !world.model.knows() {
@@ -249,7 +281,7 @@ fn judge_one<M: RightDrive>(
                 worlds.insert(next);
             }
         }
-        if explained.0.is_empty() {
+        if explained.all.is_empty() {
             return Judged::Wrong(place, expected);
         }
         worlds = explained;
@@ -257,7 +289,7 @@ fn judge_one<M: RightDrive>(
     Judged::Right
 }
 
-impl<P: Clone> Dialogue<P> {
+impl<P: Clone + Eq + Hash> Dialogue<P> {
     /// Where what a world has said is what came at a place, the world behind it. Returns whether it can do nothing else before that.
     fn say<M: RightDrive<Piece = P>>(
         &self,

@@ -35,7 +35,7 @@ use harness_bench::medium::Medium;
 use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::segment::observed::{Beats, LinkTimes, Slow};
 use harness_bench::scenario::expression::Scope;
-use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
+use harness_bench::scenario::run::{Outcome, Skip, Unlock, Why, lacks, run};
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
@@ -44,7 +44,7 @@ use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::guard;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Identifiers and bit rate: a drive that stores new ones may be lost.
@@ -118,8 +118,9 @@ pub(crate) struct Player {
     stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
-    /// The scenarios that are played to their end although a line is not met, since right drives do not meet it either.
-    goes_on: BTreeSet<String>,
+    /// The lines whose contents right drives alone judge, by scenario, and how the first of them was not met: where frames are late, right
+    /// drives do not meet it either.
+    excused: BTreeMap<String, (BTreeSet<usize>, String)>,
     /// Whether the drives are qualified.
     qualifies: bool,
     /// What shows that the program works while it plays on models.
@@ -153,7 +154,7 @@ impl Player {
             levels: BTreeSet::new(),
             stored: false,
             before: None,
-            goes_on: BTreeSet::new(),
+            excused: BTreeMap::new(),
             qualifies: false,
             beats: Beats::default(),
             left: NotPutBack::default(),
@@ -352,11 +353,9 @@ impl Player {
         }
         link.begin();
         link.take_late();
-        let at_mismatch = match self.goes_on.contains(&own.name) {
-            true => AtMismatch::GoOn,
-            false => AtMismatch::Stop,
-        };
-        let outcome = play(&own.plan, link, at_mismatch);
+        let excused = self.excused.get(&own.name);
+        let excused = excused.map(|(lines, _)| own.without_contents(lines));
+        let outcome = run(excused.as_ref().unwrap_or(&own.plan), link);
         if link.time_tolerance() > Span::ZERO {
             // What is missing may still be under way.
             let under_way = match outcome.verdict {
@@ -505,7 +504,7 @@ impl Player {
         observed.begin();
         observed = observed.slowed(other.slow);
         let (outcome, at_rest) = match at_rest {
-            Ok(at_rest) => (play(&own.plan, &mut observed, AtMismatch::Stop), at_rest),
+            Ok(at_rest) => (run(&own.plan, &mut observed), at_rest),
             Err(error) => (self.unanswered(&error), Vec::new()),
         };
         let noted = std::mem::take(&mut observed.noted);

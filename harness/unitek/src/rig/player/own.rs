@@ -75,13 +75,48 @@ impl Own {
         self.plan.steps.iter().flat_map(asks).collect()
     }
 
-    /// The registers that the step at a place of the text asks for, and those that the steps behind it ask for.
-    pub(super) fn asks_from(&self, place: usize) -> [Vec<u8>; 2] {
-        let all = self.plan.steps.iter();
-        let (at, behind): (Vec<_>, Vec<_>) = all
-            .filter(|own| own.span.start >= place)
-            .partition(|own| own.span.start == place);
-        [at, behind].map(|own| own.into_iter().flat_map(asks).collect())
+    /// The lines from this one on of which all contents are of registers for which `compared` holds; with whether others behind it ask for
+    /// something too. `None` where it is none of them.
+    pub(super) fn lines_from(
+        &self,
+        place: usize,
+        compared: impl Fn(u8) -> bool,
+    ) -> Option<(BTreeSet<usize>, bool)> {
+        let behind = self.plan.steps.iter().filter(|own| own.span.start >= place);
+        let asking: Vec<_> = behind.filter(|own| !asks(own).is_empty()).collect();
+        let own = |step: &&&Step| {
+            let frames = matches!(
+                step.action,
+                PlannedAction::Receive(..) | PlannedAction::Own(Act::Read { .. })
+            );
+            frames && asks(step).into_iter().all(&compared)
+        };
+        let all: BTreeSet<_> = asking
+            .iter()
+            .filter(own)
+            .map(|own| own.span.start)
+            .collect();
+        let goes_on = asking.iter().any(|own| own.span.start != place);
+        all.contains(&place).then_some((all, goes_on))
+    }
+
+    /// The plan in which these lines ask for any contents.
+    pub(super) fn without_contents(&self, lines: &BTreeSet<usize>) -> Plan<Unitek> {
+        let mut plan = self.plan.clone();
+        let own = |step: &&mut Step| lines.contains(&step.span.start);
+        for step in plan.steps.iter_mut().filter(own) {
+            match &mut step.action {
+                PlannedAction::Receive(_, wanted) => {
+                    let contents = wanted
+                        .iter_mut()
+                        .flat_map(|own| own.data.iter_mut().skip(1));
+                    contents.for_each(|own| *own = Expected::Any);
+                }
+                PlannedAction::Own(Act::Read { wanted, .. }) => *wanted = None,
+                _ => {}
+            }
+        }
+        plan
     }
 }
 

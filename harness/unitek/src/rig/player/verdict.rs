@@ -12,6 +12,9 @@ use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use std::collections::BTreeSet;
 
+/// Why a line that was not met accuses nothing.
+const LATE_ALONE: &str = "right drives send the same where frames are as late as these: the line is not met for that reason alone";
+
 impl Player {
     /// Whether a line that was not met accuses the drive.
     pub(super) fn judged(
@@ -25,17 +28,30 @@ impl Player {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => {
                 return wronged(own, outcome, why.clone());
             }
-            (Verdict::Failed, Shown::Complete) => match compares(own, &outcome, unlike) {
-                // What stands behind the line is played in the next attempt.
-                Some(true) if self.goes_on.insert(own.name.clone()) => {
-                    return Outcome {
-                        verdict: Verdict::Marginal,
-                        ..right_but_late(outcome)
+            (Verdict::Failed, Shown::Complete) => {
+                if let Some(goes_on) = self.excuses(own, &outcome, unlike) {
+                    let late = right_but_late(outcome);
+                    let verdict = match goes_on {
+                        // What stands behind the line is played in the next attempt.
+                        true => Verdict::Marginal,
+                        false => Verdict::Passed,
                     };
+                    return Outcome { verdict, ..late };
                 }
-                Some(_) => return right_but_late(outcome),
-                None => {}
-            },
+            }
+            (Verdict::Passed, Shown::Complete)
+                if let Some((_, found)) = self.excused.get(&own.name) =>
+            {
+                let why = [LATE_ALONE.to_owned(), found.clone()].into_iter();
+                let remarks = why.chain(outcome.remarks).collect();
+                let outcome = Outcome { remarks, ..outcome };
+                return outcome.judged_by(&own.plan);
+            }
+            (Verdict::Passed, Shown::Right | Shown::Unknown)
+                if self.excused.contains_key(&own.name) =>
+            {
+                return not_compared(outcome);
+            }
             (Verdict::Passed, Shown::Unknown) if own.by_frames => return not_compared(outcome),
             _ => {}
         }
@@ -78,6 +94,23 @@ impl Player {
                 ..outcome
             },
         }
+    }
+
+    /// Takes the contents of the line that was not met, and of those behind it, from what the lines judge, where right drives are compared in
+    /// all that they ask for; returns whether more is asked for behind it. `None` where it is not so, or was done before.
+    fn excuses(&mut self, own: &Own, outcome: &Outcome, unlike: &[(u8, u8)]) -> Option<bool> {
+        let found = outcome.finding.as_ref()?;
+        let compared = |register| {
+            let differs = unlike.iter().any(|own| own.1 == register);
+            World::compares(register) && !differs
+        };
+        let (lines, goes_on) = own.lines_from(found.span.start, compared)?;
+        if self.excused.contains_key(&own.name) {
+            return None;
+        }
+        self.excused
+            .insert(own.name.clone(), (lines, found.message.clone()));
+        Some(goes_on)
     }
 
     /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
@@ -146,7 +179,7 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
 
 /// An attempt of which only the frames judge, and these were not compared.
 fn not_compared(outcome: Outcome) -> Outcome {
-    let why = "what came was not compared: there are too many worlds, or something beside the bus has changed the drive";
+    let why = "what came was not compared to its end: there are too many worlds, or something beside the bus has changed the drive";
     Outcome {
         verdict: Verdict::Inconclusive,
         remarks: std::iter::once(why.to_owned())
@@ -156,25 +189,11 @@ fn not_compared(outcome: Outcome) -> Outcome {
     }
 }
 
-/// Whether lines behind the one that was not met ask for something too; `None` where right drives are not compared in all that they and it
-/// ask for.
-fn compares(own: &Own, outcome: &Outcome, unlike: &[(u8, u8)]) -> Option<bool> {
-    let [at, behind] = own.asks_from(outcome.finding.as_ref()?.span.start);
-    let compared = |register: &u8| {
-        let differs = unlike.iter().any(|own| own.1 == *register);
-        World::compares(*register) && !differs
-    };
-    let all = at.iter().chain(&behind).all(compared);
-    (all && !at.is_empty()).then_some(!behind.is_empty())
-}
-
 /// An attempt in which the drives did what right ones do, and a line is not met since frames were late.
 fn right_but_late(outcome: Outcome) -> Outcome {
     let found = outcome.finding.map(|own| own.message);
-    let why = "right drives send the same where frames are as late as these: the line is not met for that reason alone";
-    let why = std::iter::once(why.to_owned()).chain(found);
+    let why = std::iter::once(LATE_ALONE.to_owned()).chain(found);
     Outcome {
-        verdict: Verdict::Passed,
         finding: None,
         remarks: why.chain(outcome.remarks).collect(),
         ..outcome
