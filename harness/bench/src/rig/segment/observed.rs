@@ -49,7 +49,7 @@ pub struct Observed<'l, N> {
     pub noted: N,
 }
 
-/// What an adapter and a busy computer may do to frames and telegrams.
+/// What an adapter and a busy computer may do to frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Slow {
     /// How late one leaves.
@@ -58,11 +58,9 @@ pub struct Slow {
     pub which: u32,
     /// How exact times are compared.
     pub tolerance: Span,
-    /// How many of these octets leave without a pause, where those behind them are late; `None` where what is sent stays together.
-    pub parts: Option<fn(&[u8]) -> usize>,
 }
 
-/// How late frames and telegrams may leave through an adapter and a busy computer, in us, beside what was measured.
+/// How late frames may leave through an adapter and a busy computer, in us, beside what was measured.
 const LATE: [u64; 3] = [1_000, 3_000, 15_000];
 
 /// The way to the drives and back, as it was in an attempt.
@@ -88,18 +86,7 @@ impl LinkTimes {
                 by,
                 which,
                 tolerance,
-                parts: None,
             })
-    }
-
-    /// A way on which octets are late behind what stays together, where time is not virtual.
-    pub fn in_parts(self, parts: fn(&[u8]) -> usize) -> Option<Slow> {
-        (self.tolerance > Span::ZERO).then_some(Slow {
-            by: Span::from_millis(1),
-            which: 2,
-            tolerance: self.tolerance,
-            parts: Some(parts),
-        })
     }
 }
 
@@ -176,25 +163,7 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
         std::mem::take(&mut self.late)
     }
 
-    /// Sends octets in parts.
-    fn send_parts(
-        &mut self,
-        port: usize,
-        octets: &[u8],
-        parts: fn(&[u8]) -> usize,
-        slow: Slow,
-    ) -> Instant {
-        let (part, mut rest) = octets.split_at(parts(octets).min(octets.len()));
-        let mut end = self.link.send(port, Out::Octets(part));
-        while !rest.is_empty() {
-            let length = parts(rest).clamp(1, rest.len());
-            end = self.send_late(port, Out::Octets(&rest[..length]), slow);
-            rest = &rest[length..];
-        }
-        end
-    }
-
-    /// Sends a frame or a telegram later than it should be.
+    /// Sends a frame later than it should be.
     fn send_late(&mut self, port: usize, what: Out<'_>, slow: Slow) -> Instant {
         self.sent += 1;
         if slow.which > 1 || self.sent % 2 == slow.which {
@@ -218,11 +187,7 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
 
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
         let end = match (self.slow, what) {
-            (None, what) => self.link.send(port, what),
-            (Some(slow), Out::Octets(octets)) => match slow.parts {
-                None => self.send_late(port, what, slow),
-                Some(parts) => self.send_parts(port, octets, parts, slow),
-            },
+            (None, what) | (_, what @ Out::Octets(_)) => self.link.send(port, what),
             (Some(slow), Out::Frames(frames)) => {
                 let now = self.link.now();
                 let one_by_one = frames.chunks(1).map(Out::Frames);

@@ -10,7 +10,6 @@ use crate::rig::settle::Assumed;
 use crate::rig::talk::TalkError;
 use crate::simulate::Bench;
 use harness_bench::link::{Line as _, Link as _, LinkEvent, Recording, Trouble};
-use harness_bench::rig::segment::observed::Slow;
 use harness_bench::scenario::run::outcome::Unready;
 use harness_bench::scenario::run::{AtMismatch, Outcome, Why, play};
 use harness_bench::scenario::verdict::Verdict;
@@ -24,8 +23,6 @@ use std::collections::BTreeSet;
 pub(super) struct Other<'o> {
     /// The properties of the slaves in place of those that are known.
     pub(super) properties: Option<&'o Assumed>,
-    /// What adapter and computer do to telegrams.
-    pub(super) slow: Option<Slow>,
     /// Whether the settings of the bus are switched to those of the scenario.
     pub(super) switches: bool,
     /// What came from the slaves, where the model is played up to the first difference from it.
@@ -306,7 +303,6 @@ impl Player {
         let outcome = match ready {
             Ok(()) => {
                 observed.begin();
-                observed = observed.slowed(other.slow);
                 if let Some(came) = other.came {
                     observed.noted.expect(came, observed.noted.fresh, true);
                 }
