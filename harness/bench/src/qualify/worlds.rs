@@ -15,7 +15,7 @@ use std::hash::Hash;
 pub(crate) const MOST_WORLDS: usize = 4_096;
 
 /// The most steps of all worlds together.
-const MOST_STEPS: usize = 50_000;
+const MOST_STEPS: usize = 200_000;
 
 /// The clock of a drive may be off by this part of a time: 2 % (UNITEK 5.2; our choice for other buses).
 const DRIFT: i64 = 50;
