@@ -14,9 +14,6 @@ use std::hash::Hash;
 /// The most worlds at one time.
 pub(crate) const MOST_WORLDS: usize = 4_096;
 
-/// The most steps of all worlds together.
-const MOST_STEPS: usize = 200_000;
-
 /// The clock of a drive may be off by this part of a time: 2 % (UNITEK 5.2; our choice for other buses).
 const DRIFT: i64 = 50;
 
@@ -94,6 +91,8 @@ pub struct Dialogue<P> {
     pub overtakes: bool,
     /// Whether all that was said has come, so that nothing is on its way any more.
     pub complete: bool,
+    /// The most steps of all worlds together.
+    pub most_steps: usize,
 }
 
 /// One right drive.
@@ -262,7 +261,7 @@ fn judge_one<M: RightDrive>(
         let mut expected = None;
         while let Some(world) = worlds.pop_first() {
             alive();
-            if steps > MOST_STEPS || worlds.all.len() + explained.all.len() > MOST_WORLDS {
+            if steps > talk.most_steps || worlds.all.len() + explained.all.len() > MOST_WORLDS {
                 return Judged::TooMany;
             }
             if !world.model.knows() {
@@ -485,6 +484,7 @@ mod tests {
             lag: Span::from_millis(1),
             overtakes: false,
             complete: false,
+            most_steps: 50_000,
         };
         judge(vec![drive], &talk)
     }
