@@ -194,6 +194,19 @@ fn scenarios_over(ways: &[&str]) {
     }
 }
 
+/// Right drives behind an adapter pass all that is played: nothing is inconclusive because frames are late.
+#[test]
+#[ignore = "takes two minutes; .ci/nightly runs it"]
+fn right_drives_pass_a_full_qualification() {
+    let limits = "allow_eeprom = true\nallow_bus_settings = true\nallow_other_identifiers = true\n";
+    let desk = Desk::new("pty", &format!("{MOTION}{limits}"));
+    let output = desk.run("qualify --allow-motion --evidence kept");
+    ended(&output, 0, "deviations: none;");
+    ended(&output, 0, " 0 failed, 0 inconclusive;");
+    let verify = desk.command("verify kept").output().expect("the program");
+    ended(&verify, 0, " 0 things wrong");
+}
+
 /// An adapter in front of another one that says of itself that it has lost frames; returns its address.
 fn losing(adapter: &str) -> String {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
