@@ -105,11 +105,12 @@ impl Player {
             World::compares(register) && !differs
         };
         let (lines, goes_on) = own.lines_from(found.span.start, compared)?;
-        if self.excused.contains_key(&own.name) {
+        let first = || (BTreeSet::new(), found.message.clone());
+        let excused = self.excused.entry(own.name.clone()).or_insert_with(first);
+        if excused.0.contains(&found.span.start) {
             return None;
         }
-        self.excused
-            .insert(own.name.clone(), (lines, found.message.clone()));
+        excused.0.extend(lines);
         Some(goes_on)
     }
 
