@@ -8,7 +8,7 @@ use harness::buses::novobus::language::run::over_bus::play_over_bus;
 use harness::buses::novobus::simulate::bench;
 use harness::library::Entry;
 use harness::link::{
-    Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
+    Capability, Lead, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use harness::medium::{Heard, Medium, Out};
 use harness::scenario::run::{AtMismatch, Outcome, play};
@@ -31,9 +31,14 @@ fn plan(text: &str) -> Plan {
 /// Plays on a guarded link, and again from what was recorded.
 fn guarded(text: &str, limits: Limits) -> Outcome {
     let plan = plan(text);
-    let mut line = guard_rings(bench(&plan), limits);
-    line.assume_fresh();
-    twice(&plan, &mut line)
+    let [outcome, in_real_time] = [Span::ZERO, Span::from_millis(20)].map(|tolerance| {
+        let never = Failing::new(bench(&plan), Trouble::Interrupted, When::Begin(usize::MAX));
+        let mut line = guard_rings(Failing { tolerance, ..never }, limits);
+        line.assume_fresh();
+        twice(&plan, &mut line)
+    });
+    assert_eq!(in_real_time.verdict, outcome.verdict);
+    outcome
 }
 
 /// Plays on a link, and again from what was recorded, which must come to the same.
@@ -44,12 +49,13 @@ fn twice(plan: &Plan, link: &mut dyn Link) -> Outcome {
     recording.begin();
     let outcome = play_over_bus(plan, &mut recording, AtMismatch::Stop);
     let drives = plan.rings.iter().map(|ring| ring.drives()).collect();
-    let rate = Rate::default();
-    let mut replay = Replay::new(events.clone(), rate, Span::ZERO, drives, capabilities);
+    let (rate, tolerance) = (Rate::default(), link.time_tolerance());
+    let mut replay = Replay::new(events.clone(), rate, tolerance, drives, capabilities);
     replay.begin();
     let again = play_over_bus(plan, &mut replay, AtMismatch::Stop);
     let last = &events[events.len().saturating_sub(6)..];
     assert_eq!(said(&again), said(&outcome), "{last:?}");
+    assert_eq!(replay.left(), None, "{last:?}");
     outcome
 }
 
@@ -108,6 +114,20 @@ fn a_denied_probe_is_no_finding() {
     ends(&guarded(text, limits), Verdict::Aborted, "20 bytes");
 }
 
+/// The driver sends a telegram in pieces, and the guard denies any of them: what was not sent has no answer that is waited for.
+#[test]
+fn a_denial_in_a_telegram_is_played_again() {
+    for most_bytes in 1..16 {
+        let limits = Limits {
+            most_bytes,
+            ..Limits::default()
+        };
+        let text = "ring 2\nmaster read-byte 1 FE10 = 00; read-byte 0 FE10 = 00\n";
+        let words = format!("{most_bytes} byte");
+        ends(&guarded(text, limits), Verdict::Aborted, &words);
+    }
+}
+
 /// When a link gets into trouble.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
@@ -126,6 +146,8 @@ struct Failing<L> {
     link: L,
     trouble: Trouble,
     full: bool,
+    /// Of a link in real time.
+    tolerance: Span,
     when: When,
     counts: [usize; 3],
     failed: bool,
@@ -137,6 +159,7 @@ impl<L: Link> Failing<L> {
             link,
             trouble,
             full: false,
+            tolerance: Span::ZERO,
             when,
             counts: [0; 3],
             failed: false,
@@ -184,6 +207,15 @@ impl<L: Link> Line for Failing<L> {
     fn trouble(&self) -> Option<&Trouble> {
         Some(&self.trouble).filter(|_| self.failed && !self.full)
     }
+    fn lead(&self) -> Lead {
+        match self.tolerance {
+            Span::ZERO => Lead::NONE,
+            far => Lead {
+                far,
+                near: Span::ZERO,
+            },
+        }
+    }
 }
 
 impl<L: Link> Link for Failing<L> {
@@ -197,6 +229,9 @@ impl<L: Link> Link for Failing<L> {
     }
     fn busy(&self) -> bool {
         self.link.busy()
+    }
+    fn time_tolerance(&self) -> Span {
+        self.tolerance
     }
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         self.link.inject(ring, fault, moment);

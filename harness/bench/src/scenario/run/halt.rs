@@ -88,9 +88,9 @@ impl<L: Language> Runner<'_, L> {
     }
 
     /// Waits for bytes that a busy computer may still hold, where time is real and fewer came than were sent. A byte that comes now was
-    /// late; one that does not come is lost.
+    /// late; one that does not come is lost. Behind trouble neither is judged, and what the guard has denied has no answer.
     fn wait_for_late(&mut self) {
-        if self.link.time_tolerance() == Span::ZERO {
+        if self.link.time_tolerance() == Span::ZERO || self.link.trouble().is_some() {
             return;
         }
         let end = self.link.now() + LATE;
