@@ -29,8 +29,8 @@ pub trait Attempts {
     /// Whether correct drives, with any value of what the manual leaves open, would have shown the same in an attempt.
     fn is_right(&self, attempt: usize) -> bool;
 
-    /// Whether drives with this deviation would have shown the same in an attempt.
-    fn explains(&self, deviation: &Self::Deviation, attempt: usize) -> bool;
+    /// Whether drives with this deviation would have shown the same in an attempt; `None` where that was not compared to its end.
+    fn explains(&self, deviation: &Self::Deviation, attempt: usize) -> Option<bool>;
 }
 
 /// One attempt at a scenario.
@@ -44,8 +44,8 @@ pub struct Attempted {
     pub exact: bool,
     /// How many frames or telegrams were received.
     pub received: usize,
-    /// Whether another part of the qualification has played the same conversation before, with the same verdict: it is judged, and not
-    /// counted again.
+    /// Whether another attempt speaks for it, or another part of the qualification has played the same conversation before with the same
+    /// verdict: it is judged, and not counted again.
     pub repeats: bool,
 }
 
@@ -70,8 +70,15 @@ fn named<A: Attempts>(all: &A, attempts: &[Attempted]) -> Named {
         return Named::None;
     }
     let explaining = all.deviations().into_iter().filter(|deviation| {
-        let mut compared = unlike.iter().chain(&alike);
-        compared.all(|(place, _)| all.explains(deviation, *place))
+        let mut shown = false;
+        let mut unlike = unlike.iter();
+        let could = unlike.all(|(place, _)| {
+            let explains = all.explains(deviation, *place);
+            shown |= explains == Some(true);
+            explains != Some(false)
+        });
+        let mut alike = alike.iter();
+        could && shown && alike.all(|(place, _)| all.explains(deviation, *place) != Some(false))
     });
     let explaining: Vec<_> = explaining.map(|own| all.words(&own)).collect();
     let accused = unlike.iter().any(|(_, own)| own.accuses);
@@ -128,6 +135,16 @@ pub fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec
         before.extend(own);
     }
     all
+}
+
+/// Which attempts are spoken for by the next one: it is of the same scenario, and they `showed_nothing`, since the computer, the adapter or the
+/// line may have been the cause. `of` gives the name too.
+pub fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool)) -> Vec<bool> {
+    let again = notes.windows(2).map(|two| {
+        let [(name, showed_nothing), (next, _)] = [of(&two[0]), of(&two[1])];
+        showed_nothing && name == next
+    });
+    again.chain([false]).take(notes.len()).collect()
 }
 
 /// The profile of drives: every point that the manual leaves open, of each drive.
@@ -294,8 +311,9 @@ mod tests {
             self.0[attempt].1
         }
 
-        fn explains(&self, deviation: &&'static str, attempt: usize) -> bool {
-            self.0[attempt].2.contains(deviation)
+        fn explains(&self, deviation: &&'static str, attempt: usize) -> Option<bool> {
+            let own = self.0[attempt].2;
+            (!own.is_empty()).then(|| own.contains(deviation))
         }
     }
 
@@ -349,6 +367,18 @@ mod tests {
         assert!(none.0.contains("no single known deviation"), "{}", none.0);
     }
 
+    /// What was not compared explains nothing by itself, and refutes nothing.
+    #[test]
+    fn what_is_not_compared_names_nothing() {
+        let failed = attempted(Verdict::Failed);
+        let unknown = (failed, false, &[][..]);
+        let named = |table| deviations(&Table(table)).0;
+        let none = named(vec![unknown]);
+        assert!(none.contains("no single known deviation"), "{none}");
+        let one = named(vec![unknown, (failed, false, &["one"])]);
+        assert!(one.starts_with("deviation: one\ncompared"), "{one}");
+    }
+
     /// Nothing is named for drives that nothing accuses.
     #[test]
     fn correct_drives_are_not_named() {
@@ -359,7 +389,7 @@ mod tests {
         let unclear = attempted(Verdict::Inconclusive);
         let own = deviations(&Table(vec![
             (unclear, false, &["one"]),
-            (passed, true, &[]),
+            (passed, true, &["two"]),
         ]));
         assert!(own.0.starts_with("deviations: not known"), "{}", own.0);
         assert_eq!(own.1, Verdict::Inconclusive);
@@ -409,7 +439,10 @@ mod tests {
     #[test]
     fn no_deviation_explains_a_right_and_a_wrong_drive() {
         let (passed, failed) = (attempted(Verdict::Passed), attempted(Verdict::Failed));
-        let own = deviations(&Table(vec![(passed, true, &[]), (failed, false, &["one"])]));
+        let own = deviations(&Table(vec![
+            (passed, true, &["two"]),
+            (failed, false, &["one"]),
+        ]));
         let expected =
             "deviations: the drives differ from the model, and no single known deviation";
         assert!(own.0.starts_with(expected), "{}", own.0);
@@ -428,8 +461,8 @@ mod tests {
             ..attempted(Verdict::Passed)
         };
         let both = Table(vec![
-            (attempted(Verdict::Passed), true, &[]),
-            (again, true, &[]),
+            (attempted(Verdict::Passed), true, &["one"]),
+            (again, true, &["one"]),
         ]);
         let own = deviations(&both);
         let counts = "compared: 1 of 1 attempt passed, 0 failed, 0 inconclusive; 3 frames received";

@@ -3,7 +3,9 @@
 use super::known::{Known, Values, value_of};
 use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
 use super::{RigSlave, slaves};
-use harness_bench::qualify::segment::{Attempted, Attempts, Point, profile, qualified, repeats};
+use harness_bench::qualify::segment::{
+    Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
+};
 use harness_bench::rig::Rig;
 use harness_bench::rig::segment::Qualified;
 use harness_bench::scenario::source::Source;
@@ -187,9 +189,12 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let named: Vec<_> = named.collect();
     let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
     let part = |(place, own): (usize, &Vec<_>)| vec![place; own.len()];
+    let parts = notes.iter().enumerate().flat_map(part).collect();
+    let notes = notes.concat();
     let notes = AttemptNotes {
-        parts: notes.iter().enumerate().flat_map(part).collect(),
-        notes: notes.concat(),
+        again: spoken_for(&notes, |own| (own.name(), own.showed_nothing())),
+        parts,
+        notes,
         repeats,
         behind: RefCell::default(),
     };
@@ -235,6 +240,8 @@ struct AttemptNotes<'n> {
     parts: Vec<usize>,
     /// Which of them repeat what another part has played.
     repeats: Vec<bool>,
+    /// Which of them the next one speaks for.
+    again: Vec<bool>,
     /// What parameters of the slave at a place hold in a part, if it has the deviation with this name and that changes what they read.
     behind: RefCell<BTreeMap<(usize, usize, &'static str), Values>>,
 }
@@ -276,13 +283,14 @@ impl Attempts for AttemptNotes<'_> {
     }
 
     fn attempts(&self) -> Vec<Attempted> {
-        let attempted = self.notes.iter().zip(&self.repeats);
-        let attempted = attempted.map(|(own, repeats)| Attempted {
+        let other = self.repeats.iter().zip(&self.again);
+        let attempted = self.notes.iter().zip(other);
+        let attempted = attempted.map(|(own, (repeats, again))| Attempted {
             verdict: own.verdict,
-            accuses: own.accuses,
+            accuses: own.accuses && !again,
             exact: own.exact,
             received: own.telegrams,
-            repeats: *repeats,
+            repeats: *repeats || *again,
         });
         attempted.collect()
     }
@@ -291,17 +299,17 @@ impl Attempts for AttemptNotes<'_> {
         self.notes[attempt].is_explained_by(SlaveIs::Right, &Values::new())
     }
 
-    fn explains(&self, own: &WrongSlave, attempt: usize) -> bool {
+    fn explains(&self, own: &WrongSlave, attempt: usize) -> Option<bool> {
         let note = self.notes[attempt];
         let wrong = SlaveIs::WrongSlave(own.place, own.deviation);
         if note.is_explained_by(wrong, &Values::new()) {
-            return true;
+            return Some(true);
         }
         let mut behind = self.behind.borrow_mut();
         let held = behind.entry((self.parts[attempt], own.place, own.deviation.name));
         // Parameters are read once in a part, so that every attempt knows the same.
         let held = held.or_insert_with(|| note.behind(own.place, own.deviation));
-        !held.is_empty() && note.is_explained_by(wrong, held)
+        Some(!held.is_empty() && note.is_explained_by(wrong, held))
     }
 }
 

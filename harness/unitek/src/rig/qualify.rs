@@ -3,11 +3,12 @@
 use super::Axis;
 use super::known::Known;
 use super::player::{CONVERSATION, DriveIs, Note, Player};
-use harness_bench::qualify::segment::{Attempted, Attempts, Point, profile, qualified, repeats};
+use harness_bench::qualify::segment::{
+    Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
+};
 use harness_bench::rig::Rig;
 use harness_bench::rig::segment::Qualified;
 use harness_bench::scenario::source::Source;
-use harness_bench::scenario::verdict::Verdict;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
@@ -181,15 +182,13 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
     let notes = notes.concat();
-    // The last attempt at a scenario speaks for those before it that have shown nothing.
-    let again = notes.windows(2).map(|two| {
-        [Verdict::Inconclusive, Verdict::Marginal].contains(&two[0].verdict)
-            && two[0].name() == two[1].name()
-    });
-    let repeats = repeats.into_iter().zip(again.chain([false]));
-    let repeats = repeats.map(|(repeats, again)| repeats || again).collect();
+    let again = spoken_for(&notes, |own| (own.name(), own.showed_nothing()));
     qualified(
-        &Notes(notes, repeats),
+        &Notes {
+            notes,
+            repeats,
+            again,
+        },
         profile,
         "frame",
         &named.collect::<Vec<_>>(),
@@ -234,8 +233,14 @@ fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
     })
 }
 
-/// The attempts of a qualification, and which of them repeat what another part has played.
-struct Notes<'n>(Vec<&'n Note>, Vec<bool>);
+/// The attempts of a qualification.
+struct Notes<'n> {
+    notes: Vec<&'n Note>,
+    /// Which of them repeat what another part has played.
+    repeats: Vec<bool>,
+    /// Which of them the next one speaks for.
+    again: Vec<bool>,
+}
 
 /// A deviation of the drive at a place.
 struct Deviates {
@@ -248,7 +253,7 @@ impl Attempts for Notes<'_> {
     type Deviation = Deviates;
 
     fn deviations(&self) -> Vec<Deviates> {
-        let nodes = self.0.first().into_iter().flat_map(|own| own.nodes());
+        let nodes = self.notes.first().into_iter().flat_map(|own| own.nodes());
         let each = nodes.enumerate().flat_map(|(place, node)| {
             deviations().map(move |deviation| Deviates {
                 place,
@@ -270,22 +275,24 @@ impl Attempts for Notes<'_> {
     }
 
     fn attempts(&self) -> Vec<Attempted> {
-        let attempted = self.0.iter().zip(&self.1).map(|(own, repeats)| Attempted {
+        let other = self.repeats.iter().zip(&self.again);
+        let attempted = self.notes.iter().zip(other);
+        let attempted = attempted.map(|(own, (repeats, again))| Attempted {
             verdict: own.verdict,
-            accuses: own.accuses,
+            accuses: own.accuses && !again,
             exact: own.exact,
             received: own.frames,
-            repeats: *repeats,
+            repeats: *repeats || *again,
         });
         attempted.collect()
     }
 
     fn is_right(&self, attempt: usize) -> bool {
-        self.0[attempt].is_explained_by(DriveIs::Right)
+        self.notes[attempt].is_explained_by(DriveIs::Right) == Some(true)
     }
 
-    fn explains(&self, own: &Deviates, attempt: usize) -> bool {
-        self.0[attempt].is_explained_by(DriveIs::Deviates(own.place, own.deviation))
+    fn explains(&self, own: &Deviates, attempt: usize) -> Option<bool> {
+        self.notes[attempt].is_explained_by(DriveIs::Deviates(own.place, own.deviation))
     }
 }
 

@@ -39,29 +39,11 @@ pub struct Observed<'l, N> {
     late: Span,
     /// When the last wait began: all that had come by then can be received.
     looked: Instant,
-    /// How the link is made worse; `None` for the link as it is.
-    slow: Option<Slow>,
     /// Whether the link makes no queries of its own.
     unpaused: bool,
-    /// How often something was sent.
-    sent: u32,
     /// What the bus has noted.
     pub noted: N,
 }
-
-/// What an adapter and a busy computer may do to frames.
-#[derive(Clone, Copy, Debug)]
-pub struct Slow {
-    /// How late one leaves.
-    pub by: Span,
-    /// Which of two is late: 0 and 1 for one of them, 2 for both.
-    pub which: u32,
-    /// How exact times are compared.
-    pub tolerance: Span,
-}
-
-/// How late frames may leave through an adapter and a busy computer, in us, beside what was measured.
-const LATE: [u64; 3] = [1_000, 3_000, 15_000];
 
 /// The way to the drives and back, as it was in an attempt.
 #[derive(Clone, Copy, Debug)]
@@ -72,22 +54,6 @@ pub struct LinkTimes {
     pub longest: Span,
     /// How exact times are; zero where time is virtual.
     pub tolerance: Span,
-}
-
-impl LinkTimes {
-    /// Ways that are as bad as this one may have been; none where time is virtual.
-    pub fn slow(self) -> impl Iterator<Item = Slow> {
-        let measured = [self.longest, self.longest * 2];
-        let late = LATE.map(Span::from_micros).into_iter().chain(measured);
-        let late = late.flat_map(|by| [0, 1, 2].map(|which| (by, which)));
-        let tolerance = self.tolerance;
-        late.filter(move |_| tolerance > Span::ZERO)
-            .map(move |(by, which)| Slow {
-                by,
-                which,
-                tolerance,
-            })
-    }
 }
 
 /// The count by which a session's watchdog sees that the program works; none on a record and on simulated drives.
@@ -140,17 +106,9 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
             link,
             late: Span::ZERO,
             looked: Instant::START,
-            slow: None,
             unpaused: false,
-            sent: 0,
             noted: N::default(),
         }
-    }
-
-    /// The link made worse, for a rehearsal.
-    pub fn slowed(mut self, slow: Option<Slow>) -> Self {
-        self.slow = slow;
-        self
     }
 
     /// Keeps the link from queries of its own: they would change what drives do.
@@ -161,18 +119,6 @@ impl<'l, N: LinkNotes> Observed<'l, N> {
     /// By how much a wait has ended late since the last call, at most.
     pub fn take_late(&mut self) -> Span {
         std::mem::take(&mut self.late)
-    }
-
-    /// Sends a frame later than it should be.
-    fn send_late(&mut self, port: usize, what: Out<'_>, slow: Slow) -> Instant {
-        self.sent += 1;
-        if slow.which > 1 || self.sent % 2 == slow.which {
-            let until = self.link.now() + slow.by;
-            while self.link.now() < until && self.link.trouble().is_none() {
-                self.link.wait(until);
-            }
-        }
-        self.link.send(port, what)
     }
 }
 
@@ -186,14 +132,7 @@ impl<N: LinkNotes> Line for Observed<'_, N> {
     }
 
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
-        let end = match (self.slow, what) {
-            (None, what) | (_, what @ Out::Octets(_)) => self.link.send(port, what),
-            (Some(slow), Out::Frames(frames)) => {
-                let now = self.link.now();
-                let one_by_one = frames.chunks(1).map(Out::Frames);
-                one_by_one.fold(now, |_, frame| self.send_late(port, frame, slow))
-            }
-        };
+        let end = self.link.send(port, what);
         self.noted.sent(what, end);
         end
     }
@@ -288,8 +227,7 @@ impl<N: LinkNotes> Link for Observed<'_, N> {
     }
 
     fn time_tolerance(&self) -> Span {
-        let slow = self.slow.map(|slow| slow.tolerance);
-        slow.unwrap_or_else(|| self.link.time_tolerance())
+        self.link.time_tolerance()
     }
 
     fn beside(&self) -> Option<&dyn Any> {

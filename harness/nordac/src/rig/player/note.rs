@@ -170,6 +170,12 @@ impl AttemptNote {
         self.was_tried() || self.begun.known.is_none() && self.begun.unable.is_none()
     }
 
+    /// Whether it says nothing of the slaves where it is played again.
+    pub(crate) fn showed_nothing(&self) -> bool {
+        [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict)
+            || self.shown.unanswered.is_some()
+    }
+
     /// The name of the scenario.
     pub(crate) fn name(&self) -> &String {
         &self.own.name

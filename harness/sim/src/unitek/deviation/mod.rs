@@ -61,6 +61,18 @@ pub fn deviation(name: &str) -> Option<&'static Deviation> {
     deviations().find(|deviation| deviation.name == name)
 }
 
+/// Those that depend on how many frames were heard and sent before, and the one that depends on what was first sent.
+const COUNTING: [&str; 2] = ["loses-each-fifth-frame", "loses-each-fifth-reply"];
+const REPEATING: &str = "cyclic-frames-never-change";
+
+impl Deviation {
+    /// Whether it depends on how many frames were heard and sent before: it shows in each fifth one.
+    #[must_use]
+    pub fn counts(&self) -> bool {
+        COUNTING.contains(&self.name)
+    }
+}
+
 /// What a deviant drive remembers.
 #[derive(Clone, Debug, Default)]
 struct Memory {
@@ -219,9 +231,15 @@ impl Deviant {
         let own = self.drive.state();
         match self.deviation {
             None => own,
-            Some(_) => {
+            Some(deviation) => {
                 let mut state = DefaultHasher::new();
-                (own, self.part, self.memory.heard, self.memory.sent).hash(&mut state);
+                (own, self.part).hash(&mut state);
+                if deviation.counts() {
+                    (self.memory.heard % 5, self.memory.sent % 5).hash(&mut state);
+                }
+                if deviation.name == REPEATING {
+                    self.memory.first.hash(&mut state);
+                }
                 state.finish()
             }
         }
@@ -269,7 +287,9 @@ impl Deviant {
             return;
         };
         self.memory.sent += 1;
-        if let Ok(reply) = Reply::decode(&waiting.frame, tx) {
+        if self.deviation.is_some_and(|own| own.name == REPEATING)
+            && let Ok(reply) = Reply::decode(&waiting.frame, tx)
+        {
             self.memory
                 .first
                 .entry(reply.register)

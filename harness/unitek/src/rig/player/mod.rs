@@ -16,7 +16,7 @@ mod worlds;
 pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
 use verdict::unlike;
-use worlds::{Shown, Told};
+use worlds::{BY_LINES, Shown, Told};
 
 use super::Axis;
 use super::known::Known;
@@ -33,7 +33,7 @@ use crate::simulate::{self, Bench};
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use harness_bench::medium::Medium;
 use harness_bench::rig::left::NotPutBack;
-use harness_bench::rig::segment::observed::{Beats, LinkTimes, Slow};
+use harness_bench::rig::segment::observed::{Beats, LinkTimes};
 use harness_bench::scenario::expression::Scope;
 use harness_bench::scenario::run::{Outcome, Skip, Unlock, Why, lacks, run};
 use harness_bench::scenario::syntax::Scenario;
@@ -61,17 +61,6 @@ const PHASES: std::ops::Range<u64> = 1..32;
 
 /// How many times the tolerance of times is waited for a frame that is missing.
 const STILL_COMES: u64 = 5;
-
-/// What a model is beside what is known of the drives.
-#[derive(Clone, Copy, Default)]
-struct Other<'o> {
-    /// How far the clocks of the drives are ahead.
-    phase: Span,
-    /// The properties of all drives, in place of those that are known.
-    properties: Option<&'o [Properties]>,
-    /// What adapter and computer do to frames.
-    slow: Option<Slow>,
-}
 
 /// A scenario played on the model.
 struct Rehearsal {
@@ -298,14 +287,17 @@ impl Player {
                     way,
                     unlike: unlike(&drives, &models),
                 };
-                let compared = way.tolerance > Span::ZERO || own.by_frames;
-                let shown = match compared && link.trouble().is_none() {
-                    true => self.shown(&told),
-                    false => Shown::Unknown,
-                };
-                let outcome = self.judged(own, *outcome, way, (&told.unlike, &shown));
+                let exact = way.tolerance == Span::ZERO;
+                let by_lines = exact && !own.by_frames;
+                let shown =
+                    match by_lines && (own.is_disturbed() || outcome.verdict != Verdict::Failed) {
+                        true => Shown::Unknown(BY_LINES),
+                        false => self.shown(&told),
+                    };
+                let wrong = matches!(shown, Shown::Wrong(_));
+                let outcome = self.judged(own, *outcome, exact, (&told.unlike, shown));
                 if let Some(note) = self.notes.last_mut() {
-                    note.told(told, &shown);
+                    note.told(told, wrong);
                 }
                 outcome
             }
@@ -392,13 +384,13 @@ impl Player {
         if let Some(why) = self.other_properties(&own.scenario) {
             return Err(Why::OtherDrives(why).into());
         }
-        let first = self.rehearse(own, &self.limits, Other::default());
+        let first = self.rehearse(own, &self.limits, None);
         if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
             return Ok(first);
         }
         let mut limits = self.limits.clone();
         let mut unlocks = BTreeSet::new();
-        let mut last = self.rehearse(own, &limits, Other::default());
+        let mut last = self.rehearse(own, &limits, None);
         for _ in 0..4 {
             let wanted = match &last.denied {
                 Some((_, settings)) => settings.clone(),
@@ -414,7 +406,7 @@ impl Player {
             if limits == before {
                 break;
             }
-            last = self.rehearse(own, &limits, Other::default());
+            last = self.rehearse(own, &limits, None);
         }
         let found = |outcome: &Outcome| {
             let finding = outcome.finding.as_ref().map(|own| own.message.clone());
@@ -481,19 +473,22 @@ impl Player {
         })
     }
 
-    /// Plays a scenario on the model within limits.
-    fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+    /// Plays a scenario on the model within limits, in which the drive at a place may have other properties.
+    fn rehearse(
+        &self,
+        own: &Own,
+        limits: &Limits,
+        other: Option<(usize, Properties)>,
+    ) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
-            let other = other.properties.and_then(|all| all.get(place)).copied();
-            known.model(other.unwrap_or(known.properties))
+            let other = other.filter(|own| own.0 == place);
+            known.model(other.map_or(known.properties, |own| own.1))
         });
         let setup = simulate::Setup::new(self.rate, drives.collect());
         let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
-        let mut bench = Bench::new(&setup);
-        bench.wait(Instant::START + other.phase);
-        let mut link = guarded(bench, limits.clone(), &identifiers, false);
+        let mut link = guarded(Bench::new(&setup), limits.clone(), &identifiers, false);
         if let Some(gate) = link.segment_mut() {
             self.tell(self.known(), gate);
         }
@@ -502,7 +497,6 @@ impl Player {
         let mut observed = Observed::new(&mut recording);
         let at_rest = self.prepare(own, limits.motion, &mut observed);
         observed.begin();
-        observed = observed.slowed(other.slow);
         let (outcome, at_rest) = match at_rest {
             Ok(at_rest) => (run(&own.plan, &mut observed), at_rest),
             Err(error) => (self.unanswered(&error), Vec::new()),

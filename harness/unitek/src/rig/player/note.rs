@@ -5,7 +5,7 @@
 
 use super::super::known::Known;
 use super::super::observed::Observed;
-use super::worlds::{Shown as Sent, Told};
+use super::worlds::Told;
 use super::{Gone, Own, PHASES, Player};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
@@ -135,20 +135,33 @@ impl Note {
         self.accuses = outcome.verdict == Verdict::Failed || unready;
     }
 
-    /// Notes its frames and their times, and what right drives say of them.
-    pub(super) fn told(&mut self, told: Told, shown: &Sent) {
-        self.wrong = matches!(shown, Sent::Wrong(_));
+    /// Notes its frames and their times, and whether no right drive could have sent them.
+    pub(super) fn told(&mut self, told: Told, wrong: bool) {
+        self.wrong = wrong;
         self.told = Some(told).filter(|_| !self.exact || self.own.by_frames);
     }
 
-    /// Whether the frames and their times are those that a drive with a deviation could have sent.
-    fn told_by(&self, place: usize, deviation: &'static Deviation) -> bool {
-        let (Some(told), Some(known)) = (&self.told, self.drives.get(place)) else {
-            return true;
-        };
+    /// Whether the frames and their times are those that a drive with a deviation could have sent; `None` where that is not compared.
+    fn told_by(&self, place: usize, deviation: &'static Deviation) -> Option<bool> {
+        let (told, known) = (self.told.as_ref()?, self.drives.get(place)?);
         let setup = deviant(known, known.properties, deviation);
-        let mut heard = std::iter::once(0).chain(HEARD_BEFORE);
-        heard.any(|heard| self.begun.could_deviate(known, (&setup, heard), told))
+        let before = match deviation.counts() {
+            true => HEARD_BEFORE,
+            false => 0..0,
+        };
+        let tried = std::iter::once(0).chain(before).map(|heard| {
+            self.begun
+                .could_deviate(known, (&setup, heard), told, self.wrong)
+        });
+        let mut refuted = Some(false);
+        for own in tried {
+            match own {
+                Some(true) => return own,
+                None => refuted = None,
+                Some(false) => {}
+            }
+        }
+        refuted
     }
 
     /// Whether the scenario was played, or the drives did not become ready for it.
@@ -159,6 +172,12 @@ impl Note {
     /// Whether it has shown something: the scenario was tried, or the drives were asked for everything.
     pub(crate) fn shows_something(&self) -> bool {
         self.was_tried() || self.begun.known.is_none()
+    }
+
+    /// Whether it says nothing of the drives where it is played again.
+    pub(crate) fn showed_nothing(&self) -> bool {
+        [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict)
+            || self.shown.unanswered.is_some()
     }
 
     /// The name of the scenario.
@@ -187,12 +206,21 @@ impl Note {
         values.iter().filter(explains).collect()
     }
 
-    /// Whether drives that differ so would have shown the same.
-    pub(crate) fn is_explained_by(&self, other: Other) -> bool {
-        let same = self.is_shown_by(other);
-        match other {
-            Other::Deviates(place, deviation) => same && self.told_by(place, deviation),
-            Other::Right => same && !self.wrong,
+    /// Whether drives that differ so would have shown the same; `None` where that was not compared to its end. Behind an adapter its frames and
+    /// their times alone say it.
+    pub(crate) fn is_explained_by(&self, other: Other) -> Option<bool> {
+        let told = match other {
+            Other::Deviates(place, deviation) if self.told.is_some() => {
+                self.told_by(place, deviation)
+            }
+            Other::Deviates(..) => Some(true),
+            Other::Right => Some(!self.wrong),
+        };
+        let by_times = self.told.is_some() && !self.exact;
+        match told {
+            Some(true) if !by_times => Some(self.is_shown_by(other)),
+            None if !by_times && !self.is_shown_by(other) => Some(false),
+            told => told,
         }
     }
 

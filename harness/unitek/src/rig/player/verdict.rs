@@ -1,98 +1,70 @@
 //! The verdict of an attempt in which a line was not met, or right drives would have sent something else.
 
 use super::worlds::Shown;
-use super::{AtRest, Other, Own, PHASES, Player};
+use super::{AtRest, Own, Player};
 use crate::judge::World;
-use harness_bench::rig::segment::observed::LinkTimes;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::run::outcome::Mismatch;
 use harness_bench::scenario::verdict::Verdict;
-use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use std::collections::BTreeSet;
 
 /// Why a line that was not met accuses nothing.
 const LATE_ALONE: &str = "right drives send the same where frames are as late as these: the line is not met for that reason alone";
 
+/// Why a line that was not met accuses nothing, where right drives were compared.
+const NOT_COMPARED: &str = "right drives send the same as far as it is compared, and the contents of this line follow from the plant or from inputs";
+
+/// Why a line is not judged while right drives could have sent what came.
+const UNDER_WAY: &str = "right drives could have sent this with another value of what the manual leaves open, or with frames that are still on their way";
+
 impl Player {
-    /// Whether a line that was not met accuses the drive.
+    /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met: a line accuses the drive where time
+    /// is virtual and right drives were compared to the end.
     pub(super) fn judged(
         &mut self,
         own: &Own,
         outcome: Outcome,
-        way: LinkTimes,
-        (unlike, shown): (&[(u8, u8)], &Shown),
+        exact: bool,
+        (unlike, shown): (&[(u8, u8)], Shown),
     ) -> Outcome {
+        let excused = self.excused.get(&own.name).map(|(_, found)| found.clone());
         match (outcome.verdict, shown) {
-            (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => {
-                return wronged(own, outcome, why.clone());
-            }
+            (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
             (Verdict::Failed, Shown::Complete) => {
-                if let Some(goes_on) = self.excuses(own, &outcome, unlike) {
-                    let late = right_but_late(outcome);
-                    let verdict = match goes_on {
-                        // What stands behind the line is played in the next attempt.
-                        true => Verdict::Marginal,
-                        false => Verdict::Passed,
-                    };
-                    return Outcome { verdict, ..late };
+                match self.excuses(own, &outcome, unlike) {
+                    // What stands behind the line is played in the next attempt.
+                    Some(true) => right_but_late(outcome, Verdict::Marginal),
+                    Some(false) => right_but_late(outcome, Verdict::Passed),
+                    None if exact => outcome,
+                    None => inconclusive(outcome, NOT_COMPARED.to_owned()),
                 }
             }
-            (Verdict::Passed, Shown::Complete)
-                if let Some((_, found)) = self.excused.get(&own.name) =>
-            {
-                let why = [LATE_ALONE.to_owned(), found.clone()].into_iter();
-                let remarks = why.chain(outcome.remarks).collect();
-                let outcome = Outcome { remarks, ..outcome };
-                return outcome.judged_by(&own.plan);
+            (Verdict::Passed, Shown::Complete) => {
+                let late = excused.map(|found| [LATE_ALONE.to_owned(), found]);
+                let remarks = late.into_iter().flatten().chain(outcome.remarks);
+                let remarks = remarks.collect();
+                Outcome { remarks, ..outcome }.judged_by(&own.plan)
             }
-            (Verdict::Passed, Shown::Right | Shown::Unknown)
-                if self.excused.contains_key(&own.name) =>
-            {
-                return not_compared(outcome);
+            (Verdict::Failed, Shown::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
+            (Verdict::Passed, Shown::Right) if excused.is_some() => {
+                inconclusive(outcome, UNDER_WAY.to_owned())
             }
-            (Verdict::Passed, Shown::Unknown) if own.by_frames => return not_compared(outcome),
-            _ => {}
-        }
-        if outcome.verdict != Verdict::Failed {
-            return outcome.judged_by(&own.plan);
-        }
-        let asks_for = own.asks_for();
-        let unlike = unlike
-            .iter()
-            .find(|(_, register)| asks_for.contains(register));
-        let real = way.tolerance > Span::ZERO;
-        let why = if real && way.late > way.tolerance {
-            Some(format!(
-                "the computer was late by {}: this may not be the drive's fault",
-                way.late
-            ))
-        } else if real && way.longest > way.tolerance {
-            Some(format!(
-                "a request and its reply took {} over the adapter: this may not be the drive's fault",
-                way.longest
-            ))
-        } else if let Some((node, register)) = unlike {
-            Some(format!(
-                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
-                 another firmware",
-                Register::of(*register).name
-            ))
-        } else {
-            self.left_open(own, way).map(|property| {
-                format!(
-                    "a correct drive with {property} does not meet it either, and this is not known"
-                )
-            })
-        };
-        match why {
-            None => outcome,
-            Some(why) => Outcome {
-                verdict: Verdict::Inconclusive,
-                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
-                ..outcome
+            (Verdict::Failed, Shown::Unknown(_)) if exact => match self.left_open(own) {
+                None => outcome,
+                Some(words) => inconclusive(
+                    outcome,
+                    format!(
+                        "a correct drive with {words} does not meet it either, and this is not known"
+                    ),
+                ),
             },
+            (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
+            (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || excused.is_some() => {
+                inconclusive(outcome, not_to_its_end(why))
+            }
+            _ => outcome.judged_by(&own.plan),
         }
     }
 
@@ -114,50 +86,18 @@ impl Player {
         Some(goes_on)
     }
 
-    /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
-    /// settled, the place of its clock, or times in which frames leave.
-    fn left_open(&self, own: &Own, way: LinkTimes) -> Option<String> {
-        let fails = |other: Other<'_>| {
-            let played = self.rehearse(own, &self.limits, other);
+    /// The first value of what the manual leaves open with which a correct drive does not meet the scenario either.
+    fn left_open(&self, own: &Own) -> Option<String> {
+        let fails = |other| {
+            let played = self.rehearse(own, &self.limits, Some(other));
             played.denied.is_some() || played.outcome.verdict != Verdict::Passed
         };
-        for phase in PHASES.map(|own| Span::from_micros(own * 1_000 / 32)) {
-            let other = Other {
-                phase,
-                ..Other::default()
-            };
-            if fails(other) {
-                return Some(format!("its clock of 1 ms ahead by {phase}"));
-            }
-        }
-        for slow in way.slow() {
-            let other = Other {
-                slow: Some(slow),
-                ..Other::default()
-            };
-            if fails(other) {
-                return Some(format!(
-                    "an adapter through which frames leave {} late",
-                    slow.by
-                ));
-            }
-        }
-        for (place, known) in self.known().iter().enumerate() {
-            for (words, other) in known.candidates() {
-                let drives = self.known().iter().enumerate();
-                let all: Vec<_> = drives
-                    .map(|(at, own)| if at == place { other } else { own.properties })
-                    .collect();
-                let other = Other {
-                    properties: Some(&all),
-                    ..Other::default()
-                };
-                if fails(other) {
-                    return Some(words);
-                }
-            }
-        }
-        None
+        let drives = self.known().iter().enumerate();
+        let mut all = drives.flat_map(|(place, known)| {
+            let each = known.candidates().into_iter();
+            each.map(move |(words, properties)| (words, (place, properties)))
+        });
+        all.find(|own| fails(own.1)).map(|own| own.0)
     }
 }
 
@@ -178,23 +118,24 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
     }
 }
 
-/// An attempt of which only the frames judge, and these were not compared.
-fn not_compared(outcome: Outcome) -> Outcome {
-    let why = "what came was not compared to its end: there are too many worlds, or something beside the bus has changed the drive";
+fn inconclusive(outcome: Outcome, why: String) -> Outcome {
     Outcome {
         verdict: Verdict::Inconclusive,
-        remarks: std::iter::once(why.to_owned())
-            .chain(outcome.remarks)
-            .collect(),
+        remarks: std::iter::once(why).chain(outcome.remarks).collect(),
         ..outcome
     }
 }
 
+fn not_to_its_end(why: &str) -> String {
+    format!("what came was not compared to its end: {why}")
+}
+
 /// An attempt in which the drives did what right ones do, and a line is not met since frames were late.
-fn right_but_late(outcome: Outcome) -> Outcome {
+fn right_but_late(outcome: Outcome, verdict: Verdict) -> Outcome {
     let found = outcome.finding.map(|own| own.message);
     let why = std::iter::once(LATE_ALONE.to_owned()).chain(found);
     Outcome {
+        verdict,
         finding: None,
         remarks: why.chain(outcome.remarks).collect(),
         ..outcome

@@ -1,12 +1,13 @@
 //! What came in an attempt, judged by right drives: whether one of them could have sent it.
 
+use super::super::Axis;
 use super::super::known::Known;
 use super::super::observed::Exchange;
 use super::Player;
 use crate::judge::World;
 use crate::language::written;
 use crate::simulate::DriveSetup;
-use harness_bench::qualify::worlds::{Dialogue, Judged, Timed, judge_alive};
+use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, judge_alive};
 use harness_bench::rig::segment::observed::LinkTimes;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -33,8 +34,8 @@ const WORSE: u64 = 3;
 /// FW-VERSION.
 const FIRMWARE: u8 = 0x1B;
 
-/// The second pair of identifiers, and the first.
-const IDENTIFIERS: [u8; 4] = [0x68, 0x69, 0x88, 0x89];
+/// The bits of an identifier (UNITEK 3.1).
+const MOST_IDENTIFIER: u32 = 0x7FF;
 
 /// Bits of D8 that show inputs, and the inputs one by one (UNITEK 4).
 const INPUT_BITS: u32 = 0x003F;
@@ -83,16 +84,24 @@ pub(super) enum Shown {
     Complete,
     /// Right drives could have sent all of it.
     Right,
-    /// It was not compared, or not to its end.
-    Unknown,
+    /// It was not compared, or not to its end, and why.
+    Unknown(&'static str),
 }
+
+/// Why what came is not compared to its end.
+const OTHER_IDENTIFIERS: &str = "two drives may have sent it";
+const NOT_AT_REST: &str = "the drive did not stand, or had the error of a time-out, before it";
+const CHANGED_INPUTS: &str = "an input has changed, or what an input is blamed for";
+const NOT_FORETOLD: &str = "what a right drive does here does not follow from what is known of it";
+pub(super) const BY_LINES: &str = "time is virtual, and its lines compare it";
+const TOO_MANY: &str = "it has more worlds than are kept";
 
 impl Shown {
     /// What several drives come to.
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Wrong(why), _) | (_, Self::Wrong(why)) => Self::Wrong(why),
-            (Self::Unknown, _) | (_, Self::Unknown) => Self::Unknown,
+            (Self::Unknown(why), _) | (_, Self::Unknown(why)) => Self::Unknown(why),
             (Self::Complete, Self::Complete) => Self::Complete,
             _ => Self::Right,
         }
@@ -103,14 +112,16 @@ impl Player {
     /// Whether right drives could have sent what came.
     pub(super) fn shown(&self, told: &Told) -> Shown {
         let each = self.known().iter().map(|known| self.shown_by(known, told));
-        each.reduce(Shown::and).unwrap_or(Shown::Unknown)
+        each.reduce(Shown::and)
+            .unwrap_or(Shown::Unknown(NOT_AT_REST))
     }
 
     fn shown_by(&self, known: &Known, told: &Told) -> Shown {
         let unlike = told.unlike(known);
         let talk = &told.talk;
-        let Some(came) = self.came_from(known, talk) else {
-            return Shown::Unknown;
+        let came = match self.came_from(known, talk) {
+            Ok(came) => came,
+            Err(why) => return Shown::Unknown(why),
         };
         let judged = |properties, late: Span, (overtakes, complete)| {
             let talk = Dialogue {
@@ -124,34 +135,41 @@ impl Player {
         for (late, overtakes) in told.lateness() {
             match judged(known.properties, late, (overtakes, true)) {
                 Judged::Right => return Shown::Complete,
-                Judged::TooMany | Judged::Unknown => return Shown::Unknown,
+                Judged::TooMany => return Shown::Unknown(TOO_MANY),
+                Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
                 Judged::Wrong(..) => {}
             }
         }
-        let others = || known.candidates().into_iter().map(|own| own.1);
+        let right = self.world(known, known.properties, &unlike);
+        let others = known.candidates().into_iter().map(|own| own.1);
+        let others = others.filter(|own| {
+            let other = self.world(known, *own, &unlike);
+            !say_the_same(&right, &other, told)
+        });
         let mut wrong = None;
-        for properties in std::iter::once(known.properties).chain(others()) {
+        for properties in std::iter::once(known.properties).chain(others) {
             match judged(properties, told.slowest(), (true, false)) {
                 Judged::Right => return Shown::Right,
-                Judged::TooMany | Judged::Unknown => return Shown::Unknown,
+                Judged::TooMany => return Shown::Unknown(TOO_MANY),
+                Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
                 Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
             }
         }
         let words = |(place, expected)| words(known, (&came, place), expected);
-        wrong.map_or(Shown::Unknown, |own| Shown::Wrong(words(own)))
+        wrong.map_or(Shown::Unknown(NOT_FORETOLD), |own| Shown::Wrong(words(own)))
     }
 
-    /// Whether a drive with a deviation could have sent what came from it in an attempt; true where that is not compared. Before the attempt
-    /// it has answered what the drives were asked at first, and some requests `more`.
+    /// Whether a drive with a deviation could have sent what came from it in an attempt; `None` where that is not compared. Before the attempt
+    /// it has answered what the drives were asked at first, and some requests `more`. A drive that says what a right one says could have sent it
+    /// unless that is `wrong`.
     pub(super) fn could_deviate(
         &self,
         known: &Known,
         (setup, more): (&DriveSetup, u8),
         shown: &Told,
-    ) -> bool {
-        let Some(mut came) = self.came_from(known, &shown.talk) else {
-            return true;
-        };
+        wrong: bool,
+    ) -> Option<bool> {
+        let mut came = self.came_from(known, &shown.talk).ok()?;
         // A frame that began before the first request had left belongs to what was before; stamps of adapters are not that exact.
         if let (Some((first, _)), Span::ZERO) = (shown.talk.sent.first(), shown.way.tolerance) {
             let least = |own: &Frame| self.rate.time_of(own.bits_to_acknowledge());
@@ -159,27 +177,38 @@ impl Player {
             let before = before.count();
             came.drain(..before);
         }
-        let mut drive = setup.drive(self.rate, Instant::START);
-        let more = std::iter::repeat_n(FIRMWARE, more.into());
-        for register in known.cells.keys().copied().chain(more) {
-            let request = Request::Read { register };
-            if let Ok(frame) = request.encode(known.axis.rx) {
-                drive.hear(Instant::START, &frame);
+        let world = |setup: &DriveSetup| {
+            let mut drive = setup.drive(self.rate, Instant::START);
+            let more = std::iter::repeat_n(FIRMWARE, more.into());
+            for register in known.cells.keys().copied().chain(more) {
+                let request = Request::Read { register };
+                if let Ok(frame) = request.encode(known.axis.rx) {
+                    drive.hear(Instant::START, &frame);
+                }
+                while drive.wants().is_some() {
+                    drive.sent(Instant::START);
+                }
             }
-            while drive.wants().is_some() {
-                drive.sent(Instant::START);
-            }
+            World::new(drive, shown.unlike(known), false)
+        };
+        let deviant = world(setup);
+        let right = world(&known.model(known.properties));
+        if say_the_same(&deviant, &right, shown) {
+            return Some(!wrong);
         }
-        let world = World::new(drive, shown.unlike(known), false);
-        shown.lateness().into_iter().any(|(late, overtakes)| {
+        for (late, overtakes) in shown.lateness() {
             let talk = Dialogue {
                 overtakes,
                 most_steps: STEPS_OF_A_NAME,
                 ..conversation(&shown.talk, &came, late)
             };
-            let judged = judge_alive(vec![world.clone()], &talk, &|| self.beats.beat());
-            !matches!(judged, Judged::Wrong(..))
-        })
+            match judge_alive(vec![deviant.clone()], &talk, &|| self.beats.beat()) {
+                Judged::Right => return Some(true),
+                Judged::Wrong(..) => {}
+                Judged::TooMany | Judged::Unknown => return None,
+            }
+        }
+        Some(false)
     }
 
     fn world(&self, known: &Known, properties: Properties, unlike: &Arc<BTreeSet<u8>>) -> World {
@@ -188,25 +217,36 @@ impl Player {
         World::new(drive, Arc::clone(unlike), homing)
     }
 
-    /// What came from a drive; `None` where that is not known, or where something beside the bus has changed the drive.
-    fn came_from(&self, known: &Known, talk: &Exchange) -> Option<Vec<(Instant, Instant, Frame)>> {
+    /// What came from a drive.
+    ///
+    /// # Errors
+    /// Why that is not known, or that something beside the bus has changed the drive.
+    fn came_from(
+        &self,
+        known: &Known,
+        talk: &Exchange,
+    ) -> Result<Vec<(Instant, Instant, Frame)>, &'static str> {
         let axis = known.axis;
-        let moved = talk.sent.iter().any(|(_, frame)| {
-            let rx = u16::try_from(frame.id().number()).unwrap_or(0);
-            matches!(Request::decode(frame, rx, Dlc4::As3),
-                Ok(Request::Write { register, .. }) if IDENTIFIERS.contains(&register))
-        });
+        let [receives, sends] = identifiers(axis, talk);
+        let others = self.axes.iter().filter(|own| **own != axis);
+        let shared = others
+            .flat_map(|own| identifiers(*own, talk).concat())
+            .any(|own| receives.contains(&own) || sends.contains(&own));
         let stands = known.cells.get(&0xF5).is_none_or(|own| own & 1 == 1);
         let timed_out = known.cell(0x8F) & ERROR_TIME_OUT != 0;
-        if moved || !stands || timed_out || known.cells.is_empty() {
-            return None;
+        if shared {
+            return Err(OTHER_IDENTIFIERS);
+        }
+        if !stands || timed_out || known.cells.is_empty() {
+            return Err(NOT_AT_REST);
         }
         let own = |came: &&(Instant, Instant, Frame)| {
-            came.2.id().number() == u32::from(axis.tx) && !came.2.id().is_extended()
+            sends.contains(&came.2.id().number()) && !came.2.id().is_extended()
         };
         let came: Vec<_> = talk.came.iter().filter(own).copied().collect();
         let changed = came.iter().any(|(_, _, frame)| {
-            let reply = Reply::decode(frame, axis.tx);
+            let tx = u16::try_from(frame.id().number()).unwrap_or(axis.tx);
+            let reply = Reply::decode(frame, tx);
             let differs = |own: &Reply| own.data.bits() ^ known.cell(own.register);
             reply.is_ok_and(|own| match own.register {
                 0x40 => {
@@ -218,8 +258,32 @@ impl Player {
                 register => INPUTS.contains(&register) && differs(&own) & 1 != 0,
             })
         });
-        (!changed).then_some(came)
+        match changed {
+            true => Err(CHANGED_INPUTS),
+            false => Ok(came),
+        }
     }
+}
+
+/// The identifiers in which a drive may receive and send in a conversation: those that it had and those that are written to it (UNITEK 3.1).
+fn identifiers(axis: Axis, talk: &Exchange) -> [Vec<u32>; 2] {
+    let [mut receives, mut sends] = [axis.rx, axis.tx].map(|own| vec![u32::from(own)]);
+    for (_, frame) in &talk.sent {
+        let id = frame.id().number();
+        let rx = u16::try_from(id).unwrap_or(0);
+        if let (true, Ok(Request::Write { register, data })) = (
+            receives.contains(&id),
+            Request::decode(frame, rx, Dlc4::As3),
+        ) {
+            let given = data.bits() & MOST_IDENTIFIER;
+            match register {
+                0x68 | 0x88 => receives.push(given),
+                0x69 | 0x89 => sends.push(given),
+                _ => {}
+            }
+        }
+    }
+    [receives, sends]
 }
 
 /// A conversation in which each frame may have been this late.
@@ -247,6 +311,33 @@ fn conversation(
         complete: false,
         most_steps: STEPS,
     }
+}
+
+/// What a drive says, and when, in a conversation in which every frame reaches it this late.
+fn said(mut drive: World, talk: &Exchange, late: Span) -> Vec<(Instant, Frame)> {
+    let mut said = Vec::new();
+    let end = (talk.read, None);
+    let sent = talk.sent.iter().map(|(at, frame)| (*at, Some(frame)));
+    for (at, frame) in sent.chain([end]) {
+        let at = at + late;
+        while let Some(due) = drive.due().filter(|due| *due < at) {
+            drive.advance(due);
+            said.extend(std::iter::from_fn(|| Some((due, drive.say()?))));
+        }
+        drive.advance(at);
+        frame.into_iter().for_each(|own| drive.hear(at, own));
+        said.extend(std::iter::from_fn(|| Some((at, drive.say()?))));
+    }
+    said
+}
+
+/// Whether two drives say the same in a conversation, with frames as late as they may be and without.
+fn say_the_same(one: &World, other: &World, told: &Told) -> bool {
+    let mut late = [Span::ZERO, told.slowest()].into_iter();
+    late.all(|late| {
+        let [one, other] = [one, other].map(|own| said(own.clone(), &told.talk, late));
+        one == other
+    })
 }
 
 /// What no right drive would have sent.
