@@ -2,7 +2,7 @@
 
 use super::note::kind;
 use super::rehearse::Other;
-use super::worlds::{Differs, right_slaves_send};
+use super::worlds::{Differs, right_slaves_send, right_slaves_send_or_lose};
 use super::{Left, Own, Player};
 use crate::rig::known::value_of;
 use crate::rig::observed::{Came, Turn};
@@ -17,6 +17,9 @@ use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
+
+/// In how many attempts at a scenario the line may have lost the same telegram or its reply.
+const LOST_BY_THE_LINE: usize = 2;
 
 impl Player {
     /// The outcome where the slaves could not be made ready.
@@ -75,7 +78,7 @@ impl Player {
     }
 
     /// The outcome where time is real: slaves are right if right ones could have sent what came, whatever the lines say of it.
-    fn judged_by_times(&self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
+    fn judged_by_times(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
         let turns = &left.turns;
         let late = left.way.late.max(left.way.longest);
         let not_shown = |why: &str| {
@@ -87,7 +90,17 @@ impl Player {
             Err(differs) if differs.torn => {
                 return not_shown("a stream has parted a telegram, and the next one met the reply");
             }
-            Err(differs) => return accused(outcome, &differs, turns),
+            Err(differs) => match self.lost(own, turns) {
+                None => return accused(outcome, &differs, turns),
+                Some(why) => {
+                    let remarks = std::iter::once(why).chain(outcome.remarks);
+                    return Outcome {
+                        verdict: Verdict::Inconclusive,
+                        remarks: remarks.collect(),
+                        ..outcome
+                    };
+                }
+            },
             Ok(()) => {}
         }
         let Some(finding) = &outcome.finding else {
@@ -117,6 +130,31 @@ impl Player {
             remarks: std::iter::once(remark).chain(outcome.remarks).collect(),
             ..outcome
         }
+    }
+
+    /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
+    /// there in two attempts before is not lost by the line.
+    fn lost(&mut self, own: &Own, turns: &[Turn]) -> Option<String> {
+        let lost = right_slaves_send_or_lose(self.known(), self.rate, turns, &self.beats).ok()?;
+        let first = turns.get(*lost.first()?)?;
+        let place = |number: usize| {
+            let step = turns.get(number).map(|own| own.step);
+            let same = turns[..number].iter().filter(|own| Some(own.step) == step);
+            (step.flatten(), same.count())
+        };
+        let before = self.lost.entry(own.name.clone()).or_default();
+        let mut again = false;
+        for number in lost {
+            let times = before.entry(place(number)).or_default();
+            *times += 1;
+            again |= *times > LOST_BY_THE_LINE;
+        }
+        (!again).then(|| {
+            format!(
+                "no whole reply came to {}: the line may have lost it, and all else is what right slaves send",
+                hex(&first.octets)
+            )
+        })
     }
 
     /// The same as [`Self::explained`], unless a slave was proven wrong before.

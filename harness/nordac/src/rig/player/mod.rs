@@ -47,7 +47,7 @@ use harness_proto::nordac::words::zsw;
 use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use harness_sim::nordac::History;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A scenario of this bus.
@@ -127,6 +127,8 @@ pub(crate) struct Player {
     unable: Option<String>,
     /// Whether the slaves are qualified.
     qualifies: bool,
+    /// How often something was lost behind a telegram, by scenario, and by step and place among its telegrams.
+    lost: BTreeMap<String, BTreeMap<(Option<usize>, usize), usize>>,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
     /// The attempts of a qualification.
@@ -158,6 +160,7 @@ impl Player {
             proven: false,
             unable: None,
             qualifies: false,
+            lost: BTreeMap::new(),
             beats: Beats::default(),
             notes: Vec::new(),
         }

@@ -49,6 +49,12 @@ const MOST_EVENTS: usize = 16;
 /// How often a window is halved in search of a time: after this number of halvings an hour is shorter than a bit.
 const HALVES: usize = 48;
 
+/// How many telegrams and replies a line loses in one attempt at most.
+const MOST_LOST: usize = 3;
+
+/// The most ways to lose them that are tried for one telegram.
+const MOST_WAYS: usize = 4;
+
 /// Where the slaves differ from what came.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Differs {
@@ -72,11 +78,33 @@ pub(super) fn right_slaves_send(
     turns: &[Turn],
     beats: &Beats,
 ) -> Result<(), Differs> {
+    right_slaves_lose(known, (rate, 0), turns, beats).map(|_| ())
+}
+
+/// The same over a line that may have lost telegrams or replies; returns behind which telegrams.
+///
+/// # Errors
+/// Where the slaves as they are known differ.
+pub(super) fn right_slaves_send_or_lose(
+    known: &[Known],
+    rate: BusRate,
+    turns: &[Turn],
+    beats: &Beats,
+) -> Result<Vec<usize>, Differs> {
+    right_slaves_lose(known, (rate, MOST_LOST), turns, beats)
+}
+
+fn right_slaves_lose(
+    known: &[Known],
+    (rate, most_lost): (BusRate, usize),
+    turns: &[Turn],
+    beats: &Beats,
+) -> Result<Vec<usize>, Differs> {
     let send = |all: &Assumed| {
         beats.beat();
         let slaves = known.iter().zip(all);
         let slaves: Vec<_> = slaves.map(|(known, own)| known.model(*own)).collect();
-        could_send(&slaves, rate, turns)
+        World::new(&slaves, rate).plays(turns, 0, most_lost)
     };
     let base: Assumed = known.iter().map(|own| own.properties).collect();
     let first = send(&base);
@@ -84,16 +112,16 @@ pub(super) fn right_slaves_send(
         return first;
     }
     let may = |place: usize, property: &Description| !known[place].is_settled(property);
-    match search(&base, may, |all| agreement(&send(all))).is_empty() {
-        true => first,
-        false => Ok(()),
+    match search(&base, may, |all| agreement(&send(all))).first() {
+        None => first,
+        Some((_, all)) => send(all),
     }
 }
 
 /// How far slaves send what came.
-fn agreement(found: &Result<(), Differs>) -> Agreement {
+fn agreement(found: &Result<Vec<usize>, Differs>) -> Agreement {
     match found {
-        Ok(()) => WHOLE,
+        Ok(_) => WHOLE,
         Err(own) => own.turn * 1024 + own.agreed.min(1023),
     }
 }
@@ -107,34 +135,7 @@ pub(super) fn could_send(
     rate: BusRate,
     turns: &[Turn],
 ) -> Result<(), Differs> {
-    let remembers = slaves.iter().any(|own| !own.history.faults.is_empty());
-    let slaves = slaves.iter().map(|own| own.drive(HEARD_AT, Instant::START));
-    let mut world = World {
-        slaves: slaves.collect(),
-        own: match remembers {
-            true => &OWN,
-            false => &OWN[..OWN.len() - FAULT_MEMORY],
-        },
-        rate,
-        free: Instant::START,
-        ahead: (0, 0),
-        owed: Vec::new(),
-        torn: false,
-        actual: None,
-    };
-    for (number, turn) in turns.iter().enumerate() {
-        let next = turns.get(number + 1);
-        world = world.takes(number, turn, next)?;
-    }
-    match world.owed.is_empty() {
-        true => Ok(()),
-        false => Err(Differs {
-            turn: turns.len().saturating_sub(1),
-            wanted: world.owed,
-            agreed: 0,
-            torn: world.torn,
-        }),
-    }
+    World::new(slaves, rate).plays(turns, 0, 0).map(|_| ())
 }
 
 /// Slaves as they may be.
@@ -149,7 +150,7 @@ struct World {
     /// By how much the time of the slaves is ahead of the bench's, at least and at most, in units.
     ahead: (i64, i64),
     /// What they have sent and the bench has not read: a computer that stood still reads it behind its next telegram.
-    owed: Vec<u8>,
+    owed: Vec<Vec<u8>>,
     /// The bench has not waited for it: more octets than a telegram's had left, which a slave answers where a stream parts them.
     torn: bool,
     /// The actual value that came last.
@@ -169,23 +170,109 @@ fn behind(at: Instant, before: Instant) -> i64 {
 }
 
 impl World {
+    fn new(slaves: &[SlaveSetup], rate: BusRate) -> Self {
+        let remembers = slaves.iter().any(|own| !own.history.faults.is_empty());
+        let slaves = slaves.iter().map(|own| own.drive(HEARD_AT, Instant::START));
+        Self {
+            slaves: slaves.collect(),
+            own: match remembers {
+                true => &OWN,
+                false => &OWN[..OWN.len() - FAULT_MEMORY],
+            },
+            rate,
+            free: Instant::START,
+            ahead: (0, 0),
+            owed: Vec::new(),
+            torn: false,
+            actual: None,
+        }
+    }
+
+    /// Takes the telegrams from a place on, of which the line may have lost some, or their replies; returns which.
+    ///
+    /// # Errors
+    /// The first reply that the slaves cannot have sent.
+    fn plays(self, turns: &[Turn], from: usize, most_lost: usize) -> Result<Vec<usize>, Differs> {
+        let mut world = self;
+        for (number, turn) in turns.iter().enumerate().skip(from) {
+            let differs = match world.takes(number, turn, turns.get(number + 1)) {
+                Ok(own) => {
+                    world = own;
+                    continue;
+                }
+                Err(differs) => differs,
+            };
+            if most_lost == 0 {
+                return Err(differs);
+            }
+            let soon = world.soon(turn);
+            let (mut heard, reply) = world.hears(&turn.octets, soon);
+            let (from, until) = world.window(turn, turns.get(number + 1));
+            heard.ahead = (behind(soon, until), behind(soon, from));
+            let sent = [&world.owed[..], &[reply]].concat();
+            let unheard = turn.came.is_empty().then(|| (1, world.clone()));
+            let damaged = damages(&sent, &turn.came).into_iter();
+            let damaged = damaged.map(|(lost, owed)| {
+                let world = heard.clone();
+                (lost, Self { owed, ..world })
+            });
+            // Where a motor moves, what is left of a reply need not be that of this moment.
+            let garbled = (!are_whole(&turn.came)).then(|| (1, heard.clone().owing_nothing()));
+            let ways: Vec<_> = damaged.chain(garbled).chain(unheard).collect();
+            for (lost, own) in ways.into_iter().filter(|own| own.0 <= most_lost) {
+                let next = number + 1;
+                if let Ok(more) = own.plays(turns, next, most_lost - lost) {
+                    return Ok((next.saturating_sub(lost)..next).chain(more).collect());
+                }
+            }
+            return Err(differs);
+        }
+        let owing = world.owed.len();
+        match owing <= most_lost {
+            true => Ok((turns.len() - owing..turns.len()).collect()),
+            false => Err(Differs {
+                turn: turns.len().saturating_sub(1),
+                wanted: world.owed.concat(),
+                agreed: 0,
+                torn: world.torn,
+            }),
+        }
+    }
+
+    fn owing_nothing(mut self) -> Self {
+        self.owed.clear();
+        self
+    }
+
+    /// When a telegram has reached the slaves, if it has done so at once.
+    fn soon(&self, turn: &Turn) -> Instant {
+        let octets = HEARD_AT.octet_time() * turn.octets.len() as u64;
+        let least = self.free + HEARD_AT.bit_time() * SYN_BITS + octets;
+        least.max(turn.left + SWITCHED_ON)
+    }
+
+    /// When a telegram has reached the slaves at the earliest and at the latest, on the bench's clock.
+    fn window(&self, turn: &Turn, next: Option<&Turn>) -> (Instant, Instant) {
+        let left = turn.left + SWITCHED_ON;
+        let read = turn.read.or(next.map(|own| own.left));
+        let until = read.map_or(left, |own| (own + SWITCHED_ON).max(left));
+        // A stream is not as slow as a line.
+        (
+            left - self.rate.octet_time() * turn.octets.len() as u64,
+            until,
+        )
+    }
+
     /// The slaves behind a telegram and what came to it.
     fn takes(&self, number: usize, turn: &Turn, next: Option<&Turn>) -> Result<Self, Differs> {
         let octets = turn.octets.len() as u64;
-        let length = self.rate.octet_time() * octets;
-        let idle = HEARD_AT.bit_time() * SYN_BITS;
-        let least = self.free + idle + HEARD_AT.octet_time() * octets;
-        let left = turn.left + SWITCHED_ON;
-        // A stream is not as slow as a line.
-        let from = left - length;
-        let read = turn.read.or(next.map(|own| own.left));
-        let until = read.map_or(left, |own| (own + SWITCHED_ON).max(left));
-        let soon = left.max(least);
+        let least = self.free + HEARD_AT.bit_time() * SYN_BITS + HEARD_AT.octet_time() * octets;
+        let (from, until) = self.window(turn, next);
+        let soon = self.soon(turn);
         let (mut world, reply) = self.hears(&turn.octets, soon);
         if turn.step.is_none() {
-            world.owed.clear();
             world.ahead = (behind(soon, until), behind(soon, from));
-            return Ok(world);
+            return Ok(world.owing_nothing());
         }
         let first = moved(from - CYCLE, self.ahead.0).max(least);
         let last = moved(until + CYCLE, self.ahead.1).max(first);
@@ -201,14 +288,20 @@ impl World {
             if self.sends(&late, turn) {
                 world.ahead = (behind(at, until), behind(at, from));
             }
-            world.owed.clear();
             world.actual = actual(&turn.came).or(self.actual);
-            return Ok(world);
+            return Ok(world.owing_nothing());
         }
-        let sent = [&self.owed[..], &reply].concat();
+        let sent = [&self.owed.concat()[..], &reply].concat();
         let came: Vec<u8> = turn.came.iter().map(|own| *own as u8).collect();
         if next.is_some() && sent.starts_with(&came) && turn.came.iter().all(|own| *own < 0x100) {
-            world.owed = sent[came.len()..].to_vec();
+            world.owed.push(reply);
+            let mut came = came.len();
+            world.owed.retain_mut(|own| {
+                let part = came.min(own.len());
+                came -= part;
+                own.drain(..part);
+                !own.is_empty()
+            });
             return Ok(world);
         }
         let pairs = sent.iter().zip(&turn.came);
@@ -223,7 +316,7 @@ impl World {
 
     /// Whether a reply, behind what is owed, is what came.
     fn sends(&self, reply: &[u8], turn: &Turn) -> bool {
-        let sent = wide(&[&self.owed[..], reply].concat());
+        let sent = wide(&[&self.owed.concat()[..], reply].concat());
         let alike = || {
             let sent = self.without_own(&sent)?;
             Some(sent == self.without_own(&turn.came)?)
@@ -457,161 +550,70 @@ impl Moving {
     }
 }
 
+/// How many of the replies that were sent a line may have damaged so that this came, and what is left of them to come: it has lost octets one
+/// behind the other, or changed them.
+fn damages(sent: &[Vec<u8>], came: &[u16]) -> Vec<(usize, Vec<Vec<u8>>)> {
+    let numbered = sent.iter().enumerate();
+    let octets: Vec<(usize, u16)> = numbered
+        .flat_map(|(reply, own)| own.iter().map(move |octet| (reply, u16::from(*octet))))
+        .collect();
+    let pairs = octets.iter().zip(came);
+    let whole = pairs.take_while(|(sent, came)| sent.1 == **came).count();
+    let alike = |from: usize, came: &[u16]| {
+        let sent = octets.get(from..from + came.len()).unwrap_or_default();
+        let mut pairs = sent.iter().zip(came);
+        sent.len() == came.len() && pairs.all(|(sent, came)| sent.1 == *came || *came >= 0x100)
+    };
+    let left = |from: usize| -> Vec<Vec<u8>> {
+        let left = octets.get(from..).unwrap_or_default();
+        let replies = left.chunk_by(|one, other| one.0 == other.0);
+        let octets = |own: &[(usize, u16)]| own.iter().map(|own| own.1 as u8).collect();
+        replies.map(octets).collect()
+    };
+    let touched = |from: usize, to: usize| {
+        let own = octets.get(from..to).unwrap_or_default();
+        own.chunk_by(|one, other| one.0 == other.0).count()
+    };
+    if octets.is_empty() {
+        return Vec::new();
+    }
+    let rest = &came[whole..];
+    let changed = !rest.is_empty() && alike(whole + 1, &rest[1..]);
+    let mut ways = Vec::new();
+    // The loss begins where something else came, or with a reply before that.
+    let begins = |own: &usize| *own == whole || *own == 0 || octets[*own - 1].0 != octets[*own].0;
+    for from in (0..=whole).filter(begins) {
+        let rest = &came[from..];
+        // Where nothing else came, the end was lost: that it comes later was looked at.
+        let first = if rest.is_empty() {
+            octets.len()
+        } else {
+            from + 1
+        };
+        let behind = (first..=octets.len()).filter(|own| alike(*own, rest));
+        ways.extend(behind.map(|own| (touched(from, own), left(own + rest.len()))));
+    }
+    ways.extend(changed.then(|| (1, left(came.len()))));
+    ways.sort_by_key(|own| own.0 + own.1.len());
+    ways.dedup();
+    ways.truncate(MOST_WAYS);
+    ways
+}
+
+/// Whether octets are telegrams without a line error, and nothing else.
+fn are_whole(octets: &[u16]) -> bool {
+    let own: Vec<u8> = octets.iter().map(|own| *own as u8).collect();
+    let mut rest = &own[..];
+    while let Decoded::Value { used, .. } = Telegram::decode(rest) {
+        rest = &rest[used..];
+    }
+    rest.is_empty() && octets.iter().all(|own| *own < 0x100)
+}
+
 /// Octets as they come without a line error.
 fn wide(octets: &[u8]) -> Vec<u16> {
     octets.iter().map(|own| u16::from(*own)).collect()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::rehearse::Other;
-    use super::super::{Own, Player};
-    use super::*;
-    use crate::rig::RigSlave;
-    use harness_bench::scenario::source::Source;
-    use harness_proto::nordac::guard::Limits;
-    use harness_sim::nordac::deviation::deviation;
-
-    /// Up to 25 % in 1.25 s, down by OFF3, a fault by 1625, and a parameter that follows the motor.
-    const RUN: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8\nexchange 8 STW=047F\nexchange 8\n\
-        wait 300ms\nexchange 8\nwait 400ms\nexchange 8\nread 8 1813\nwait 1s\nexchange 8\nexchange 8 STW=045F HSW=50%\nwait 200ms\n\
-        exchange 8\nexchange 8 STW=047F\nwait 300ms\nexchange 8\nexchange 8 STW=047E\nwait 200ms\nexchange 8\nwait 3s\nexchange 8\nexchange 8 STW=047F\n\
-        exchange 8 STW=047E\nexchange 8 STW=047F\nwait 500ms\nexchange 8 STW=047B\nwait 50ms\nexchange 8\nwait 1s\nexchange 8\n\
-        read 8 1801\nread 8 1802\nread 8 1202\nexchange 8\n";
-
-    fn known(parameters: &[(u16, u32)]) -> Known {
-        let mut known = Known::new(RigSlave {
-            address: 8,
-            ppo: Some(PpoType::One),
-        });
-        let values = parameters.iter().map(|(number, raw)| ((*number, 0), *raw));
-        known.values = [((1621, 0), 2), ((1615, 0), 20)]
-            .into_iter()
-            .chain(values)
-            .collect();
-        known
-    }
-
-    /// The telegrams of a run with a slave.
-    fn turns(slave: &Known) -> Vec<Turn> {
-        let source = Source {
-            name: "x".to_owned(),
-            text: RUN.into(),
-        };
-        let own = Own::read(&source).expect("a scenario");
-        let limits = Limits::unlimited();
-        let patience = Span::from_millis(5);
-        let able = (Vec::new(), false);
-        let mut player = Player::of(vec![slave.slave], BusRate::K500, patience, limits, able);
-        player.known = Some(vec![slave.clone()]);
-        player.rehearse(&own, &limits, Other::default()).turns
-    }
-
-    fn judged(turns: &[Turn]) -> Result<(), Differs> {
-        right_slaves_send(&[known(&[])], BusRate::K500, turns, &Beats::default())
-    }
-
-    /// A right slave is not accused, however late the computer hands over a telegram, or reads what comes to it.
-    #[test]
-    fn a_computer_that_stands_still_accuses_no_slave() {
-        let right = turns(&known(&[]));
-        assert_eq!(judged(&right), Ok(()));
-        for place in 0..right.len() {
-            for millis in [1, 30, 300, 2_000] {
-                let pause = Span::from_millis(millis);
-                // The telegram had left long before it reached the slave.
-                let mut early = right.clone();
-                let before = place.checked_sub(1).and_then(|own| right[own].read);
-                early[place].left = (right[place].left - pause).max(before.unwrap_or_default());
-                assert_eq!(judged(&early), Ok(()), "{place} {millis}");
-                // The reply was read long behind it was there.
-                let mut late = right.clone();
-                late[place].read = late[place].read.map(|own| own + pause);
-                for own in &mut late[place + 1..] {
-                    own.left += pause;
-                    own.read = own.read.map(|own| own + pause);
-                }
-                let moves = |own: &Turn| actual(&own.came).is_some_and(|own| own != 0);
-                // What moves has gone on.
-                let rests = place + 1 >= right.len() || !moves(&right[place + 1]);
-                assert!(
-                    !rests || judged(&late).is_ok(),
-                    "{place} {millis} {:?}",
-                    judged(&late)
-                );
-            }
-        }
-    }
-
-    /// A reply that the computer has read behind its next telegram.
-    #[test]
-    fn a_reply_may_be_read_late() {
-        let mut late = turns(&known(&[]));
-        let place = late.len() - 2;
-        let came = std::mem::take(&mut late[place].came);
-        late[place].read = None;
-        late[place + 1].came.splice(0..0, came);
-        assert_eq!(judged(&late), Ok(()));
-        late[place + 1].came.clear();
-        assert!(judged(&late).is_err());
-    }
-
-    /// NORDAC 3.3, 5.1, 5.5: a ramp in another time, a stop by another ramp, another time of the quick stop.
-    #[test]
-    fn a_ramp_in_another_time_is_found() {
-        for (number, raw) in [
-            (1202, 80),
-            (1202, 120),
-            (1203, 50),
-            (1203, 200),
-            (1615, 10),
-            (1205, 650),
-        ] {
-            let wrong = turns(&known(&[(number, raw)]));
-            assert!(judged(&wrong).is_err(), "{number} = {raw}");
-        }
-    }
-
-    /// NORDAC 5.7: only its last fault is known of a slave that had some.
-    #[test]
-    fn earlier_faults_are_not_known() {
-        let faults = |faults: &[u8]| {
-            let mut slave = known(&[]);
-            slave.history.faults = faults.to_vec();
-            slave
-        };
-        let beats = Beats::default();
-        let came = turns(&faults(&[3, 5, 10]));
-        let last = faults(&[10]);
-        assert_eq!(
-            right_slaves_send(std::slice::from_ref(&last), BusRate::K500, &came, &beats),
-            Ok(())
-        );
-        assert!(judged(&came).is_err());
-        // All else is compared.
-        let mut other = faults(&[3, 5, 10]);
-        other.values.insert((1202, 0), 80);
-        assert!(right_slaves_send(&[last], BusRate::K500, &turns(&other), &beats).is_err());
-    }
-
-    /// What no line of a scenario asks for is compared.
-    #[test]
-    fn deviations_are_found_without_a_line() {
-        let right = turns(&known(&[]));
-        for name in [
-            "directions-exchanged",
-            "values-of-one-more",
-            "answers-without-number",
-            "pzd-low-byte-first",
-        ] {
-            let deviation = deviation(name);
-            assert!(deviation.is_some(), "{name}");
-            let mut slave = known(&[]).model(Default::default());
-            slave.deviation = deviation;
-            assert!(
-                could_send(&[slave], BusRate::K500, &right).is_err(),
-                "{name}"
-            );
-        }
-    }
-}
+mod tests;

@@ -1,0 +1,198 @@
+//! Right inverters over every way to a bench, and wrong ones.
+
+use super::super::rehearse::Other;
+use super::super::{Own, Player};
+use super::*;
+use crate::rig::RigSlave;
+use harness_bench::scenario::source::Source;
+use harness_proto::nordac::guard::Limits;
+use harness_sim::nordac::deviation::deviation;
+
+/// Up to 25 % in 1.25 s, down by OFF3, a fault by 1625, and a parameter that follows the motor.
+const RUN: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8\nexchange 8 STW=047F\nexchange 8\n\
+    wait 300ms\nexchange 8\nwait 400ms\nexchange 8\nread 8 1813\nwait 1s\nexchange 8\nexchange 8 STW=045F HSW=50%\nwait 200ms\n\
+    exchange 8\nexchange 8 STW=047F\nwait 300ms\nexchange 8\nexchange 8 STW=047E\nwait 200ms\nexchange 8\nwait 3s\nexchange 8\nexchange 8 STW=047F\n\
+    exchange 8 STW=047E\nexchange 8 STW=047F\nwait 500ms\nexchange 8 STW=047B\nwait 50ms\nexchange 8\nwait 1s\nexchange 8\n\
+    read 8 1801\nread 8 1802\nread 8 1202\nexchange 8\n";
+
+fn known(parameters: &[(u16, u32)]) -> Known {
+    let mut known = Known::new(RigSlave {
+        address: 8,
+        ppo: Some(PpoType::One),
+    });
+    let values = parameters.iter().map(|(number, raw)| ((*number, 0), *raw));
+    known.values = [((1621, 0), 2), ((1615, 0), 20)]
+        .into_iter()
+        .chain(values)
+        .collect();
+    known
+}
+
+/// The telegrams of a run with a slave.
+fn turns(slave: &Known) -> Vec<Turn> {
+    let source = Source {
+        name: "x".to_owned(),
+        text: RUN.into(),
+    };
+    let own = Own::read(&source).expect("a scenario");
+    let limits = Limits::unlimited();
+    let patience = Span::from_millis(5);
+    let able = (Vec::new(), false);
+    let mut player = Player::of(vec![slave.slave], BusRate::K500, patience, limits, able);
+    player.known = Some(vec![slave.clone()]);
+    player.rehearse(&own, &limits, Other::default()).turns
+}
+
+fn judged(turns: &[Turn]) -> Result<(), Differs> {
+    right_slaves_send(&[known(&[])], BusRate::K500, turns, &Beats::default())
+}
+
+/// A right slave is not accused, however late the computer hands over a telegram, or reads what comes to it.
+#[test]
+fn a_computer_that_stands_still_accuses_no_slave() {
+    let right = turns(&known(&[]));
+    assert_eq!(judged(&right), Ok(()));
+    for place in 0..right.len() {
+        for millis in [1, 30, 300, 2_000] {
+            let pause = Span::from_millis(millis);
+            // The telegram had left long before it reached the slave.
+            let mut early = right.clone();
+            let before = place.checked_sub(1).and_then(|own| right[own].read);
+            early[place].left = (right[place].left - pause).max(before.unwrap_or_default());
+            assert_eq!(judged(&early), Ok(()), "{place} {millis}");
+            // The reply was read long behind it was there.
+            let mut late = right.clone();
+            late[place].read = late[place].read.map(|own| own + pause);
+            for own in &mut late[place + 1..] {
+                own.left += pause;
+                own.read = own.read.map(|own| own + pause);
+            }
+            let moves = |own: &Turn| actual(&own.came).is_some_and(|own| own != 0);
+            // What moves has gone on.
+            let rests = place + 1 >= right.len() || !moves(&right[place + 1]);
+            assert!(
+                !rests || judged(&late).is_ok(),
+                "{place} {millis} {:?}",
+                judged(&late)
+            );
+        }
+    }
+}
+
+/// A reply that the computer has read behind its next telegram.
+#[test]
+fn a_reply_may_be_read_late() {
+    let mut late = turns(&known(&[]));
+    let place = late.len() - 2;
+    let came = std::mem::take(&mut late[place].came);
+    late[place].read = None;
+    late[place + 1].came.splice(0..0, came);
+    assert_eq!(judged(&late), Ok(()));
+    late[place + 1].came.clear();
+    assert!(judged(&late).is_err());
+}
+
+/// NORDAC 3.3, 5.1, 5.5: a ramp in another time, a stop by another ramp, another time of the quick stop.
+#[test]
+fn a_ramp_in_another_time_is_found() {
+    for (number, raw) in [
+        (1202, 80),
+        (1202, 120),
+        (1203, 50),
+        (1203, 200),
+        (1615, 10),
+        (1205, 650),
+    ] {
+        let wrong = turns(&known(&[(number, raw)]));
+        assert!(judged(&wrong).is_err(), "{number} = {raw}");
+    }
+}
+
+/// NORDAC 5.7: only its last fault is known of a slave that had some.
+#[test]
+fn earlier_faults_are_not_known() {
+    let faults = |faults: &[u8]| {
+        let mut slave = known(&[]);
+        slave.history.faults = faults.to_vec();
+        slave
+    };
+    let beats = Beats::default();
+    let came = turns(&faults(&[3, 5, 10]));
+    let last = faults(&[10]);
+    assert_eq!(
+        right_slaves_send(std::slice::from_ref(&last), BusRate::K500, &came, &beats),
+        Ok(())
+    );
+    assert!(judged(&came).is_err());
+    // All else is compared.
+    let mut other = faults(&[3, 5, 10]);
+    other.values.insert((1202, 0), 80);
+    assert!(right_slaves_send(&[last], BusRate::K500, &turns(&other), &beats).is_err());
+}
+
+/// What no line of a scenario asks for is compared.
+#[test]
+fn deviations_are_found_without_a_line() {
+    let right = turns(&known(&[]));
+    for name in [
+        "directions-exchanged",
+        "values-of-one-more",
+        "answers-without-number",
+        "pzd-low-byte-first",
+    ] {
+        let deviation = deviation(name);
+        assert!(deviation.is_some(), "{name}");
+        let mut slave = known(&[]).model(Default::default());
+        slave.deviation = deviation;
+        assert!(
+            could_send(&[slave], BusRate::K500, &right).is_err(),
+            "{name}"
+        );
+    }
+}
+
+/// A line that loses a telegram or a reply, or damages one, accuses no slave; a reply that came whole and is wrong does.
+#[test]
+fn a_line_that_loses_something_accuses_no_slave() {
+    let all = [known(&[])];
+    let right = turns(&all[0]);
+    let lossy = |turns: &[Turn]| {
+        let beats = Beats::default();
+        right_slaves_send_or_lose(&all, BusRate::K500, turns, &beats)
+    };
+    assert_eq!(lossy(&right), Ok(Vec::new()));
+    let played = |own: &&usize| right[**own].step.is_some() && !right[**own].came.is_empty();
+    let places: Vec<_> = (0..right.len()).collect();
+    for place in places.iter().filter(played).copied() {
+        let mut lost = right.clone();
+        lost[place].came.clear();
+        lost[place].read = None;
+        let mut cut = right.clone();
+        cut[place].came.pop();
+        let mut changed = right.clone();
+        changed[place].came[0] ^= 1;
+        // The bench does not wait for what comes behind the damage.
+        let mut slipped = right.clone();
+        let mut came = slipped[place].came.split_off(1);
+        came.drain(..came.len().min(1));
+        if let Some(next) = slipped.get_mut(place + 1) {
+            next.came.splice(0..0, came);
+        }
+        for (way, own) in [lost, cut, changed, slipped].iter().enumerate() {
+            // The place is that of the next telegram where both replies are the same; what has slipped whole was late.
+            let found = lossy(own);
+            let least = usize::from(way < 3);
+            let one = found
+                .as_ref()
+                .is_ok_and(|own| (least..=1).contains(&own.len()));
+            assert!(one, "{place}, {way}: {found:?}");
+        }
+    }
+    // Too many are none of the line's.
+    let mut silent = right.clone();
+    for own in silent.iter_mut().filter(|own| own.step.is_some()) {
+        own.came.clear();
+    }
+    assert!(lossy(&silent).is_err());
+    assert!(lossy(&turns(&known(&[(1202, 80)]))).is_err());
+}
