@@ -33,6 +33,16 @@ const CONSTANT: [u8; 2] = [0x1B, 0xD9];
 /// What the drive makes of its inputs, its errors and its commands: ready, running, no fault, brake (ex 11, dump).
 const LOGIC: [u8; 4] = [0xE2, 0xE3, 0xEF, 0xF2];
 
+/// The position, and how far one may be off that of the model while the axis has not moved: 1 % of a turn (App 6; our choice).
+const POSITION: u8 = 0x6D;
+const POSITION_BAND: i64 = 655;
+
+/// Whether the position is in tolerance (ex 12).
+const IN_TOLERANCE: u8 = 0xF4;
+
+/// The scale of the speed, which is what C8 holds (App 7).
+const SCALE: u8 = 0xCE;
+
 /// Inputs, in conversations in which none of them changes (UNITEK 4).
 const INPUT: std::ops::RangeInclusive<u8> = 0xE4..=0xE8;
 
@@ -141,6 +151,9 @@ impl World {
             own if CURRENTS.contains(&own) && self.drive().control() == Control::Torque => {
                 Some(Compared::Near(CURRENT_BAND))
             }
+            SCALE => Some(Compared::Bits(!0)),
+            POSITION if !self.astray => Some(Compared::Near(POSITION_BAND)),
+            IN_TOLERANCE if !self.astray && !moves => Some(Compared::Bits(!0)),
             // The speed alone decides it.
             0xF5 if (self.speed().abs() - 328).abs() > SPEED_BAND => Some(Compared::Bits(!0)),
             0x40 => Some(Compared::Bits(match self.astray {
