@@ -7,8 +7,9 @@ use super::held::{is_live, takes_writes};
 use harness_bench::qualify::worlds::RightDrive;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::words::{ERRORS_NOT_READY, MODE_EVENT, MODE_LOCK, status};
-use harness_proto::unitek::{Register, Reply};
+use harness_proto::unitek::{Register, Reply, Request};
 use harness_sim::segment::Station as _;
 use harness_sim::unitek::deviation::Deviant;
 use harness_sim::unitek::{Cause, Control, Drive};
@@ -35,6 +36,7 @@ const LOGIC: [u8; 4] = [0xE2, 0xE3, 0xEF, 0xF2];
 
 /// The position, and how far one may be off that of the model while the axis has not moved: 1 % of a turn (App 6; our choice).
 const POSITION: u8 = 0x6D;
+const PRESET: u8 = 0x7A;
 const POSITION_BAND: i64 = 655;
 
 /// Whether the position is in tolerance (ex 12).
@@ -76,6 +78,8 @@ pub(crate) struct World {
     unlike: Arc<BTreeSet<u8>>,
     /// Its axis has moved, and where it stands now depends on when it was told to.
     astray: bool,
+    /// Whether its position is known: it was set in this conversation, by POS_PRESET (App 6) or by homing.
+    placed: bool,
     /// Whether it is known how long homing takes, and whether homing ran before the last step.
     homing: (bool, bool),
     /// What it sends now, and whether a request asked for it.
@@ -102,6 +106,7 @@ impl World {
             drive,
             unlike,
             astray: false,
+            placed: false,
             homing: (homing_is_known, false),
             said: VecDeque::new(),
             asked: false,
@@ -133,6 +138,7 @@ impl World {
         }
         // At its end the axis stands where 72 says (ex 12).
         let homed = self.homing.1 && !self.drive().is_homing() && self.drive().is_enabled();
+        self.placed |= homed;
         self.homing.1 = self.drive().is_homing();
         self.astray = self.speed() != 0 || self.astray && !homed;
     }
@@ -152,7 +158,7 @@ impl World {
                 Some(Compared::Near(CURRENT_BAND))
             }
             SCALE => Some(Compared::Bits(!0)),
-            POSITION if !self.astray => Some(Compared::Near(POSITION_BAND)),
+            POSITION if self.placed && !self.astray => Some(Compared::Near(POSITION_BAND)),
             IN_TOLERANCE if !self.astray && !moves => Some(Compared::Bits(!0)),
             // The speed alone decides it.
             0xF5 if (self.speed().abs() - 328).abs() > SPEED_BAND => Some(Compared::Bits(!0)),
@@ -190,6 +196,9 @@ impl RightDrive for World {
     }
 
     fn hear(&mut self, at: Instant, piece: &Frame) {
+        let rx = self.drive().identifiers().0;
+        let request = Request::decode(piece, rx, Dlc4::As3);
+        self.placed |= matches!(request, Ok(Request::Write { register, .. }) if register == PRESET);
         self.drive.hear(at, piece);
         self.speak(at);
         let mut held = DefaultHasher::new();
@@ -249,6 +258,9 @@ impl RightDrive for World {
         let place = place.map_or(1, |own| u64::from(own) << 1);
         // The destination alone changes without a frame, at the end of homing.
         let place = place ^ u64::from(self.cell(0x6E)) << 31;
-        self.drive.state() ^ self.held ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        self.drive.state()
+            ^ self.held
+            ^ u64::from(self.placed)
+            ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15)
     }
 }

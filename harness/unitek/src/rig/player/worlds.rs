@@ -13,7 +13,7 @@ use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Dlc4, Properties};
 use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS_NOT_READY, status};
-use harness_proto::unitek::{Reply, Request};
+use harness_proto::unitek::{Register, Reply, Request};
 use harness_sim::segment::Station as _;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -36,6 +36,9 @@ const FIRMWARE: u8 = 0x1B;
 
 /// The bits of an identifier (UNITEK 3.1).
 const MOST_IDENTIFIER: u32 = 0x7FF;
+
+/// Registers that are compared only where they held at first what a model holds: the scale of the speed and the tolerance.
+const READ_AT_FIRST: [u8; 2] = [0xCE, 0xF4];
 
 /// Bits of D8 that show inputs, and the inputs one by one (UNITEK 4).
 const INPUT_BITS: u32 = 0x003F;
@@ -67,11 +70,6 @@ impl Told {
     /// How late a frame may be at most.
     fn slowest(&self) -> Span {
         (self.measured() * WORSE).max(self.way.tolerance)
-    }
-
-    fn unlike(&self, known: &Known) -> Arc<BTreeSet<u8>> {
-        let own = self.unlike.iter().filter(|own| own.0 == known.axis.node);
-        Arc::new(own.map(|own| own.1).collect())
     }
 }
 
@@ -117,7 +115,7 @@ impl Player {
     }
 
     fn shown_by(&self, known: &Known, told: &Told) -> Shown {
-        let unlike = told.unlike(known);
+        let unlike = self.unlike(known, told);
         let talk = &told.talk;
         let came = match self.came_from(known, talk) {
             Ok(came) => came,
@@ -189,7 +187,7 @@ impl Player {
                     drive.sent(Instant::START);
                 }
             }
-            World::new(drive, shown.unlike(known), false)
+            World::new(drive, self.unlike(known, shown), false)
         };
         let deviant = world(setup);
         let right = world(&known.model(known.properties));
@@ -209,6 +207,20 @@ impl Player {
             }
         }
         Some(false)
+    }
+
+    /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model.
+    fn unlike(&self, known: &Known, told: &Told) -> Arc<BTreeSet<u8>> {
+        let own = told.unlike.iter().filter(|own| own.0 == known.axis.node);
+        let model = known.model(known.properties);
+        let model = model.drive(self.rate, Instant::START);
+        let differs = |register: &u8| {
+            let read = known.cells.get(register);
+            let mask = Register::of(*register).mask();
+            read.is_some_and(|own| (own ^ model.drive().register(*register)) & mask != 0)
+        };
+        let first = READ_AT_FIRST.into_iter().filter(differs);
+        Arc::new(own.map(|own| own.1).chain(first).collect())
     }
 
     fn world(&self, known: &Known, properties: Properties, unlike: &Arc<BTreeSet<u8>>) -> World {
