@@ -96,3 +96,21 @@ fn what_is_not_compared_has_not_passed() {
         );
     }
 }
+
+/// What a drive sends does not follow from what the bench sent where a fault is put on a frame: a right drive passes by the lines.
+#[test]
+fn faults_on_frames_accuse_no_drive() {
+    let folder = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../corpora/scenarios/unitek"
+    );
+    let names = ["doubled", "lost", "corrupt", "late"].map(|own| format!("unitek-fault-{own}"));
+    for name in names {
+        let text = std::fs::read_to_string(format!("{folder}/{name}.scn")).expect("a scenario");
+        let text = text.into();
+        let source = Source { name, text };
+        assert!(Own::read(&source).expect("a scenario").is_disturbed());
+        let outcome = outcome(&mut bench(&[]), &source);
+        assert_eq!(outcome.verdict, Verdict::Passed, "{}", source.name);
+    }
+}
