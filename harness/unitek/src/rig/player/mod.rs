@@ -62,6 +62,15 @@ const PHASES: std::ops::Range<u64> = 1..32;
 /// How many times the tolerance of times is waited for a frame that is missing.
 const STILL_COMES: u64 = 5;
 
+/// What a model is beside what is known of the drives.
+#[derive(Clone, Copy, Default)]
+struct Other {
+    /// How far the clocks of the drives are ahead.
+    phase: Span,
+    /// The properties of the drive at a place, in place of those that are known.
+    drive: Option<(usize, Properties)>,
+}
+
 /// A scenario played on the model.
 struct Rehearsal {
     outcome: Outcome,
@@ -288,12 +297,10 @@ impl Player {
                     unlike: unlike(&drives, &models),
                 };
                 let exact = way.tolerance == Span::ZERO;
-                let by_lines = exact && !own.by_frames;
-                let shown =
-                    match by_lines && (own.is_disturbed() || outcome.verdict != Verdict::Failed) {
-                        true => Shown::Unknown(BY_LINES),
-                        false => self.shown(&told),
-                    };
+                let shown = match exact && !own.by_frames {
+                    true => Shown::Unknown(BY_LINES),
+                    false => self.shown(&told),
+                };
                 let wrong = matches!(shown, Shown::Wrong(_));
                 let outcome = self.judged(own, *outcome, exact, (&told.unlike, shown));
                 if let Some(note) = self.notes.last_mut() {
@@ -384,13 +391,13 @@ impl Player {
         if let Some(why) = self.other_properties(&own.scenario) {
             return Err(Why::OtherDrives(why).into());
         }
-        let first = self.rehearse(own, &self.limits, None);
+        let first = self.rehearse(own, &self.limits, Other::default());
         if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
             return Ok(first);
         }
         let mut limits = self.limits.clone();
         let mut unlocks = BTreeSet::new();
-        let mut last = self.rehearse(own, &limits, None);
+        let mut last = self.rehearse(own, &limits, Other::default());
         for _ in 0..4 {
             let wanted = match &last.denied {
                 Some((_, settings)) => settings.clone(),
@@ -406,7 +413,7 @@ impl Player {
             if limits == before {
                 break;
             }
-            last = self.rehearse(own, &limits, None);
+            last = self.rehearse(own, &limits, Other::default());
         }
         let found = |outcome: &Outcome| {
             let finding = outcome.finding.as_ref().map(|own| own.message.clone());
@@ -473,22 +480,19 @@ impl Player {
         })
     }
 
-    /// Plays a scenario on the model within limits, in which the drive at a place may have other properties.
-    fn rehearse(
-        &self,
-        own: &Own,
-        limits: &Limits,
-        other: Option<(usize, Properties)>,
-    ) -> Rehearsal {
+    /// Plays a scenario on the model within limits.
+    fn rehearse(&self, own: &Own, limits: &Limits, other: Other) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
-            let other = other.filter(|own| own.0 == place);
+            let other = other.drive.filter(|own| own.0 == place);
             known.model(other.map_or(known.properties, |own| own.1))
         });
         let setup = simulate::Setup::new(self.rate, drives.collect());
         let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
-        let mut link = guarded(Bench::new(&setup), limits.clone(), &identifiers, false);
+        let mut bench = Bench::new(&setup);
+        bench.wait(Instant::START + other.phase);
+        let mut link = guarded(bench, limits.clone(), &identifiers, false);
         if let Some(gate) = link.segment_mut() {
             self.tell(self.known(), gate);
         }

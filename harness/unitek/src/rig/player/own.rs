@@ -70,16 +70,9 @@ impl Own {
             || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
 
-    /// Whether something beside the bus happens in it to a drive or to a frame: what comes then does not follow from what was sent.
-    pub(super) fn is_disturbed(&self) -> bool {
-        let disturbs = |own: &Step| {
-            use Act::{Frame, Harm, Outside, Restart};
-            let PlannedAction::Own(act) = &own.action else {
-                return false;
-            };
-            matches!(act, Frame(..) | Harm(..) | Outside(..) | Restart(..))
-        };
-        self.plan.steps.iter().any(disturbs)
+    /// The registers whose contents its lines ask for.
+    pub(super) fn asks_for(&self) -> BTreeSet<u8> {
+        self.plan.steps.iter().flat_map(asks).collect()
     }
 
     /// The lines from this one on of which all contents are of registers for which `compared` holds; with whether others behind it ask for

@@ -1,12 +1,13 @@
 //! The verdict of an attempt in which a line was not met, or right drives would have sent something else.
 
 use super::worlds::Shown;
-use super::{AtRest, Own, Player};
+use super::{AtRest, Other, Own, PHASES, Player};
 use crate::judge::World;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::run::outcome::Mismatch;
 use harness_bench::scenario::verdict::Verdict;
+use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use std::collections::BTreeSet;
 
@@ -51,14 +52,9 @@ impl Player {
             (Verdict::Passed, Shown::Right) if excused.is_some() => {
                 inconclusive(outcome, UNDER_WAY.to_owned())
             }
-            (Verdict::Failed, Shown::Unknown(_)) if exact => match self.left_open(own) {
+            (Verdict::Failed, Shown::Unknown(_)) if exact => match self.left_open(own, unlike) {
                 None => outcome,
-                Some(words) => inconclusive(
-                    outcome,
-                    format!(
-                        "a correct drive with {words} does not meet it either, and this is not known"
-                    ),
-                ),
+                Some(why) => inconclusive(outcome, why),
             },
             (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
             (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || excused.is_some() => {
@@ -86,18 +82,40 @@ impl Player {
         Some(goes_on)
     }
 
-    /// The first value of what the manual leaves open with which a correct drive does not meet the scenario either.
-    fn left_open(&self, own: &Own) -> Option<String> {
-        let fails = |other| {
-            let played = self.rehearse(own, &self.limits, Some(other));
+    /// Why a correct drive in virtual time may not meet the scenario either: a register at rest, the place of its clock, or what the manual
+    /// leaves open.
+    fn left_open(&self, own: &Own, unlike: &[(u8, u8)]) -> Option<String> {
+        let asks_for = own.asks_for();
+        let mut unlike = unlike.iter();
+        if let Some((node, register)) = unlike.find(|own| asks_for.contains(&own.1)) {
+            return Some(format!(
+                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
+                 another firmware",
+                Register::of(*register).name
+            ));
+        }
+        let fails = |other: Other| {
+            let played = self.rehearse(own, &self.limits, other);
             played.denied.is_some() || played.outcome.verdict != Verdict::Passed
         };
-        let drives = self.known().iter().enumerate();
-        let mut all = drives.flat_map(|(place, known)| {
-            let each = known.candidates().into_iter();
-            each.map(move |(words, properties)| (words, (place, properties)))
+        let phases = PHASES.map(|own| Span::from_micros(own * 1_000 / 32));
+        let phases = phases.map(|phase| {
+            let words = format!("its clock of 1 ms ahead by {phase}");
+            (words, Other { phase, drive: None })
         });
-        all.find(|own| fails(own.1)).map(|own| own.0)
+        let drives = self.known().iter().enumerate();
+        let values = drives.flat_map(|(place, known)| {
+            let each = known.candidates().into_iter();
+            each.map(move |(words, properties)| {
+                let drive = Some((place, properties));
+                let phase = Span::ZERO;
+                (words, Other { phase, drive })
+            })
+        });
+        let found = phases.chain(values).find(|own| fails(own.1));
+        found.map(|(words, _)| {
+            format!("a correct drive with {words} does not meet it either, and this is not known")
+        })
     }
 }
 
