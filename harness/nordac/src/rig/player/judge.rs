@@ -2,7 +2,7 @@
 
 use super::note::kind;
 use super::rehearse::Other;
-use super::worlds::{Differs, right_slaves_send, right_slaves_send_or_lose};
+use super::worlds::{Differs, MOST_LOST, right_slaves_send};
 use super::{Left, Own, Player};
 use crate::rig::known::value_of;
 use crate::rig::observed::{Came, Turn};
@@ -16,9 +16,9 @@ use harness_proto::decode::Decoded;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::Telegram;
 use harness_proto::time::Span;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// In how many attempts at a scenario the line may have lost the same telegram or its reply.
+/// In how many attempts at a scenario, one behind the other, the line may have lost the same telegram or its reply.
 const LOST_BY_THE_LINE: usize = 2;
 
 impl Player {
@@ -85,7 +85,7 @@ impl Player {
             let remark = format!("{why} (the computer or the adapter was late by {late})");
             Outcome::not_ready(Verdict::Inconclusive, Unready::NoAnswer, remark)
         };
-        let sent = right_slaves_send(self.known(), self.rate, turns, &self.beats);
+        let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
         match sent {
             Err(differs) if differs.torn => {
                 return not_shown("a stream has parted a telegram, and the next one met the reply");
@@ -101,7 +101,7 @@ impl Player {
                     };
                 }
             },
-            Ok(()) => {}
+            Ok(_) => drop(self.lost.remove(&own.name)),
         }
         let Some(finding) = &outcome.finding else {
             return outcome;
@@ -133,22 +133,25 @@ impl Player {
     }
 
     /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
-    /// there in two attempts before is not lost by the line.
+    /// there in the two attempts before is not lost by the line.
     fn lost(&mut self, own: &Own, turns: &[Turn]) -> Option<String> {
-        let lost = right_slaves_send_or_lose(self.known(), self.rate, turns, &self.beats).ok()?;
+        let lost =
+            right_slaves_send(self.known(), (self.rate, MOST_LOST), turns, &self.beats).ok()?;
         let first = turns.get(*lost.first()?)?;
         let place = |number: usize| {
             let step = turns.get(number).map(|own| own.step);
             let same = turns[..number].iter().filter(|own| Some(own.step) == step);
             (step.flatten(), same.count())
         };
-        let before = self.lost.entry(own.name.clone()).or_default();
-        let mut again = false;
-        for number in lost {
-            let times = before.entry(place(number)).or_default();
-            *times += 1;
-            again |= *times > LOST_BY_THE_LINE;
-        }
+        let before = self.lost.remove(&own.name).unwrap_or_default();
+        let times = |place| before.get(&place).copied().unwrap_or_default() + 1;
+        let now: BTreeMap<_, _> = lost
+            .into_iter()
+            .map(place)
+            .map(|own| (own, times(own)))
+            .collect();
+        let again = now.values().any(|times| *times > LOST_BY_THE_LINE);
+        self.lost.insert(own.name.clone(), now);
         (!again).then(|| {
             format!(
                 "no whole reply came to {}: the line may have lost it, and all else is what right slaves send",

@@ -127,7 +127,7 @@ pub(crate) struct Player {
     unable: Option<String>,
     /// Whether the slaves are qualified.
     qualifies: bool,
-    /// How often something was lost behind a telegram, by scenario, and by step and place among its telegrams.
+    /// In how many attempts, one behind the other, something was lost behind a telegram: by scenario, and by step and place among its telegrams.
     lost: BTreeMap<String, BTreeMap<(Option<usize>, usize), usize>>,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,

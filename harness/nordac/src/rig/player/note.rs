@@ -280,7 +280,8 @@ impl AttemptNote {
     fn could_be_sent_by(&self, other: Other, held: &Values) -> bool {
         let Other::WrongSlave(place, deviation) = other else {
             let beats = &self.begun.beats;
-            return right_slaves_send(&self.slaves, self.begun.rate, &self.turns, beats).is_ok();
+            return right_slaves_send(&self.slaves, (self.begun.rate, 0), &self.turns, beats)
+                .is_ok();
         };
         let slaves = self.slaves.iter().enumerate().map(|(own, known)| {
             let mut slave = known.model(known.properties);

@@ -50,7 +50,7 @@ const MOST_EVENTS: usize = 16;
 const HALVES: usize = 48;
 
 /// How many telegrams and replies a line loses in one attempt at most.
-const MOST_LOST: usize = 3;
+pub(super) const MOST_LOST: usize = 3;
 
 /// The most ways to lose them that are tried for one telegram.
 const MOST_WAYS: usize = 4;
@@ -68,33 +68,12 @@ pub(super) struct Differs {
     pub(super) torn: bool,
 }
 
-/// Whether right slaves of which this is `known`, with some values of the points that are not settled of them, could have sent what came.
+/// Whether right slaves of which this is `known`, with some values of the points that are not settled of them, could have sent what came over a
+/// line that has lost this many telegrams or replies at most; returns behind which telegrams.
 ///
 /// # Errors
 /// Where the slaves as they are known differ.
 pub(super) fn right_slaves_send(
-    known: &[Known],
-    rate: BusRate,
-    turns: &[Turn],
-    beats: &Beats,
-) -> Result<(), Differs> {
-    right_slaves_lose(known, (rate, 0), turns, beats).map(|_| ())
-}
-
-/// The same over a line that may have lost telegrams or replies; returns behind which telegrams.
-///
-/// # Errors
-/// Where the slaves as they are known differ.
-pub(super) fn right_slaves_send_or_lose(
-    known: &[Known],
-    rate: BusRate,
-    turns: &[Turn],
-    beats: &Beats,
-) -> Result<Vec<usize>, Differs> {
-    right_slaves_lose(known, (rate, MOST_LOST), turns, beats)
-}
-
-fn right_slaves_lose(
     known: &[Known],
     (rate, most_lost): (BusRate, usize),
     turns: &[Turn],
@@ -578,7 +557,7 @@ fn damages(sent: &[Vec<u8>], came: &[u16]) -> Vec<(usize, Vec<Vec<u8>>)> {
         return Vec::new();
     }
     let rest = &came[whole..];
-    let changed = !rest.is_empty() && alike(whole + 1, &rest[1..]);
+    let changed = !rest.is_empty() && whole < octets.len() && alike(whole + 1, &rest[1..]);
     let mut ways = Vec::new();
     // The loss begins where something else came, or with a reply before that.
     let begins = |own: &usize| *own == whole || *own == 0 || octets[*own - 1].0 != octets[*own].0;
