@@ -43,7 +43,7 @@ fn turns(slave: &Known) -> Vec<Turn> {
     player.rehearse(&own, &limits, Other::default()).turns
 }
 
-/// Whether right slaves send this over a line that loses so many telegrams.
+/// Whether right slaves send this over a line that loses at most `most_lost` telegrams.
 fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usize>, Differs> {
     right_slaves_send(known, (BusRate::K500, most_lost), turns, &Beats::default())
 }
