@@ -12,11 +12,11 @@ use harness_proto::time::Span;
 /// Shorter waits stay as they are.
 const LEAST: Span = Span::from_millis(400);
 
-/// The sixteenths of a wait that are tried.
-const PARTS: [u64; 9] = [1, 2, 3, 4, 6, 8, 10, 12, 14];
+/// In this many parts a wait is divided.
+const PARTS: u64 = 64;
 
-/// With this many hundredths of a part the replies must be the same too: the rig is not exact.
-const MARGIN: u64 = 85;
+/// With this many hundredths of what is left of a wait the replies must be the same too: a motor is not exact.
+const MARGIN: u64 = 95;
 
 impl Player {
     /// The same scenario with waits that are as long as right slaves need for the same replies.
@@ -45,12 +45,19 @@ impl Player {
                 shorter.plan.steps[place].action = PlannedAction::Wait(span);
                 played(&shorter).as_ref() == Some(&whole)
             };
-            let sixteenth = wait.units() / 16;
-            let enough = PARTS
-                .into_iter()
-                .map(|part| sixteenth * part)
-                .find(|part| lasts(part / 100 * MARGIN) && lasts(*part));
-            let units = enough.unwrap_or(wait.units());
+            let of = |parts: u64| wait.units() / PARTS * parts;
+            // The replies are the same with the upper one, and are not with the lower one.
+            let (mut lower, mut upper) = (0, PARTS);
+            while lower + 1 < upper {
+                let middle = lower.midpoint(upper);
+                let enough = lasts(of(middle) / 100 * MARGIN) && lasts(of(middle));
+                *if enough { &mut upper } else { &mut lower } = middle;
+            }
+            let units = if upper == PARTS {
+                wait.units()
+            } else {
+                of(upper)
+            };
             shorter.plan.steps[place].action = PlannedAction::Wait(Span::from_units(units));
         }
         shorter
