@@ -4,7 +4,7 @@
 //! brings only behind the next request would be taken for the reply to that one. So a request without a reply is waited for twice as long as
 //! the rig's file grants, and a conversation in which something comes unasked behind such a request is not judged.
 
-use super::act::{Counts, TelegramActKind};
+use super::act::{Counts, OutgoingTelegram, TelegramAct, TelegramActKind};
 use super::generate::TelegramSpice;
 use super::oracle::TelegramDifference;
 use super::{TelegramTalk, TelegramsSeen};
@@ -12,10 +12,10 @@ use crate::gate::GuardsSlaves as _;
 use crate::judge::{Breach, judge_runs};
 use crate::language::Nordac;
 use crate::rig::OfNordac as _;
-use crate::rig::{Inverters, Session, limits, slaves};
+use crate::rig::{HeldBefore, Inverters, Session, limits, slaves};
 use harness_bench::capture::runs::TelegramRun;
 use harness_bench::explore::ExploreError;
-use harness_bench::explore::line::LineRig;
+use harness_bench::explore::line::{LineRig, ONLY_SIMULATED};
 use harness_bench::guard::Guarded;
 use harness_bench::link::{Line as _, Octets as _};
 use harness_bench::rig::{Ends, Rig};
@@ -32,10 +32,18 @@ const UNANSWERED: Span = Span::from_millis(2);
 /// The same at the end of a conversation.
 const REST: Span = Span::from_millis(20);
 
+/// What is known of the slaves of a run.
+#[derive(Debug)]
+pub(crate) struct Kept {
+    /// The telegrams of the last conversation.
+    heard: Vec<TelegramRun>,
+    /// What the slaves held before; nothing where no conversation may write.
+    before: Option<HeldBefore>,
+}
+
 impl LineRig for Nordac {
     type Drives = Inverters;
-    /// The telegrams of the last conversation.
-    type Kept = Vec<TelegramRun>;
+    type Kept = Kept;
 
     fn stations(rig: &Rig, session: Option<&Session>) -> Vec<(u8, PpoType)> {
         let listed = || rig.port().map(slaves).unwrap_or_default();
@@ -45,30 +53,51 @@ impl LineRig for Nordac {
             .collect()
     }
 
-    /// Parameters are not written: every write is permanent (NORDAC 5).
-    fn possible(rig: &Rig, allow_motion: bool, spice: TelegramSpice) -> bool {
+    fn lacks(rig: &Rig, allow_motion: bool, spice: TelegramSpice) -> Option<&'static str> {
         use TelegramSpice as Own;
-        let limits = limits(rig, allow_motion);
-        match spice {
-            Own::Tasks | Own::Services | Own::Setup | Own::Control => true,
-            Own::Functions | Own::Lengths => true,
-            Own::Motion | Own::Words => limits.motion,
-            Own::Masters => limits.other_stations,
-            Own::Damage => {
-                limits.motion && limits.eeprom && limits.motor_data && limits.bus_settings
+        let own = limits(rig, allow_motion);
+        let motion = (own.motion, "allow_motion");
+        let eeprom = (own.eeprom, "allow_eeprom");
+        let bus_settings = (own.bus_settings, "allow_bus_settings");
+        let motor_data = (own.motor_data, "allow_motor_data");
+        let needed: &[_] = match spice {
+            Own::Tasks | Own::Services | Own::Setup | Own::Control => &[],
+            Own::Functions | Own::Lengths => &[],
+            Own::Motion | Own::Words => &[motion],
+            Own::Masters => &[(own.other_stations, "allow_other_stations")],
+            Own::Damage => &[motion, eeprom, motor_data, bus_settings],
+            // Every write is permanent (NORDAC 5).
+            Own::Changes => &[eeprom],
+            Own::Bus => &[eeprom, bus_settings],
+            Own::World | Own::Power => return Some(ONLY_SIMULATED),
+        };
+        needed.iter().find(|own| !own.0).map(|own| own.1)
+    }
+
+    fn keep(session: &mut Session) -> Result<Kept, ExploreError> {
+        let gate = session.guarded().slaves();
+        let before = match gate.is_some_and(|own| own.limits().eeprom) {
+            true => {
+                let read = HeldBefore::read(session);
+                Some(read.map_err(|error| ExploreError::Lost(error.to_string()))?)
             }
-            Own::Changes | Own::Bus | Own::World | Own::Power => false,
+            false => None,
+        };
+        let heard = Vec::new();
+        Ok(Kept { heard, before })
+    }
+
+    fn tidy(session: &mut Session, kept: &mut Kept) {
+        if let Some(before) = kept.before.as_mut().filter(|own| own.has_written()) {
+            // What is not put back is said at the end of the run.
+            let _as_far_as_they_do = session.make_safe();
+            let _said_later = before.put_back(session);
         }
     }
 
-    fn keep(_: &mut Session) -> Result<Vec<TelegramRun>, ExploreError> {
-        Ok(Vec::new())
-    }
-
-    fn tidy(_: &mut Session, _: &mut Vec<TelegramRun>) {}
-
-    fn restore(_: &mut Session, _: &mut Vec<TelegramRun>) -> Vec<String> {
-        Vec::new()
+    fn restore(session: &mut Session, kept: &mut Kept) -> Vec<String> {
+        let before = kept.before.as_mut();
+        before.map_or_else(Vec::new, |own| own.put_back(session))
     }
 
     fn denied(session: &Session, talk: &TelegramTalk, seen: &TelegramsSeen) -> Option<String> {
@@ -101,25 +130,31 @@ impl LineRig for Nordac {
         None
     }
 
-    fn converse(
-        session: &mut Session,
-        heard: &mut Vec<TelegramRun>,
-        talk: &TelegramTalk,
-    ) -> Option<String> {
-        heard.clear();
+    fn converse(session: &mut Session, kept: &mut Kept, talk: &TelegramTalk) -> Option<String> {
+        kept.heard.clear();
+        let telegrams = telegrams(talk);
+        if let Some(before) = &mut kept.before {
+            let sent = telegrams.iter().flatten().flatten();
+            let sent = sent.map(|own| own.octets.as_slice());
+            match before.sends(session, sent) {
+                Ok(None) => {}
+                Ok(Some(why)) => return Some(why),
+                // The link is in trouble.
+                Err(_) => return None,
+            }
+        }
         let patience = session.patience();
         let mut line = Conversation {
             link: session.link(),
             patience,
-            heard,
+            heard: &mut kept.heard,
             asked: None,
             silent: false,
             late: false,
         };
-        let mut counts = Counts::default();
-        for act in &talk.acts {
-            for _ in 0..act.times {
-                if let Some(sent) = counts.outgoing(&act.what) {
+        for (act, telegrams) in talk.acts.iter().zip(&telegrams) {
+            for sent in telegrams {
+                if let Some(sent) = sent {
                     line.ask(&sent.octets);
                 }
                 line.pass(act.wait());
@@ -136,13 +171,23 @@ impl LineRig for Nordac {
         })
     }
 
-    fn judged(_: &Session, heard: &Vec<TelegramRun>) -> (Option<TelegramDifference>, bool) {
-        let first = judge_runs(heard.iter().cloned())
+    fn judged(_: &Session, kept: &Kept) -> (Option<TelegramDifference>, bool) {
+        let first = judge_runs(kept.heard.iter().cloned())
             .breaches
             .into_iter()
             .next();
         (first.map(TelegramDifference::from), false)
     }
+}
+
+/// What goes out for each act of a conversation, once for each time; `None` where an act sends nothing.
+fn telegrams(talk: &TelegramTalk) -> Vec<Vec<Option<OutgoingTelegram>>> {
+    let mut counts = Counts::default();
+    let mut of = |act: &TelegramAct| {
+        let times = (0..act.times).map(|_| counts.outgoing(&act.what));
+        times.collect()
+    };
+    talk.acts.iter().map(&mut of).collect()
 }
 
 impl From<Breach> for TelegramDifference {

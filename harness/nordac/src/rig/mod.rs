@@ -1,5 +1,6 @@
 //! Rig files of NORDAC inverters: addresses, limits, and the simulated bench.
 
+mod held;
 pub(crate) mod interlock;
 mod known;
 mod observed;
@@ -13,6 +14,7 @@ mod session;
 mod settle;
 pub(crate) mod talk;
 
+pub(crate) use held::HeldBefore;
 pub(crate) use permitted::limits;
 pub(crate) use player::Player;
 pub(crate) use session::{Inverters, OfNordac, Session};

@@ -217,8 +217,33 @@ impl TelegramNotes {
     }
 }
 
+/// What a telegram may write, in every layout that its length fits, and the address that each of these may give to the station.
+pub(super) fn writes(octets: &[u8]) -> Vec<(Written, Option<u8>)> {
+    let telegram = Telegram::decode(octets).value();
+    let exchange = telegram
+        .as_ref()
+        .and_then(Telegram::pdu)
+        .filter(|own| Service::of(own.dsap()) == Some(Service::DataExchange));
+    let Some(pdu) = exchange else {
+        return Vec::new();
+    };
+    let layouts = PpoType::ALL.into_iter().filter(|own| own.has_pkw());
+    let tasks = layouts.filter_map(|ppo| Some(Image::decode(ppo, pdu.data())?.pkw));
+    let changes = tasks
+        .filter(|own| own.task().is_change() && own.task() != Task::ChangeDescription)
+        .map(|own: Pkw| {
+            let moved = match own.number() {
+                ADDRESS => u8::try_from(own.low_word()).ok(),
+                number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
+                _ => None,
+            };
+            let moved = moved.filter(|own| (1..=DEFAULT_ADDRESS).contains(own));
+            ((pdu.da(), own.number(), own.ind), moved)
+        });
+    changes.collect()
+}
+
 impl LinkNotes for TelegramNotes {
-    /// A telegram was sent. In every layout that its length fits, its parameter channel may write.
     fn sent(&mut self, what: Out<'_>, end: Instant) {
         self.sent += 1;
         self.last = Some(end);
@@ -234,28 +259,9 @@ impl LinkNotes for TelegramNotes {
             });
         }
         self.reach(end);
-        let telegram = Telegram::decode(what.octets()).value();
-        let Some(pdu) = telegram.as_ref().and_then(Telegram::pdu) else {
-            return;
-        };
-        if Service::of(pdu.dsap()) != Some(Service::DataExchange) {
-            return;
-        }
-        let images = PpoType::ALL.into_iter().filter(|own| own.has_pkw());
-        for image in images.filter_map(|ppo| Image::decode(ppo, pdu.data())) {
-            let Pkw { ind, .. } = image.pkw;
-            let changes = image.pkw.task().is_change();
-            if changes && image.pkw.task() != Task::ChangeDescription {
-                let number = image.pkw.number();
-                self.written.insert((pdu.da(), number, ind));
-                let moved = match number {
-                    ADDRESS => u8::try_from(image.pkw.low_word()).ok(),
-                    number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
-                    _ => None,
-                };
-                let moved = moved.filter(|own| (1..=DEFAULT_ADDRESS).contains(own));
-                self.moved.extend(moved.map(|own| (pdu.da(), own)));
-            }
+        for (written, moved) in writes(what.octets()) {
+            self.written.insert(written);
+            self.moved.extend(moved.map(|own| (written.0, own)));
         }
     }
 

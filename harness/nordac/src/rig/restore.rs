@@ -59,7 +59,7 @@ impl Player {
                 Some(gate) => gate.places(own.address).collect(),
                 None => vec![own.address],
             };
-            let changed = changed(known, &places, self.written());
+            let changed = changed(known, &places, &self.written);
             let mut talk = Talk::new(Box::new(&mut *line), self.patience());
             let slave = match found(&mut talk, &places) {
                 Ok((address, _)) => RigSlave { address, ..own },

@@ -10,7 +10,7 @@ use crate::language::Unitek;
 use crate::rig::OfUnitek as _;
 use crate::rig::{HeldBefore, Session, UnitekDrives, axes, limits};
 use harness_bench::explore::ExploreError;
-use harness_bench::explore::line::{LineRig, pass};
+use harness_bench::explore::line::{LineRig, ONLY_SIMULATED, pass};
 use harness_bench::link::{Line as _, Link as _};
 use harness_bench::medium::Out;
 use harness_bench::rig::Rig;
@@ -47,17 +47,22 @@ impl LineRig for Unitek {
         drives.iter().map(|own| (own.node, own.rx)).collect()
     }
 
-    fn possible(rig: &Rig, allow_motion: bool, spice: FrameSpice) -> bool {
-        let limits = limits(rig, allow_motion);
-        match spice {
-            FrameSpice::Read | FrameSpice::Cycles | FrameSpice::Mode => true,
-            FrameSpice::Write | FrameSpice::Motion | FrameSpice::Homing => limits.motion,
-            FrameSpice::Settings => limits.bus_settings,
-            FrameSpice::Eeprom => limits.eeprom,
-            FrameSpice::WriteAny => limits.motion && limits.eeprom && limits.bus_settings,
-            FrameSpice::Foreign => limits.other_identifiers,
-            FrameSpice::Lengths | FrameSpice::Inputs | FrameSpice::Power => false,
-        }
+    fn lacks(rig: &Rig, allow_motion: bool, spice: FrameSpice) -> Option<&'static str> {
+        use FrameSpice as Own;
+        let own = limits(rig, allow_motion);
+        let motion = (own.motion, "allow_motion");
+        let eeprom = (own.eeprom, "allow_eeprom");
+        let bus_settings = (own.bus_settings, "allow_bus_settings");
+        let needed: &[_] = match spice {
+            Own::Read | Own::Cycles | Own::Mode => &[],
+            Own::Write | Own::Motion | Own::Homing => &[motion],
+            Own::Settings => &[bus_settings],
+            Own::Eeprom => &[eeprom],
+            Own::WriteAny => &[motion, eeprom, bus_settings],
+            Own::Foreign => &[(own.other_identifiers, "allow_other_identifiers")],
+            Own::Lengths | Own::Inputs | Own::Power => return Some(ONLY_SIMULATED),
+        };
+        needed.iter().find(|own| !own.0).map(|own| own.1)
     }
 
     fn keep(session: &mut Session) -> Result<Left, ExploreError> {

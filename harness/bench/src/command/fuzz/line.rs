@@ -22,6 +22,7 @@ use crate::link::Line as _;
 use crate::rig::buses::RigBuses;
 use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
@@ -123,6 +124,7 @@ fn run<B: LineRig>(
         let how = ("fuzz", arguments.allow_motion, arguments.wait);
         return on_adapter::<B>(&rig, how, output, |target, (scope, setup), output| {
             target.end_between_cases();
+            output.say(&left_out::<B>(&rig, arguments.allow_motion));
             let about = settings((&name, true), (&scope, setup), run);
             let bounds = bounds_on_ports(arguments);
             explore(arguments, (about, scope), target, &bounds, output)
@@ -147,6 +149,24 @@ fn run<B: LineRig>(
         ));
     }
     Ok(exit)
+}
+
+/// What conversations on a rig do not have, with the limit that would permit it; nothing where they have everything.
+fn left_out<B: LineRig>(rig: &Rig, allow_motion: bool) -> String {
+    let mut left: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (name, own) in B::Spice::ALL {
+        if let Some(why) = B::lacks(rig, allow_motion, *own) {
+            left.entry(why).or_default().push(name);
+        }
+    }
+    let each = left
+        .iter()
+        .map(|(why, names)| format!("{} ({why})", names.join(", ")));
+    let each: Vec<_> = each.collect();
+    match each.is_empty() {
+        true => String::new(),
+        false => format!("not in the conversations: {}\n", each.join("; ")),
+    }
 }
 
 /// What conversations with simulated drives may have: everything.
@@ -187,7 +207,7 @@ fn on_adapter<B: LineRig>(
     let scope = LineScope::<B> {
         drives: B::stations(rig, Some(&session)),
         spices: all
-            .filter(|own| B::possible(rig, allow_motion, *own))
+            .filter(|own| B::lacks(rig, allow_motion, *own).is_none())
             .collect(),
     };
     let mut setup = LineSetup::of_rig::<B>(rig, &scope.drives, Vec::new());

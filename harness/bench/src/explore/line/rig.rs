@@ -14,6 +14,9 @@ const REST: Span = Span::from_millis(60);
 /// The same at most, while a reply is missing.
 const LONGEST_REST: Span = Span::from_millis(1_000);
 
+/// What only a simulated drive can do.
+pub const ONLY_SIMULATED: &str = "only on simulated drives";
+
 /// A rig in use, of the drives of a bus.
 pub(crate) type SessionOf<B> = PortSession<<B as LineRig>::Drives>;
 
@@ -29,8 +32,9 @@ pub trait LineRig: LineBus {
 
     /// The drives of a rig as conversations address them; as they were found, where the rig is in use.
     fn stations(rig: &Rig, session: Option<&SessionOf<Self>>) -> Vec<Self::Station>;
-    /// Whether conversations may have this on a rig: what they change is taken back, and it is permitted.
-    fn possible(rig: &Rig, allow_motion: bool, spice: Self::Spice) -> bool;
+    /// The limit that keeps this out of conversations on a rig, or [`ONLY_SIMULATED`]; `None` where they have it, and what it changes is put
+    /// back.
+    fn lacks(rig: &Rig, allow_motion: bool, spice: Self::Spice) -> Option<&'static str>;
     /// Reads what conversations write.
     ///
     /// # Errors

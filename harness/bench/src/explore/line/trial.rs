@@ -95,7 +95,9 @@ impl<B: LineBus> EngineTrial<B> {
         let mut session = SessionOf::<B>::open(&rig, &options).expect("drives");
         let drives = B::stations(&rig, Some(&session));
         let all = B::Spice::ALL.iter().map(|(_, own)| *own);
-        let spices = all.filter(|own| B::possible(&rig, true, *own)).collect();
+        let spices = all
+            .filter(|own| B::lacks(&rig, true, *own).is_none())
+            .collect();
         let setup = LineSetup::of_rig::<B>(&rig, &drives, Vec::new());
         let model = setup.under_test::<B>().expect("a header");
         let mut target = OnAdapter::<B>::new(&mut session, model).expect("drives");

@@ -108,9 +108,9 @@ pub(crate) struct Player {
     /// Slaves can be switched off and on: they are simulated.
     restarts: bool,
     /// Known from the first attempt on.
-    known: Option<Vec<Known>>,
+    pub(super) known: Option<Vec<Known>>,
     /// What the last attempt may have written: station, number and IND.
-    written: BTreeSet<Written>,
+    pub(super) written: BTreeSet<Written>,
     /// Where it says what a scenario changes, before it does.
     pub(super) left: NotPutBack,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
@@ -189,11 +189,6 @@ impl Player {
     /// What is known of the slaves; nothing before the first attempt.
     pub(super) fn known(&self) -> &[Known] {
         self.known.as_deref().unwrap_or_default()
-    }
-
-    /// What the last attempt may have written.
-    pub(super) const fn written(&self) -> &BTreeSet<Written> {
-        &self.written
     }
 
     /// Why a scenario is not begun, whatever the slaves are; `None` if it is.
