@@ -256,6 +256,7 @@ impl Settled {
             took: self.took,
             records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
             unready: None,
+            shows_nothing: false,
             skip: None,
         }
     }

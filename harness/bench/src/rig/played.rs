@@ -72,10 +72,17 @@ impl Attempt {
         why.filter(|_| self.outcome.unready == Some(Unready::NoAnswer))
     }
 
-    /// Whether something differed in it, apart from times.
+    /// Whether it did not end as the scenario says, apart from times.
     fn failed(&self) -> bool {
         let right = [Verdict::Passed, Verdict::Marginal, Verdict::Skipped];
         !right.contains(&self.outcome.verdict) && self.unanswered().is_none()
+    }
+
+    /// Whether it accuses no drive and speaks for none, for a reason that another attempt need not have: the drives were not ready, or the
+    /// computer was late.
+    fn showed_nothing(&self) -> bool {
+        let own = &self.outcome;
+        own.verdict == Verdict::Inconclusive && (own.unready.is_some() || own.shows_nothing)
     }
 }
 
@@ -129,7 +136,8 @@ impl PlayedScenario {
             let why = why.filter(|why| !outcome.remarks.contains(why));
             outcome.remarks.extend(why);
             let right = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
-            if right && attempts.iter().any(Attempt::failed) {
+            let differed = |own: &Attempt| own.failed() && !own.showed_nothing();
+            if right && attempts.iter().any(differed) {
                 outcome.verdict = Verdict::Flaky;
             }
             let differing = outcome.unready == Some(Unready::NoAnswer)
@@ -255,6 +263,9 @@ mod tests {
         assert_eq!(of(&[differs]), Failed);
         assert_eq!(of(&[differs, passed]), Flaky);
         assert_eq!(of(&[late, differs]), Flaky);
+        // A slave whose watchdog ran out while the computer was busy refuses what makes it ready.
+        assert_eq!(of(&[(Inconclusive, DIFFERS), passed]), Passed);
+        assert_eq!(of(&[(Inconclusive, ""), passed]), Flaky);
     }
 
     /// How many attempts there are where each ends like this, the last over and over.

@@ -117,7 +117,7 @@ fn diverged(
         }
         None => match left_open::explanation(facts) {
             Some(found) if found.comparisons.iter().any(|own| own.silenced) => {
-                outcome.verdict = Verdict::Inconclusive;
+                late(outcome);
                 outcome.remarks.push(format!(
                     "{} explains every byte up to a silence of the bench: {SILENCED}",
                     found.words
@@ -130,13 +130,14 @@ fn diverged(
                     return Some(found);
                 }
                 outcome.verdict = Verdict::Inconclusive;
+                outcome.shows_nothing = found.time_outs && may_be_late(facts);
                 outcome.remarks.push(format!(
                     "the manual leaves open what differs: {} explains every byte; `qualify` settles such properties",
                     found.words
                 ));
             }
             None if facts.comparisons.iter().any(|own| own.silenced) => {
-                outcome.verdict = Verdict::Inconclusive;
+                late(outcome);
                 outcome.remarks.push(SILENCED.to_owned());
             }
             None => outcome.verdict = Verdict::Failed,
@@ -193,11 +194,8 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
             "drives sent bytes unasked (ND21 9.9); their order depends on the drives' clocks, and the model cannot tell it"
                 .to_owned(),
         );
-    } else if facts.exactness.tolerance > Span::ZERO
-        && facts.comparisons.iter().any(|own| own.monitored)
-        && passes(facts.rig, facts)
-    {
-        outcome.verdict = Verdict::Inconclusive;
+    } else if may_be_late(facts) && passes(facts.rig, facts) {
+        late(outcome);
         outcome.remarks.push(
             "every byte is as the model says for these times, and the scenario passes on the model: the drives monitor time-outs (ND21 9.9), and the computer left the line silent"
                 .to_owned(),
@@ -217,7 +215,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
         && (finding.difference.as_ref()).is_none_or(ByteDifference::is_absence)
         && facts.exactness.tolerance > Span::ZERO
     {
-        outcome.verdict = Verdict::Inconclusive;
+        late(outcome);
         outcome.remarks.push(format!(
             "every byte is as the model says, but the computer or the drive was late: {untimely}"
         ));
@@ -227,6 +225,17 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
                 .to_owned(),
         );
     }
+}
+
+/// Whether drives monitor time-outs, and the line may have been silent for longer than the computer has measured (ND21 9.9).
+fn may_be_late(facts: &AttemptFacts<'_>) -> bool {
+    facts.exactness.tolerance > Span::ZERO && facts.comparisons.iter().any(|own| own.monitored)
+}
+
+/// The computer was late, which accuses no drive and speaks for none.
+const fn late(outcome: &mut Outcome) {
+    outcome.verdict = Verdict::Inconclusive;
+    outcome.shows_nothing = true;
 }
 
 /// The outcome of the scenario on a rig's model with drives that have just been switched on and have these known deviations.

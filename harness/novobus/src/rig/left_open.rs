@@ -15,6 +15,9 @@ use harness_proto::time::Span;
 /// The largest ring of which single drives are tried.
 const SMALL: u8 = 16;
 
+/// The property of the time after which drives that monitor the line report a silence (ND21 9.9).
+const TIME_OUT: &str = "time-out";
+
 /// Choices that explain every byte of an attempt.
 pub struct Explanation {
     /// They, in words.
@@ -25,6 +28,8 @@ pub struct Explanation {
     pub(crate) comparisons: Vec<Comparison>,
     /// Whether the bytes that they explain come before the steps of the scenario: nothing that it asks for depends on the choices.
     pub(crate) before_steps: bool,
+    /// Whether they are time-outs alone: a line that was silent for longer than the computer has measured explains the same bytes (ND21 9.9).
+    pub(crate) time_outs: bool,
 }
 
 /// The choices that explain every byte of an attempt; `None` where the model's defaults explain them as well, or where no choice does.
@@ -35,8 +40,8 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
     }
     let (mut first, monitored) = compare(&Header::default(), facts).err()?;
     let mut open = choices(facts);
-    open.retain(|choice| choice.property != "time-out" || monitored);
-    let (mut header, mut chosen) = (Header::default(), Vec::new());
+    open.retain(|choice| choice.property != TIME_OUT || monitored);
+    let (mut header, mut chosen, mut time_outs) = (Header::default(), Vec::new(), true);
     // Each choice explains more bytes than those before it.
     loop {
         let mut further = None;
@@ -56,6 +61,7 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
                         header: all,
                         comparisons,
                         before_steps: !facts.conversations[..last].iter().any(has_steps),
+                        time_outs: time_outs && choice.property == TIME_OUT,
                     });
                 }
                 Err((place, _)) if further.is_none() && place.is_behind(&first) => {
@@ -67,6 +73,7 @@ pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
         let (place, words, all, property) = further?;
         open.retain(|choice| choice.property != property);
         chosen.push(words);
+        time_outs &= property == TIME_OUT;
         (first, header) = (place, all);
     }
 }

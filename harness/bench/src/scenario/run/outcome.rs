@@ -30,6 +30,8 @@ pub struct Outcome {
     pub records: Vec<CellRecord>,
     /// Why no step was played although the rig has all that the scenario needs: a drive could not be made ready.
     pub unready: Option<Unready>,
+    /// The computer or the adapter may have caused all that was not as a step says: another attempt speaks for this one.
+    pub shows_nothing: bool,
     /// Why it was skipped; `None` where it was not, and where this is read from a record.
     pub skip: Option<Skip>,
 }
@@ -130,6 +132,7 @@ impl Outcome {
             took: Span::ZERO,
             records: Vec::new(),
             unready: None,
+            shows_nothing: false,
             skip: None,
         }
     }

@@ -69,6 +69,7 @@ pub fn play_until<L: Language>(
         took,
         records: L::records(runner.own),
         unready: None,
+        shows_nothing: false,
         skip: None,
     }
 }

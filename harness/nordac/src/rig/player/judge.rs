@@ -49,9 +49,23 @@ impl Player {
             TalkError::NoReply { .. } if !exact => {
                 Outcome::not_ready(Verdict::Failed, what, remark)
             }
-            // A slave may have reasons of its own to refuse a parameter.
-            _ => Outcome::not_ready(Verdict::Inconclusive, what, remark),
+            _ => match self.differs(own, left) {
+                Some(differs) if !exact => {
+                    let said = said(&differs, &left.turns);
+                    Outcome::not_ready(Verdict::Failed, what, format!("{remark}; {said}"))
+                }
+                // A slave may have reasons of its own to refuse a parameter.
+                _ => Outcome::not_ready(Verdict::Inconclusive, what, remark),
+            },
         }
+    }
+
+    /// What no right slave sends, where nothing that the line has lost or a stream has parted explains it.
+    fn differs(&mut self, own: &Own, left: &Left) -> Option<Differs> {
+        let turns = &left.turns;
+        let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
+        let differs = sent.err().filter(|own| !own.torn)?;
+        self.lost(own, turns).is_none().then_some(differs)
     }
 
     /// Whether a line that was not met accuses the slave; behind an adapter, whether anything that it sent does.
@@ -213,16 +227,7 @@ impl Player {
 /// A reply that no right slave sends.
 fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
     let turn = turns.get(differs.turn);
-    let came: Vec<u8> = turn.map_or(Vec::new(), |own| {
-        own.came.iter().map(|own| *own as u8).collect()
-    });
-    let asked = turn.map_or(Vec::new(), |own| own.octets.clone());
-    let message = format!(
-        "the slave replies {} to {}, where a right one sends {}, or the same at another time that the record allows",
-        hex(&came),
-        hex(&asked),
-        hex(&differs.wanted)
-    );
+    let message = said(differs, turns);
     let finding = match outcome.finding {
         Some(own) => own,
         None => {
@@ -245,6 +250,21 @@ fn accused(outcome: Outcome, differs: &Differs, turns: &[Turn]) -> Outcome {
         remarks: std::iter::once(message).chain(outcome.remarks).collect(),
         ..outcome
     }
+}
+
+/// What the slave replied, and what a right one replies, in a sentence.
+fn said(differs: &Differs, turns: &[Turn]) -> String {
+    let turn = turns.get(differs.turn);
+    let came: Vec<u8> = turn.map_or(Vec::new(), |own| {
+        own.came.iter().map(|own| *own as u8).collect()
+    });
+    let asked = turn.map_or(Vec::new(), |own| own.octets.clone());
+    format!(
+        "the slave replies {} to {}, where a right one sends {}, or the same at another time that the record allows",
+        hex(&came),
+        hex(&asked),
+        hex(&differs.wanted)
+    )
 }
 
 /// Octets in words.

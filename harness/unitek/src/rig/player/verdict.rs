@@ -139,6 +139,7 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
 fn inconclusive(outcome: Outcome, why: String) -> Outcome {
     Outcome {
         verdict: Verdict::Inconclusive,
+        shows_nothing: true,
         remarks: std::iter::once(why).chain(outcome.remarks).collect(),
         ..outcome
     }
