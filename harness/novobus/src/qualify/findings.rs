@@ -18,6 +18,10 @@ const MOST_TOLD: usize = 8;
 /// The most scenarios and probes listed that were not compared, or not equal.
 const MOST_LISTED: usize = 12;
 
+/// Why a conversation that passed was compared in part: drives of any kind race here.
+const RACE: &str =
+    "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)";
+
 /// The most sections that are listed for a drive whose deviation has no name.
 const MOST_SECTIONS: usize = 3;
 
@@ -59,6 +63,8 @@ pub(super) struct Findings {
     failed: bool,
     /// What was not compared, or not equal, with its name.
     open: Vec<String>,
+    /// What drives of any kind show only in part on this rig, with its name: it says nothing against them.
+    in_part: Vec<String>,
     /// How many scenarios and conversations had a byte that differed and accuses no drive.
     unsettled: usize,
     /// The bytes that drives hold back, as far as the tolerance permits.
@@ -94,6 +100,7 @@ impl Findings {
                 self.equal += 1;
                 self.alike.push(last.beside().conversations.clone());
             }
+            Some(RACE) => self.in_part.push(format!("{name}: {RACE}")),
             Some(why) => self.note_unequal(name, why, played, last),
         }
     }
@@ -107,6 +114,7 @@ impl Findings {
         self.note_attempts(name, played);
         match self.why_open(played, last) {
             None => self.alike.push(last.beside().conversations.clone()),
+            Some(RACE) => {}
             Some(why) => self.note_unequal(name, why, played, last),
         }
     }
@@ -121,6 +129,7 @@ impl Findings {
     fn why_open(&self, played: &PlayedScenario, last: &Attempt) -> Option<&'static str> {
         let differs = differs(last);
         let left_out = last.beside().comparisons.iter().any(|own| own.left_out);
+        let monitored = last.beside().comparisons.iter().any(|own| own.monitored);
         let whole =
             last.beside().comparisons.len() == last.beside().conversations.len() && !left_out;
         Some(match played.outcome.verdict {
@@ -140,9 +149,10 @@ impl Findings {
             Verdict::Marginal if played.late_each_time(self.tolerance).is_some() => {
                 "a byte was late by the same time at each attempt: the computer or a drive is slow"
             }
-            Verdict::Passed | Verdict::Marginal if !whole => {
-                "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)"
+            Verdict::Passed | Verdict::Marginal if !whole && !monitored => {
+                "a drive sent bytes by itself, and none monitors the line"
             }
+            Verdict::Passed | Verdict::Marginal if !whole => RACE,
             Verdict::Passed | Verdict::Marginal => return None,
         })
     }
@@ -293,6 +303,9 @@ impl Findings {
             let more = self.open.len() - MOST_LISTED;
             let _infallible = writeln!(text, "  and {more} more");
         }
+        for own in &self.in_part {
+            let _infallible = writeln!(text, "compared in part: {own}");
+        }
         text
     }
 
@@ -337,9 +350,13 @@ impl Findings {
             };
             let _infallible = writeln!(text, "deviations: not known; {what}: {count}");
         } else if known.is_empty() {
+            let compared = match self.in_part.is_empty() {
+                true => "every byte",
+                false => "every byte that was compared",
+            };
             let _infallible = writeln!(
                 text,
-                "deviations: none; every byte is as the model of the manual says: {count}"
+                "deviations: none; {compared} is as the model of the manual says: {count}"
             );
         } else {
             let known = known.join(", ");
@@ -453,6 +470,15 @@ mod tests {
                 "{text}"
             );
         }
+        let mut raced = played();
+        raced.in_part.push(format!("9.9-master-silent: {RACE}"));
+        assert_eq!(raced.judged(), Verdict::Passed);
+        let text = raced.text(Some(&[]), &[]);
+        assert!(text.starts_with("deviations: none; every byte that was compared"));
+        assert!(
+            text.contains("\ncompared in part: 9.9-master-silent: "),
+            "{text}"
+        );
         let mut unsettled = played();
         unsettled.unsettled = 2;
         unsettled.note_open("10.2-march: a byte differed once, and not again".to_owned());

@@ -24,6 +24,12 @@ const MOST_EVENTS: usize = 4096;
 /// How long a start-up waits for ready, and for the hardware enable (ex 11).
 const START_UP: Span = Span::from_millis(2_000);
 
+/// How long a drive behind an adapter may be silent before one has not answered: the computer or the adapter may stand still for that long.
+const SILENCE: Span = Span::from_millis(2_500);
+
+/// What a drive is asked for while it is silent, and how long the line is left alone behind each request.
+const ALIVE: (u8, Span) = (0x40, Span::from_millis(50));
+
 /// The registers of a speed and of a torque command.
 const COMMANDS: [u8; 2] = [0x31, 0x90];
 
@@ -44,6 +50,8 @@ pub(crate) struct Driver<'l> {
     line: Box<dyn Line + 'l>,
     drives: Vec<Drive>,
     events: VecDeque<(Instant, Axis, Event)>,
+    /// How long a drive may be silent that was asked as often as a request is repeated.
+    silence: Span,
 }
 
 struct Drive {
@@ -78,7 +86,18 @@ impl<'l> Driver<'l> {
             line,
             drives: axes.iter().map(drive).collect(),
             events: VecDeque::new(),
+            silence: Span::ZERO,
         }
+    }
+
+    /// The same driver, which outlasts a computer or an adapter that stands still, where `tolerance` says that time is real.
+    #[must_use]
+    pub(crate) fn outlasting(self, tolerance: Span) -> Self {
+        let silence = match tolerance {
+            Span::ZERO => Span::ZERO,
+            _ => SILENCE,
+        };
+        Self { silence, ..self }
     }
 
     /// Its drives.
@@ -246,8 +265,26 @@ impl<'l> Driver<'l> {
         self.line.denied(0, Out::Frames(&frames))
     }
 
-    /// Runs a job to its end.
+    /// Runs a job to its end. Where a drive is silent, it is asked until it answers or was silent for too long, and the job is run again then.
     fn run_job(&mut self, axis: Axis, job: Job) -> Result<Outcome, Error> {
+        let outcome = self.run_once(axis, job)?;
+        if self.silence == Span::ZERO || !matches!(outcome, Outcome::NoReply { .. }) {
+            return Ok(outcome);
+        }
+        let (register, pause) = ALIVE;
+        let until = self.now() + self.silence;
+        while self.now() < until {
+            match self.run_once(axis, Job::Read { register })? {
+                Outcome::NoReply { .. } => self.run(pause)?,
+                _ => return self.run_once(axis, job),
+            }
+        }
+        // It is not waited for again.
+        self.silence = Span::ZERO;
+        Ok(outcome)
+    }
+
+    fn run_once(&mut self, axis: Axis, job: Job) -> Result<Outcome, Error> {
         let place = self.drives.iter().position(|drive| drive.axis == axis);
         let place = place.ok_or(Error::NoSuchDrive(axis.node))?;
         self.pause();

@@ -153,7 +153,9 @@ struct Probe<'p, 'l> {
 
 impl Probe<'_, '_> {
     fn driver(&mut self) -> Driver<'_> {
+        let tolerance = self.link.time_tolerance();
         Driver::new(Box::new(&mut *self.link), &[self.known.axis], self.patience)
+            .outlasting(tolerance)
     }
 
     fn read(&mut self, register: u8) -> Result<Reply, Error> {

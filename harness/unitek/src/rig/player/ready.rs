@@ -49,7 +49,9 @@ impl Player {
                 ..Known::new(known.axis)
             };
         }
-        let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+        let tolerance = link.time_tolerance();
+        let driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+        let mut driver = driver.outlasting(tolerance);
         if known.cells.is_empty() {
             known.read_all(&mut driver)?;
             drop(driver);
@@ -68,7 +70,8 @@ impl Player {
             }
             self.left.foretell(Vec::new(), None);
             self.profile.settle(known, self.rate)?;
-            driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+            let again = Driver::new(Box::new(&mut *link), &axes, self.patience);
+            driver = again.outlasting(tolerance);
         }
         known.read_again(&mut driver, &self.written)
     }
@@ -94,7 +97,9 @@ impl Player {
         release: bool,
         link: &mut dyn Link,
     ) -> Result<AtRest, Error> {
-        let mut driver = Driver::new(Box::new(&mut *link), &self.axes, self.patience);
+        let tolerance = link.time_tolerance();
+        let driver = Driver::new(Box::new(&mut *link), &self.axes, self.patience);
+        let mut driver = driver.outlasting(tolerance);
         for axis in &self.axes {
             driver.write(*axis, MODE, Data::Short(MODE_LOCK))?;
             for register in COMMANDS {
