@@ -91,6 +91,8 @@ pub struct Dialogue<P> {
     pub overtakes: bool,
     /// Whether all that was said has come, so that nothing is on its way any more.
     pub complete: bool,
+    /// The most pieces that the drive said and an adapter has lost.
+    pub most_lost: usize,
     /// The most steps of all worlds together.
     pub most_steps: usize,
 }
@@ -107,6 +109,8 @@ struct World<M: RightDrive> {
     heard: usize,
     /// What it has said that has not come so far.
     said: VecDeque<Said<M::Piece>>,
+    /// How much of what it has said was lost.
+    lost: usize,
 }
 
 /// A piece that a world has said.
@@ -118,14 +122,23 @@ struct Said<P> {
     may_wait: bool,
 }
 
-/// Worlds that have heard the same number of pieces, are in the same state and have said the same, as long ago, do the same from now on.
-type Same<P> = (usize, u64, Vec<(i64, P)>);
+/// Worlds that have heard and lost the same number of pieces, are in the same state and have said the same, as long ago, do the same from now
+/// on.
+type Same<P> = (usize, usize, u64, Vec<(i64, P)>);
 
 impl<M: RightDrive> World<M> {
     fn same(&self) -> Same<M::Piece> {
         let said = self.said.iter();
         let said = said.map(|own| (self.at - own.at, own.piece.clone()));
-        (self.heard, self.model.state(), said.collect())
+        (self.heard, self.lost, self.model.state(), said.collect())
+    }
+
+    /// The world in which the piece that is next to come is lost; `None` where nothing is said, or where `most` are lost.
+    fn losing(&self, most: usize) -> Option<Self> {
+        let mut own = self.clone();
+        own.said.pop_front().filter(|_| self.lost < most)?;
+        own.lost += 1;
+        Some(own)
     }
 
     /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
@@ -255,6 +268,7 @@ fn judge_one<M: RightDrive>(
         ahead: (0, 0),
         heard: 0,
         said: VecDeque::new(),
+        lost: 0,
     });
     for place in 0..=talk.came.len() {
         let mut explained = Worlds::new();
@@ -269,6 +283,10 @@ fn judge_one<M: RightDrive>(
             }
             if let Some(said) = world.said.front() {
                 expected = Some(said.piece.clone());
+            }
+            if let Some(own) = world.losing(talk.most_lost) {
+                steps += 1;
+                worlds.insert(own);
             }
             let mut heard = |world| explained.insert(world);
             let last = talk.say(&world, place, &mut heard);
@@ -465,6 +483,16 @@ mod tests {
 
     /// What was sent can reach the drive up to 3 ms later, and what came was on the bus up to 1 ms before.
     fn judged(alarm: bool, sent: &[(u64, u8)], came: &[(u64, u8)]) -> Judged<u8> {
+        judged_with(alarm, sent, came, 0)
+    }
+
+    /// The same where this many pieces may be lost.
+    fn judged_with(
+        alarm: bool,
+        sent: &[(u64, u8)],
+        came: &[(u64, u8)],
+        most_lost: usize,
+    ) -> Judged<u8> {
         let timed = |list: &[(u64, u8)], before, behind| -> Vec<_> {
             let own = |(at, piece): &(u64, u8)| Timed {
                 earliest: ms(at - before),
@@ -484,6 +512,7 @@ mod tests {
             lag: Span::from_millis(1),
             overtakes: false,
             complete: false,
+            most_lost,
             most_steps: 50_000,
         };
         judge(vec![drive], &talk)
@@ -535,6 +564,20 @@ mod tests {
         );
         assert_eq!(judged(true, &[(10, 1), (60, 2)], &[]), Judged::Right);
         assert_eq!(judged(true, &[], &[(10, 0)]), Judged::Wrong(0, None));
+    }
+
+    /// What an adapter has lost explains that something has not come, and not that something else has.
+    #[test]
+    fn lost_pieces_explain_what_has_not_come() {
+        let sent = [(10, 7), (20, 0), (40, 0), (60, 0)];
+        let came = |lost: &[(u64, u8)], most| judged_with(false, &sent, lost, most);
+        let one = [(22, 7), (62, 7)];
+        assert_ne!(came(&one, 0), Judged::Right);
+        assert_eq!(came(&one, 1), Judged::Right);
+        assert_ne!(came(&one[1..], 1), Judged::Right);
+        assert_eq!(came(&one[1..], 2), Judged::Right);
+        assert_ne!(came(&[(22, 7), (62, 8)], 2), Judged::Right);
+        assert_ne!(came(&[(22, 7), (24, 7)], 2), Judged::Right);
     }
 
     /// Where there are more worlds than are kept, nothing is accused.

@@ -62,6 +62,7 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
         end: link.now(),
         lag: late + Span::from_millis(1),
         complete: false,
+        most_lost: 0,
         most_steps: 50_000,
         overtakes: late > Span::from_millis(5),
     };
@@ -171,6 +172,7 @@ fn an_event_that_never_comes_is_missed() {
             lag: Span::from_millis(30),
             overtakes: false,
             complete: false,
+            most_lost: 0,
             most_steps: 50_000,
         };
         let drive = setup.drives[0].drive(setup.rate, Instant::START);

@@ -119,6 +119,8 @@ pub(crate) struct Player {
     /// The lines whose contents right drives alone judge, by scenario, and how the first of them was not met: where frames are late, right
     /// drives do not meet it either.
     excused: BTreeMap<String, (BTreeSet<usize>, String)>,
+    /// Of which register a frame may have been lost, and in how many attempts one behind the other, by scenario.
+    lost: BTreeMap<String, (u8, usize)>,
     /// Whether the drives are qualified.
     qualifies: bool,
     /// What shows that the program works while it plays on models.
@@ -153,6 +155,7 @@ impl Player {
             stored: false,
             before: None,
             excused: BTreeMap::new(),
+            lost: BTreeMap::new(),
             qualifies: false,
             beats: Beats::default(),
             left: NotPutBack::default(),
@@ -299,7 +302,10 @@ impl Player {
                 let exact = way.tolerance == Span::ZERO;
                 let shown = match exact && !own.by_frames {
                     true => Shown::Unknown(BY_LINES),
-                    false => self.shown(&told),
+                    false => {
+                        let shown = self.shown(&told);
+                        self.lost_again(own, shown)
+                    }
                 };
                 let wrong = matches!(shown, Shown::Wrong(_));
                 let outcome = self.judged(own, *outcome, exact, (&told.unlike, shown));

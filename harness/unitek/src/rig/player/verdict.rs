@@ -14,6 +14,12 @@ use std::collections::BTreeSet;
 /// Why a line that was not met accuses nothing.
 const LATE_ALONE: &str = "right drives send the same where frames are as late as these: the line is not met for that reason alone";
 
+/// In how many attempts at a scenario, one behind the other, an adapter may have lost a frame of the same register.
+const LOST_BY_THE_ADAPTER: usize = 2;
+
+/// Why what has not come accuses nothing.
+const LOST: &str = "an adapter may have lost it, and all else is what right drives send";
+
 /// Why a line that was not met accuses nothing, where right drives were compared.
 const NOT_COMPARED: &str = "right drives send the same as far as it is compared, and the contents of this line follow from the plant or from inputs";
 
@@ -21,6 +27,21 @@ const NOT_COMPARED: &str = "right drives send the same as far as it is compared,
 const UNDER_WAY: &str = "right drives could have sent this with another value of what the manual leaves open, or with frames that are still on their way";
 
 impl Player {
+    /// What was shown, where it is compared with the attempts before: a drive that does not send something does not send it each time.
+    pub(super) fn lost_again(&mut self, own: &Own, shown: Shown) -> Shown {
+        let before = self.lost.remove(&own.name);
+        let Shown::Lost(register, why) = shown else {
+            return shown;
+        };
+        let same = before.filter(|own| own.0 == register);
+        let times = same.map_or(1, |own| own.1 + 1);
+        if times > LOST_BY_THE_ADAPTER {
+            return Shown::Wrong(why);
+        }
+        self.lost.insert(own.name.clone(), (register, times));
+        Shown::Lost(register, why)
+    }
+
     /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met: a line accuses the drive where time
     /// is virtual and right drives were compared to the end.
     pub(super) fn judged(
@@ -33,6 +54,13 @@ impl Player {
         let excused = self.excused.get(&own.name).map(|(_, found)| found.clone());
         match (outcome.verdict, shown) {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
+            (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
+                verdict: Verdict::Inconclusive,
+                remarks: std::iter::once(format!("{why}: {LOST}"))
+                    .chain(outcome.remarks)
+                    .collect(),
+                ..outcome
+            },
             (Verdict::Failed, Shown::Complete) => {
                 match self.excuses(own, &outcome, unlike) {
                     // What stands behind the line is played in the next attempt.

@@ -31,6 +31,9 @@ const USUALLY: Span = Span::from_millis(3);
 /// How much later than the slowest one that was measured a frame may be.
 const WORSE: u64 = 3;
 
+/// The most frames of an attempt that an adapter may lose.
+const MOST_LOST: usize = 3;
+
 /// FW-VERSION.
 const FIRMWARE: u8 = 0x1B;
 
@@ -78,6 +81,8 @@ impl Told {
 pub(super) enum Shown {
     /// Something no right drive would have sent, in a sentence.
     Wrong(String),
+    /// An adapter may have lost frames, and all else is what right drives send: what has not come, with its register.
+    Lost(u8, String),
     /// Right drives could have sent all of it, and nothing more.
     Complete,
     /// Right drives could have sent all of it.
@@ -99,6 +104,7 @@ impl Shown {
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Wrong(why), _) | (_, Self::Wrong(why)) => Self::Wrong(why),
+            (own @ Self::Lost(..), _) | (_, own @ Self::Lost(..)) => own,
             (Self::Unknown(why), _) | (_, Self::Unknown(why)) => Self::Unknown(why),
             (Self::Complete, Self::Complete) => Self::Complete,
             _ => Self::Right,
@@ -121,17 +127,18 @@ impl Player {
             Ok(came) => came,
             Err(why) => return Shown::Unknown(why),
         };
-        let judged = |properties, late: Span, (overtakes, complete)| {
+        let judged = |properties, late: Span, (overtakes, complete), most_lost| {
             let talk = Dialogue {
                 overtakes,
                 complete,
+                most_lost,
                 ..conversation(talk, &came, late)
             };
             let world = self.world(known, properties, &unlike);
             judge_alive(vec![world], &talk, &|| self.beats.beat())
         };
         for (late, overtakes) in told.lateness() {
-            match judged(known.properties, late, (overtakes, true)) {
+            match judged(known.properties, late, (overtakes, true), 0) {
                 Judged::Right => return Shown::Complete,
                 Judged::TooMany => return Shown::Unknown(TOO_MANY),
                 Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
@@ -146,15 +153,30 @@ impl Player {
         });
         let mut wrong = None;
         for properties in std::iter::once(known.properties).chain(others) {
-            match judged(properties, told.slowest(), (true, false)) {
+            match judged(properties, told.slowest(), (true, false), 0) {
                 Judged::Right => return Shown::Right,
                 Judged::TooMany => return Shown::Unknown(TOO_MANY),
                 Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
                 Judged::Wrong(place, expected) => wrong = wrong.or(Some((place, expected))),
             }
         }
-        let words = |(place, expected)| words(known, (&came, place), expected);
-        wrong.map_or(Shown::Unknown(NOT_FORETOLD), |own| Shown::Wrong(words(own)))
+        let Some((place, expected)) = wrong else {
+            return Shown::Unknown(NOT_FORETOLD);
+        };
+        let loses = || {
+            let mut lateness = told.lateness().into_iter();
+            lateness.any(|(late, overtakes)| {
+                let lossy = judged(known.properties, late, (overtakes, false), MOST_LOST);
+                lossy == Judged::Right
+            })
+        };
+        let missing = expected.filter(|_| told.way.tolerance > Span::ZERO && loses());
+        let register = missing.and_then(|own| own.data().first().copied());
+        let why = words(known, (&came, place), expected);
+        match register {
+            Some(register) => Shown::Lost(register, why),
+            None => Shown::Wrong(why),
+        }
     }
 
     /// Whether a drive with a deviation could have sent what came from it in an attempt; `None` where that is not compared. Before the attempt
@@ -321,6 +343,7 @@ fn conversation(
         lag: late,
         overtakes: false,
         complete: false,
+        most_lost: 0,
         most_steps: STEPS,
     }
 }
