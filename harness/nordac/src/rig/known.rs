@@ -94,7 +94,7 @@ impl Known {
         for parameter in all.filter(|own| !own.needs_posicon()) {
             for ind in indices(parameter) {
                 let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
-                let answer = answer(self.slave, talk, task)?;
+                let answer = confirmed(self.slave, talk, task)?;
                 if let Some((answer, value)) = answer.and_then(|own| Some((own, value(own)?))) {
                     self.values.insert((parameter.number, ind), value);
                     self.shown.insert((parameter.number, ind), answer.pwe);
@@ -179,6 +179,26 @@ pub(super) fn answer(
             continue;
         }
         return Ok(Some(shown));
+    }
+    Ok(None)
+}
+
+/// The same, as the exchange behind it shows it too: a value is put back later, and a wrong slave may show the one of an earlier answer first.
+fn confirmed(slave: RigSlave, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<Pkw>, TalkError> {
+    let Some(mut last) = answer(slave, talk, task)? else {
+        return Ok(None);
+    };
+    let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default());
+    let outputs = Image {
+        pkw: task,
+        ..Image::default()
+    };
+    for _ in 0..MOST_EXCHANGES {
+        let shown = talk.exchange(address, ppo, &outputs)?.pkw;
+        if shown == last {
+            return Ok(Some(last));
+        }
+        last = shown;
     }
     Ok(None)
 }

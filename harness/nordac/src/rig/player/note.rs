@@ -292,6 +292,7 @@ impl AttemptNote {
             slave
         });
         let slaves: Vec<_> = slaves.collect();
+        self.begun.beats.beat();
         could_send(&slaves, self.begun.rate, &self.turns).is_ok()
     }
 
