@@ -119,7 +119,7 @@ fn frames_and_telegrams() {
                   [68 0C 0C 68 88 82 6C 3D 3E 80 00 00 0B 75 31 00 22 16]\n\
                   0.000506 slave 8             Set_Prm        confirmed  [E5]\n";
     assert!(telegrams.starts_with(begins), "{telegrams}");
-    let last = "3.004884 slave 8   2         Data_Exchange  ZSW 0F37 (OE, at setpoint, bus control, reference, clockwise)";
+    let last = "0.754884 slave 8   2         Data_Exchange  ZSW 0F37 (OE, at setpoint, bus control, reference, clockwise)";
     assert!(telegrams.contains(last), "{telegrams}");
 }
 

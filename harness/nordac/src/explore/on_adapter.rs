@@ -121,6 +121,11 @@ impl LineRig for Nordac {
             if sent.bad.is_some() {
                 return Some("only a simulated line can be disturbed".to_owned());
             }
+            if is_followed(&sent.octets) {
+                return Some(
+                    "an adapter may part octets that follow a telegram from it".to_owned(),
+                );
+            }
             let now = began + done.at.since_start();
             let mut octets = sent.octets.iter();
             if let Some(why) = octets.find_map(|own| gate.admit(now, *own).err()) {
@@ -178,6 +183,11 @@ impl LineRig for Nordac {
             .next();
         (first.map(TelegramDifference::from), false)
     }
+}
+
+/// Whether a telegram begins these octets and others follow it: whether a slave takes it depends on the gap between them.
+fn is_followed(octets: &[u8]) -> bool {
+    matches!(Telegram::decode(octets), Decoded::Value { used, .. } if used < octets.len())
 }
 
 /// What goes out for each act of a conversation, once for each time; `None` where an act sends nothing.

@@ -1,13 +1,14 @@
 //! What slaves held before a fuzz run, and what its conversations may have written: put back behind each of them.
 
-use super::known::Known;
-use super::observed::writes;
+use super::known::{Known, PPO_TYPE};
+use super::observed::{changes, moves_to};
 use super::player::Player;
 use super::rate;
 use super::session::{OfNordac as _, Session};
 use super::talk::TalkError;
 use crate::gate::GuardsSlaves as _;
 use harness_proto::nordac::guard::Limits;
+use harness_proto::nordac::{Pkw, PpoType};
 use std::collections::BTreeSet;
 
 /// Slaves of a session, as they were.
@@ -42,8 +43,8 @@ impl HeldBefore {
         !self.0.written.is_empty()
     }
 
-    /// Notes telegrams that are about to be sent. Every address that one of them gives to a slave is asked for its status: returns why they are
-    /// not sent, where another station answers there.
+    /// Notes telegrams that are about to be sent. Returns why they are not sent: behind them a slave may have no parameter channel, by which
+    /// alone it can be put back, or the address of another station. Every such address is asked for its status.
     ///
     /// # Errors
     /// The link is in trouble.
@@ -52,10 +53,17 @@ impl HeldBefore {
         session: &mut Session,
         telegrams: impl Iterator<Item = &'t [u8]>,
     ) -> Result<Option<String>, TalkError> {
-        let all: Vec<_> = telegrams.flat_map(writes).collect();
+        let all: Vec<_> = telegrams.flat_map(changes).collect();
+        let mut types = all.iter().filter(|own| own.1.number() == PPO_TYPE);
+        if let Some((slave, task)) = types.find(|own| !has_channel(own.1)) {
+            let value = task.low_word();
+            return Ok(Some(format!(
+                "with {PPO_TYPE} = {value} slave {slave} may have no parameter channel, by which it is put back"
+            )));
+        }
         let moved = all
             .iter()
-            .filter_map(|((slave, ..), to)| Some((*slave, (*to)?)));
+            .filter_map(|(slave, task)| Some((*slave, moves_to(*task)?)));
         let moved: BTreeSet<_> = moved.filter(|(slave, to)| slave != to).collect();
         let mut talk = session.talk();
         for (slave, to) in moved {
@@ -65,7 +73,10 @@ impl HeldBefore {
                 )));
             }
         }
-        self.0.written.extend(all.into_iter().map(|own| own.0));
+        let written = all
+            .iter()
+            .map(|(slave, task)| (*slave, task.number(), task.ind));
+        self.0.written.extend(written);
         Ok(None)
     }
 
@@ -81,4 +92,11 @@ impl HeldBefore {
         }
         notes
     }
+}
+
+/// Whether a slave has a parameter channel behind a task that changes its PPO type, which is numbered from 0 there (NORDAC 5.5).
+fn has_channel(task: Pkw) -> bool {
+    let number = u8::try_from(task.low_word().saturating_add(1)).ok();
+    let ppo = number.and_then(PpoType::from_number);
+    ppo.is_none_or(PpoType::has_pkw)
 }

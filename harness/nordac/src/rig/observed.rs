@@ -217,8 +217,8 @@ impl TelegramNotes {
     }
 }
 
-/// What a telegram may write, in every layout that its length fits, and the address that each of these may give to the station.
-pub(super) fn writes(octets: &[u8]) -> Vec<(Written, Option<u8>)> {
+/// The tasks by which a telegram may change parameters, in every layout that its length fits, each with the station.
+pub(super) fn changes(octets: &[u8]) -> Vec<(u8, Pkw)> {
     let telegram = Telegram::decode(octets).value();
     let exchange = telegram
         .as_ref()
@@ -229,18 +229,19 @@ pub(super) fn writes(octets: &[u8]) -> Vec<(Written, Option<u8>)> {
     };
     let layouts = PpoType::ALL.into_iter().filter(|own| own.has_pkw());
     let tasks = layouts.filter_map(|ppo| Some(Image::decode(ppo, pdu.data())?.pkw));
-    let changes = tasks
-        .filter(|own| own.task().is_change() && own.task() != Task::ChangeDescription)
-        .map(|own: Pkw| {
-            let moved = match own.number() {
-                ADDRESS => u8::try_from(own.low_word()).ok(),
-                number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
-                _ => None,
-            };
-            let moved = moved.filter(|own| (1..=DEFAULT_ADDRESS).contains(own));
-            ((pdu.da(), own.number(), own.ind), moved)
-        });
-    changes.collect()
+    let changes =
+        tasks.filter(|own| own.task().is_change() && own.task() != Task::ChangeDescription);
+    changes.map(|own| (pdu.da(), own)).collect()
+}
+
+/// The address that a task may give to its station.
+pub(super) fn moves_to(task: Pkw) -> Option<u8> {
+    let to = match task.number() {
+        ADDRESS => u8::try_from(task.low_word()).ok(),
+        number if WIPES.contains(&number) => Some(DEFAULT_ADDRESS),
+        _ => None,
+    };
+    to.filter(|own| (1..=DEFAULT_ADDRESS).contains(own))
 }
 
 impl LinkNotes for TelegramNotes {
@@ -259,9 +260,9 @@ impl LinkNotes for TelegramNotes {
             });
         }
         self.reach(end);
-        for (written, moved) in writes(what.octets()) {
-            self.written.insert(written);
-            self.moved.extend(moved.map(|own| (written.0, own)));
+        for (station, task) in changes(what.octets()) {
+            self.written.insert((station, task.number(), task.ind));
+            self.moved.extend(moves_to(task).map(|own| (station, own)));
         }
     }
 

@@ -15,8 +15,10 @@ const LEAST: Span = Span::from_millis(400);
 /// In this many parts a wait is divided.
 const PARTS: u64 = 64;
 
-/// With this many hundredths of what is left of a wait the replies must be the same too: a motor is not exact.
+/// With this many hundredths of what is left of a wait the replies must be the same too, and with this much less: a motor is not exact, and a
+/// computer that is late must not leave it open whether a time was over.
 const MARGIN: u64 = 95;
+const SLACK: Span = Span::from_millis(100);
 
 impl Player {
     /// The same scenario with waits that are as long as right slaves need for the same replies.
@@ -50,7 +52,9 @@ impl Player {
             let (mut lower, mut upper) = (0, PARTS);
             while lower + 1 < upper {
                 let middle = lower.midpoint(upper);
-                let enough = lasts(of(middle) / 100 * MARGIN) && lasts(of(middle));
+                let all = of(middle);
+                let least = (all / 100 * MARGIN).min(all.saturating_sub(SLACK.units()));
+                let enough = lasts(least) && lasts(all);
                 *if enough { &mut upper } else { &mut lower } = middle;
             }
             let units = if upper == PARTS {
