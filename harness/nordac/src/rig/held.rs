@@ -100,3 +100,27 @@ fn has_channel(task: Pkw) -> bool {
     let ppo = number.and_then(PpoType::from_number);
     ppo.is_none_or(PpoType::has_pkw)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1622 is numbered from 0: PPO types 1 and 2 have a parameter channel, and what is no type is refused (NORDAC 3.1, 5.5).
+    #[test]
+    fn types_without_a_parameter_channel_are_not_written() {
+        let has = [true, true, false, false, true];
+        for (value, has) in (0..).zip(has) {
+            assert_eq!(has_channel(Pkw::of(2, PPO_TYPE, 0, value)), has, "{value}");
+        }
+    }
+
+    /// Another address (1624), and the factory setting, behind which it is 126 (NORDAC 4.1.3, 5.5).
+    #[test]
+    fn addresses_are_read_out_of_tasks() {
+        let moved = |number, value| moves_to(Pkw::of(2, number, 0, value));
+        assert_eq!(moved(1624, 9), Some(9));
+        assert_eq!(moved(1624, 200), None);
+        assert_eq!(moved(970, 1), Some(126));
+        assert_eq!(moved(1625, 9), None);
+    }
+}

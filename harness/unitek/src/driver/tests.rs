@@ -152,3 +152,28 @@ fn cycles_come_as_events() {
     driver.run(Span::from_millis(100)).expect("time passes");
     assert_eq!(driver.events().count(), 0);
 }
+
+/// A computer or an adapter that stands still is outlasted; a drive that stays silent is waited for once, and the other one answers.
+#[test]
+fn a_silence_is_outlasted_once() {
+    let mut line = line(&released(), Limits::unlimited());
+    line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
+    let back = line.now() + Span::from_millis(1_250);
+    line.inject(0, PlacedFault::Drive(1, DriveFault::On), Moment::At(back));
+    let mut driver = driver(&mut line).outlasting(Span::from_millis(1));
+    driver.read(axis(1), 0x1B).expect("it is back");
+    assert!(driver.now() >= back);
+    drop(driver);
+    line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
+    let mut driver = self::driver(&mut line).outlasting(Span::from_millis(1));
+    for least in [SILENCE, Span::ZERO] {
+        let began = driver.now();
+        driver.read(axis(1), 0x1B).expect_err("silence");
+        let took = driver.now().since(began);
+        assert!(
+            took >= least && took < least + Span::from_millis(300),
+            "{took}"
+        );
+    }
+    driver.read(axis(2), 0x1B).expect("the other one answers");
+}

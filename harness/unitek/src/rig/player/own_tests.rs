@@ -1,11 +1,12 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
+use super::worlds::Shown;
 use super::{CONVERSATION, Own, Player};
 use crate::BUSES;
 use crate::rig::Axis;
 use crate::rig::qualify::conversations;
 use harness_bench::rig::segment::SegmentRun as _;
-use harness_bench::rig::segment::run::PortRun;
+use harness_bench::rig::segment::run::{PortPlayer as _, PortRun};
 use harness_bench::rig::{UseOptions, parse};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::source::Source;
@@ -22,18 +23,21 @@ const WRONG: [(&str, &str); 6] = [
     ("speed-on-ramps", "speed-without-sign"),
 ];
 
-/// A rig with one simulated drive that is set up by lines.
-fn bench(setup: &[&str]) -> PortRun<Player> {
+/// The file of a rig with one simulated drive that is set up by lines.
+fn desk(setup: &[&str]) -> Source {
     let text = format!(
         "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n\
          [sim]\nbus = \"unitek\"\nsetup = {setup:?}\n\
          [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n"
     );
-    let file = Source {
+    Source {
         name: "desk.toml".to_owned(),
         text: text.into(),
-    };
-    let rig = parse(&file, &BUSES).expect("a rig's file");
+    }
+}
+
+fn bench(setup: &[&str]) -> PortRun<Player> {
+    let rig = parse(&desk(setup), &BUSES).expect("a rig's file");
     let options = UseOptions {
         allow_motion: true,
         ill_as_well: true,
@@ -113,5 +117,28 @@ fn faults_on_frames_accuse_no_drive() {
         let source = Source { name, text };
         let outcome = outcome(&mut bench(&[]), &source);
         assert_eq!(outcome.verdict, Verdict::Passed, "{}", source.name);
+    }
+}
+
+/// An adapter loses a frame of one register or another; a drive that does not send it is silent each time.
+#[test]
+fn what_is_lost_each_time_accuses() {
+    let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
+    let mut player = Player::new(&rig, true, true);
+    let (_, source) = by_frames().swap_remove(0);
+    let own = Own::read(&source).expect("a conversation");
+    let lost = |register| Shown::Lost(register, "it has not come".to_owned());
+    let wrong = Shown::Wrong("it has not come".to_owned());
+    for (shown, expected) in [
+        (lost(0x30), lost(0x30)),
+        (lost(0x30), lost(0x30)),
+        (lost(0x31), lost(0x31)),
+        (lost(0x31), lost(0x31)),
+        (Shown::Complete, Shown::Complete),
+        (lost(0x31), lost(0x31)),
+        (lost(0x31), lost(0x31)),
+        (lost(0x31), wrong),
+    ] {
+        assert_eq!(player.lost_again(&own, shown), expected);
     }
 }
