@@ -15,7 +15,6 @@ use harness_proto::unitek::frame::{Data, Reply, Request};
 use harness_proto::unitek::guard::{Gate, Places};
 use harness_proto::unitek::units::{Given, Scaling, shown};
 use harness_proto::unitek::words::{ERRORS, MODE_LOCK, set_bits, status};
-use std::fmt::Write as _;
 
 /// The registers of a speed and of a torque command.
 const COMMANDS: [u8; 2] = [0x31, 0x90];
@@ -25,6 +24,9 @@ const MODE: u8 = 0x51;
 
 /// How often a register is written that does not take its value: a frame may be lost.
 const TRIES: usize = 3;
+
+/// Time behind a port, where a silent drive may be asked again (`Driver::outlasting`).
+const REAL: Span = Span::from_millis(1);
 
 /// How often the speed of a drive is looked at that does not stand yet.
 const AGAIN: Span = Span::from_millis(20);
@@ -64,9 +66,7 @@ pub(crate) fn safe_state<L: Line>(
     let gate = line.segment();
     let cycles: Vec<_> = gate.map_or_else(Vec::new, |own| own.cycles().collect());
     let places: Vec<_> = gate.map_or_else(Vec::new, |own| own.places().collect());
-    let mut reports = String::new();
-    let (mut safe, mut back) = (true, true);
-    for axis in axes {
+    let mut report = |axis: &Axis, tolerance| {
         let places = places.iter().find(|own| own.first == (axis.rx, axis.tx));
         let mut place = Place {
             line,
@@ -75,38 +75,47 @@ pub(crate) fn safe_state<L: Line>(
             places,
         };
         let at = place.find();
-        let mut driver = Driver::new(Box::new(&mut *place.line), &[at], patience);
+        let driver = Driver::new(Box::new(&mut *place.line), &[at], patience);
+        let mut driver = driver.outlasting(tolerance);
         let own = cycles.iter().filter(|(rx, _)| *rx == axis.rx);
         let own: Vec<_> = own.map(|(_, register)| *register).collect();
         let made = make_safe(&mut driver, at, &own, standing);
         drop(driver);
-        let sent = match made {
-            Ok(_) => still_sent(place.line, axis.rx, (at.rx, at.tx)),
-            Err(_) => Vec::new(),
+        let report = match made {
+            Ok(report) => report,
+            Err(why) => {
+                let lost = place.lost(way_back);
+                return Report {
+                    end: why.end(),
+                    words: format!("NOT confirmed: {why}{lost}"),
+                };
+            }
         };
+        let sent = still_sent(place.line, axis.rx, (at.rx, at.tx));
         let sent = sent.iter().map(|register| {
             let rx = at.rx;
             format!("; register {register:02X} is still sent: {rx:03X}#3D{register:02X}FF has not ended it")
         });
-        let made = made.map(|report| report + &sent.collect::<String>());
-        let words = match made {
-            Ok(report) => match place.bring_back(at) {
-                Ok(None) => report,
-                Ok(Some(note)) => format!("{report}; {note}"),
-                Err(why) => {
-                    back = false;
-                    format!("{report}; NOT as it was found: {why}")
-                }
-            },
-            Err(why) => {
-                safe = false;
-                let lost = place.lost(way_back);
-                format!("NOT confirmed: {why}{lost}")
-            }
+        let report = report + &sent.collect::<String>();
+        let (end, words) = match place.bring_back(at) {
+            Ok(None) => (End::Safe, report),
+            Ok(Some(note)) => (End::Safe, format!("{report}; {note}")),
+            Err(why) => (
+                End::Elsewhere,
+                format!("{report}; NOT as it was found: {why}"),
+            ),
         };
-        // Writing to a String cannot fail.
-        let _infallible = write!(reports, "\n  drive {}: {words}", axis.node);
+        Report { end, words }
+    };
+    let mut reports: Vec<_> = axes.iter().map(|axis| report(axis, Span::ZERO)).collect();
+    // An adapter may have stood still. All other drives are safe before one is waited for.
+    for (axis, own) in axes.iter().zip(&mut reports) {
+        if own.end == End::Silent {
+            *own = report(axis, REAL);
+        }
     }
+    let safe = (reports.iter()).all(|own| matches!(own.end, End::Safe | End::Elsewhere));
+    let back = reports.iter().all(|own| own.end != End::Elsewhere);
     let words = match (safe, back) {
         (true, true) => "safe state: every drive is locked and stands, with commands 0",
         (true, false) => {
@@ -116,7 +125,42 @@ pub(crate) fn safe_state<L: Line>(
     };
     Safe {
         confirmed: safe && back,
-        words: format!("{words}{reports}"),
+        words: (axes.iter().zip(&reports)).fold(words.to_owned(), |words, (axis, own)| {
+            format!("{words}\n  drive {}: {}", axis.node, own.words)
+        }),
+    }
+}
+
+/// What became of a drive.
+struct Report {
+    end: End,
+    words: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    Safe,
+    /// Safe, but not on the identifiers of the rig's file.
+    Elsewhere,
+    Silent,
+    NotSafe,
+}
+
+/// Why a drive is not confirmed.
+#[derive(Debug, thiserror::Error)]
+enum NotSafe {
+    #[error(transparent)]
+    Call(#[from] Error),
+    #[error("{0}")]
+    Reads(String),
+}
+
+impl NotSafe {
+    const fn end(&self) -> End {
+        match self {
+            Self::Call(Error::NoReply { .. }) => End::Silent,
+            Self::Call(_) | Self::Reads(_) => End::NotSafe,
+        }
     }
 }
 
@@ -222,11 +266,11 @@ fn make_safe(
     axis: Axis,
     cycles: &[u8],
     standing: &Standstill,
-) -> Result<String, String> {
+) -> Result<String, NotSafe> {
     let mut why = Ok(());
     let mut note = |done: Result<(), Error>| {
-        if let (Ok(()), Err(error)) = (&why, done) {
-            why = Err(error.to_string());
+        if why.is_ok() {
+            why = done;
         }
     };
     if standing.order.contains(&StandstillStep::Stop) && driver.permits_write(axis, COMMANDS[0], 0)
@@ -246,23 +290,21 @@ fn make_safe(
     }
     why?;
     stands(driver, axis, standing)?;
-    let read = |driver: &mut Driver<'_>, register| {
-        let reply = driver.read(axis, register);
-        reply.map_err(|error| error.to_string())
-    };
+    let read = |driver: &mut Driver<'_>, register| driver.read(axis, register);
     let [mode, speed, torque] = [0x51, 0x31, 0x90].map(|register| read(driver, register));
     let value = |reply: Reply| low(reply.data.bits());
     let (mode, speed, torque) = (value(mode?), value(speed?), value(torque?));
     let locks = standing.order.contains(&StandstillStep::Block);
     if locks && (mode & MODE_LOCK == 0 || speed != 0 || torque != 0) {
-        return Err(format!(
+        return Err(NotSafe::Reads(format!(
             "MODE reads {mode:04X}, the speed command {speed:04X}, the torque command {torque:04X}"
-        ));
+        )));
     }
     let [ready, errors, state] = [0xE2, 0x8F, 0x40].map(|register| read(driver, register));
     let (ready, errors, state) = (value(ready?), errors?.data.bits(), state?.data.bits());
     if locks && state & status::ENABLED != 0 {
-        return Err(format!("STATUS reads {state:X}: the drive is enabled"));
+        let why = format!("STATUS reads {state:X}: the drive is enabled");
+        return Err(NotSafe::Reads(why));
     }
     let errors: Vec<_> = set_bits(ERRORS, errors).map(|bit| bit.name).collect();
     let errors = match errors.is_empty() {
@@ -282,15 +324,14 @@ const fn low(bits: u32) -> u16 {
 }
 
 /// Waits until a drive stands.
-fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<(), String> {
-    let text = |error: Error| error.to_string();
-    let full = driver.read(axis, 0xCE).map_err(text)?;
+fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<(), NotSafe> {
+    let full = driver.read(axis, 0xCE)?;
     let full = f64::from(low(full.data.bits()));
     let end = driver.now() + standing.within;
     loop {
         // The speed may be read before a computer stands still for all that time.
         let over = driver.now() >= end;
-        let reply = driver.read(axis, 0x30).map_err(text)?;
+        let reply = driver.read(axis, 0x30)?;
         // 32767 is 100 % (UNITEK 6.1).
         let raw = f64::from(low(reply.data.bits()).cast_signed());
         let rpm = raw * full / 32_767.0;
@@ -306,12 +347,12 @@ fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<
                 scaling,
             );
             let percent = speed.map_or_else(String::new, |speed| format!(" ({speed})"));
-            return Err(format!(
+            return Err(NotSafe::Reads(format!(
                 "waited {} for it to stand; its speed is {rpm:.0} rpm{percent}",
                 standing.within
-            ));
+            )));
         }
-        driver.run(AGAIN).map_err(text)?;
+        driver.run(AGAIN)?;
     }
 }
 
@@ -455,6 +496,24 @@ mod tests {
         );
         assert!(safe.words.contains("drive 2: ready"), "{safe}");
         assert_eq!(registers(&line, 2)[..3], [4, 0, 0]);
+    }
+
+    /// An adapter that stood still for 1.5 s: the other drive is locked first, then the silent one is asked again.
+    #[test]
+    fn a_drive_that_answers_late_is_confirmed() {
+        let mut line = line(Limits::unlimited());
+        send(&mut line, &["202#31FF7F"]);
+        line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
+        let back = Moment::At(line.now() + Span::from_millis(1_500));
+        line.inject(0, PlacedFault::Drive(1, DriveFault::On), back);
+        let safe = safe(&mut line);
+        assert!(safe.confirmed, "{safe}");
+        let trace = line.inner().trace(0);
+        let frames = trace.channels[0].frames().iter();
+        let texts: Vec<_> = frames.map(|own| own.frame.to_string()).collect();
+        let first = |text| texts.iter().position(|own| own == text);
+        let last = texts.iter().rposition(|own| own == "201#510400");
+        assert!(first("202#510400") < last, "{texts:?}");
     }
 
     /// Cycles that were started are stopped, and identifiers are set back.
