@@ -9,7 +9,7 @@ use crate::command::deviations::DeviationRow;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
-use crate::command::port_row::PortCommands;
+use crate::command::rig_commands::RigCommands;
 use crate::command::sim::SimArguments;
 use crate::manual::Manual;
 use crate::rig::buses::{PortRow, RigBuses};
@@ -64,6 +64,8 @@ pub struct Bus {
     pub live: fn(&RecordedPlace, Option<u8>) -> Box<dyn LiveText>,
     /// Targets whose inputs are bytes or frames of the bus, and what their inputs reach.
     pub fuzz: (&'static [FuzzTarget], &'static [Noting]),
+    /// What the commands ask of its rigs; `None` for a bus that has none.
+    pub rigs: Option<RigCommands>,
     /// What it has where its stations share one line; `None` for rings.
     pub shared: Option<SharedLine>,
 }
@@ -72,8 +74,6 @@ pub struct Bus {
 pub struct SharedLine {
     /// What the files of rigs ask.
     pub port: &'static PortRow,
-    /// What the commands on rigs ask.
-    pub commands: PortCommands,
     pub report: &'static dyn SegmentReport,
     /// The file that describes this many drives to other tools.
     pub description: fn(u16) -> String,

@@ -51,9 +51,9 @@ pub static BUS: Bus = Bus {
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
     live: |_, _| Box::<report::live::TelegramText>::default(),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
+    rigs: Some(rig::COMMANDS),
     shared: Some(SharedLine {
         port: &rig::PORT,
-        commands: rig::COMMANDS,
         report: &report::TelegramReport,
         description: |_| GSD.to_owned(),
         replayed: capture::scenario,

@@ -50,5 +50,6 @@ pub static BUS: Bus = Bus {
         Box::new(report::live::LinkText::new(from, to, rate, drives))
     },
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
+    rigs: Some(cli::COMMANDS),
     shared: None,
 };

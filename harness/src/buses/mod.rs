@@ -13,20 +13,19 @@ pub use harness_unitek as unitek;
 pub use novobus::language::{plan, syntax};
 pub use novobus::link::SimulatedLink;
 
-pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
-pub(crate) use novobus::{cli as commands, driver, twin};
+pub(crate) use novobus::driver;
 
 use crate::bus::{Bus, SharedLine};
 use crate::bus_name::BusName;
 use crate::capture::Carries;
-use crate::command::args::ListFormat;
 use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
-use crate::command::fuzz::LineFuzz;
+use crate::command::fuzz::FuzzCommands;
 use crate::command::held::HeldBench;
 use crate::command::output::Output;
-use crate::command::rig_failure::{self, exit_of};
+use crate::command::rig_commands::RigCommands;
+use crate::command::rig_failure;
 use crate::command::rig_name::RigName;
 use crate::command::sim::SimArguments;
 use crate::rig::buses::RigBuses;
@@ -36,7 +35,6 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::serve::{ServeEnd, ServeError};
 use crate::traffic::SegmentReport;
-use commands::rig_check::CheckRigArguments;
 use harness_sim::record::Trace;
 use std::path::Path;
 use std::rc::Rc;
@@ -63,12 +61,6 @@ pub(crate) fn carrier(carries: Carries) -> &'static Bus {
 /// The same where it is a line that stations share; `None` for links of a ring.
 pub(crate) fn carrying(carries: Carries) -> Option<&'static SharedLine> {
     carrier(carries).shared.as_ref()
-}
-
-/// The line at the port of a rig; `None` for rings.
-fn line_of(rig: &Rig) -> Option<&'static SharedLine> {
-    let bus = rig.port()?.bus;
-    shared_lines().find(|line| line.port.bus == bus)
 }
 
 /// The bus of a rig.
@@ -107,29 +99,48 @@ pub(crate) fn find_any_rig(name: &str, output: &mut Output) -> Option<Rig> {
     rig_failure::find_any_rig(name, &RIG_BUSES, output)
 }
 
-/// Takes a rig with a port, to play scenarios on it.
+/// What the commands ask of the bus of a rig.
+fn commands_of(rig: &Rig) -> Option<&'static RigCommands> {
+    bus_of(rig).rigs.as_ref()
+}
+
+/// Whether every scenario on a rig may bring drives of its own.
+pub(crate) fn is_bare(rig: &Rig) -> bool {
+    commands_of(rig).is_some_and(|commands| (commands.is_bare)(rig))
+}
+
+/// A bus that is not built serves no rig.
+fn no_rigs(rig: &Rig) -> String {
+    format!(
+        "{}: the bus {} has no rigs",
+        rig.id(),
+        bus_of(rig).name.name()
+    )
+}
+
+/// Takes a rig to play scenarios on it.
 ///
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
 pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError> {
-    match line_of(rig) {
-        Some(line) => (line.commands.run)(rig, options),
+    match commands_of(rig) {
+        Some(commands) => (commands.run)(rig, options),
         None => Err(SessionError::Drives {
             rig: rig.id().to_owned(),
-            why: "it has no [port.1]".to_owned(),
+            why: no_rigs(rig),
         }),
     }
 }
 
-/// Judges what was played on a rig with a port again, with or without `--allow-motion`, by a qualification or by a run; `None` for a bench
-/// with rings.
-pub(crate) fn judge_of(
-    rig: &Rig,
-    allow_motion: bool,
-    qualifies: bool,
-) -> Option<Box<dyn SegmentJudge>> {
-    let line = line_of(rig)?;
-    Some((line.commands.judge)(rig, allow_motion, qualifies))
+/// Judges what was played on a rig again, by a qualification or by a run.
+///
+/// # Errors
+/// The rig's file describes no drives, in a sentence.
+pub(crate) fn judge_of(rig: &Rig, qualifies: bool) -> Result<Box<dyn SegmentJudge>, String> {
+    match commands_of(rig) {
+        Some(commands) => (commands.judge)(rig, qualifies),
+        None => Err(no_rigs(rig)),
+    }
 }
 
 /// How traces of a shared line are shown; `None` for a ring.
@@ -143,24 +154,23 @@ pub(crate) fn carried(traces: &[Trace]) -> &'static str {
 }
 
 /// Runs a command on drives, in the words of the bus of its bench.
-pub(crate) fn drive(mut command: DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn drive(command: DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
     if let DriveCommand::Sim(arguments) = &command {
         return told(sim(arguments, output), output);
     }
-    let Some(RigName::Named(name)) = command.rig().and_then(|own| own.rig.as_ref()) else {
-        return novobus::cli::drive(&command, output);
+    let named = command.rig().and_then(|own| own.rig.as_ref());
+    let rig = match named {
+        Some(RigName::Named(name)) => match find_any_rig(name, output) {
+            Some(rig) => Some(Rc::new(rig)),
+            None => return Ok(Exit::Usage),
+        },
+        _ => None,
     };
-    let Some(rig) = find_any_rig(name, output) else {
+    let bus = rig.as_deref().map_or(BUSES[0], bus_of);
+    let Some(commands) = &bus.rigs else {
         return Ok(Exit::Usage);
     };
-    let Some(line) = line_of(&rig) else {
-        if let Some(arguments) = command.rig_mut() {
-            arguments.found = Some(Rc::new(rig));
-        }
-        return novobus::cli::drive(&command, output);
-    };
-    let end = (line.commands.command)(&rig, &command, output);
-    told(end, output)
+    told((commands.command)(rig, command, output), output)
 }
 
 /// Takes a rig for a session.
@@ -172,34 +182,27 @@ pub(crate) fn hold(
     options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
-    match line_of(rig) {
-        None => novobus::cli::held::hold(rig, options, output),
-        Some(line) => (line.commands.hold)(rig, options)
-            .map_err(|error| Failure::Said(exit_of(&error), error.to_string())),
-    }
+    let commands = commands_of(rig).ok_or_else(|| Failure::refused(no_rigs(rig)))?;
+    (commands.hold)(rig, options, output)
 }
 
-/// Runs `rig check`.
+/// Runs `rig check`, as text or for tools.
 pub(crate) fn check_rig(
-    arguments: &CheckRigArguments,
+    rig: &Rig,
+    options: &UseOptions,
+    for_tools: bool,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let Some(rig) = find_any_rig(&arguments.rig, output) else {
-        return Ok(Exit::Usage);
+    let end = match commands_of(rig) {
+        Some(commands) => (commands.check)(rig, options, for_tools, output),
+        None => Err(Failure::refused(no_rigs(rig))),
     };
-    let for_tools = arguments.format == ListFormat::Json;
-    match line_of(&rig) {
-        None => novobus::cli::rig_check::check(&rig, arguments, output),
-        Some(line) => {
-            let end = (line.commands.check)(&rig, &arguments.options(), for_tools, output);
-            told(end, output)
-        }
-    }
+    told(end, output)
 }
 
-/// How drives of a shared line are explored; `None` for rings.
-pub(crate) fn line_fuzz(bus: BusName) -> Option<&'static LineFuzz> {
-    Some(&named(bus).shared.as_ref()?.commands.fuzz)
+/// How drives of a bus are explored.
+pub(crate) fn fuzz_of(bus: BusName) -> Option<&'static FuzzCommands> {
+    Some(&named(bus).rigs.as_ref()?.fuzz)
 }
 
 /// Serves simulated drives.

@@ -4,7 +4,7 @@
 use super::args::Shell;
 use super::help::command;
 use crate::buses::novobus::campaign::find as campaigns;
-use crate::buses::{self, BUSES, commands::deviations, find_rig_in};
+use crate::buses::{self, BUSES, find_rig_in};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::rig::find;
@@ -156,9 +156,9 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
                 .to_vec(),
             "DRIVE=NAME" => {
                 let drive = current.split_once('=').map_or("0", |(drive, _)| drive);
-                deviations::names()
-                    .map(|name| format!("{drive}={name}"))
-                    .collect()
+                let [drives, _] = (BUSES[0].deviations)();
+                let names = drives.iter().map(|own| own.name);
+                names.map(|name| format!("{drive}={name}")).collect()
             }
             _ => Vec::new(),
         },

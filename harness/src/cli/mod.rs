@@ -24,7 +24,6 @@ mod report;
 mod rig;
 mod run;
 mod run_rig;
-mod run_segment;
 mod schema;
 mod shell;
 mod shrink;

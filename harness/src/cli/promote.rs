@@ -1,9 +1,9 @@
 //! `drivebench promote`: a finding that is kept.
 
-use crate::buses::line_fuzz;
-use crate::buses::novobus::explore::Case;
+use crate::bus_name::BusName;
+use crate::buses::fuzz_of;
 use crate::command::exit::Exit;
-use crate::command::fuzz::promote::{PromoteArguments, keep};
+use crate::command::fuzz::promote::PromoteArguments;
 use crate::command::output::Output;
 use crate::explore::{ExploreError, bus_of};
 use crate::library::Entry;
@@ -14,9 +14,9 @@ use crate::scenario::verdict::Verdict;
 
 /// Keeps a finding, whatever its bus.
 pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
-    match bus_of(&arguments.finding).and_then(line_fuzz) {
+    match fuzz_of(bus_of(&arguments.finding).unwrap_or(BusName::DEFAULT)) {
         Some(own) => (own.promote)(arguments, played, output),
-        None => keep::<Case>(arguments, played, output),
+        None => Ok(Exit::Usage),
     }
 }
 

@@ -3,22 +3,14 @@
 
 use super::args::QualifyArguments;
 use super::run::{of_rig, select};
-use super::run_rig::{EarlyEnd, PlayOrder, over, play, show, work};
-use super::run_segment;
+use super::run_rig::{PlayOrder, work};
 use super::tally::EarlierVerdicts;
 use crate::buses::find_any_rig;
-use crate::buses::novobus::language::read::RingScenario;
-use crate::buses::novobus::qualify::{Qualification, QualifiedBench};
-use crate::buses::novobus::rig::Run;
-use crate::buses::syntax::Header;
-use crate::buses::twin::Twin;
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
-use crate::evidence::{DEVIATIONS, Folder, Keep, PROFILE, SplitRun};
-use crate::rig::PlayedScenario;
+use crate::evidence::{Keep, SplitRun};
 use crate::rig::state;
-use crate::scenario::problem::Problems;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
@@ -71,53 +63,5 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         keep: Keep::All,
         earlier: EarlierVerdicts::default(),
     };
-    match rig.port() {
-        Some(_) => run_segment::work(&rig, &entries, &job, page, output),
-        None => work(&rig, &entries, &job, page, output),
-    }
-}
-
-/// A rig in use, and the folder that keeps what is played on it.
-pub(super) struct Live<'l, 's> {
-    pub(super) run: &'l mut Run<'s>,
-    pub(super) folder: Option<&'l mut Folder>,
-    pub(super) output: &'l mut Output,
-}
-
-impl QualifiedBench for Live<'_, '_> {
-    type Stop = EarlyEnd;
-
-    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, EarlyEnd> {
-        let (_, played) = play(self.run, &entry.clone().into(), self.folder.as_deref_mut())?;
-        Ok(played)
-    }
-
-    fn over(&mut self) -> bool {
-        over(self.run)
-    }
-
-    fn twin(&self, header: &Header) -> Result<Twin, Problems> {
-        self.run.twin_with(header)
-    }
-
-    fn tell(&mut self, text: &str) -> Result<(), EarlyEnd> {
-        Ok(self.output.result(text)?)
-    }
-
-    fn show(&mut self, entry: &RingScenario, played: &PlayedScenario) -> Result<(), EarlyEnd> {
-        Ok(show(&entry.clone().into(), played, self.output)?)
-    }
-}
-
-/// Settles what is left of a qualification, and writes its files.
-pub(super) fn settle(course: Qualification, mut live: Live<'_, '_>) -> Result<Exit, EarlyEnd> {
-    let qualified = course.settle(&mut live)?;
-    if let Some(folder) = live.folder {
-        if let Some(profile) = &qualified.profile {
-            folder.add(PROFILE, profile)?;
-        }
-        folder.add(DEVIATIONS, &qualified.deviations)?;
-    }
-    live.output.result(&qualified.deviations)?;
-    Ok(Exit::of(&[qualified.verdict], false))
+    work(&rig, &entries, &job, page, output)
 }

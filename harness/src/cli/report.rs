@@ -1,7 +1,8 @@
 //! `drivebench report`.
 
 use super::args::ReportArguments;
-use crate::buses::novobus::explore::page;
+use crate::bus_name::BusName;
+use crate::buses::fuzz_of;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{writable, write};
@@ -43,9 +44,11 @@ fn explored(arguments: &ReportArguments, output: &mut Output) -> Exit {
         );
         return Exit::Usage;
     }
-    let text = match page(&arguments.folder) {
-        Ok(text) => text,
-        Err(error) => {
+    let page = fuzz_of(BusName::DEFAULT).and_then(|own| own.page);
+    let text = match page.map(|page| page(&arguments.folder)) {
+        Some(Ok(text)) => text,
+        None => return Exit::Usage,
+        Some(Err(error)) => {
             output.complain(&error.to_string());
             return Exit::Usage;
         }

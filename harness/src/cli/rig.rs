@@ -1,20 +1,22 @@
 //! `drivebench rig`: benches, their files and their locks.
 
 use crate::buses::RIG_BUSES;
-use crate::buses::check_rig as check;
-use crate::buses::commands::rig_check::CheckRigArguments;
+use crate::buses::{check_rig, find_any_rig};
 use crate::command::args::ListFormat;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
+use crate::command::rig_failure::alarm;
 use crate::rig::file::Quarantine;
 use crate::rig::find::{self, FindError, RigPlace};
 use crate::rig::lock::{self, LockError, Standing};
 use crate::rig::state::{self, Holder};
-use crate::rig::{Rig, scan, schema};
-use clap::Subcommand;
+use crate::rig::{Rig, UseOptions, scan, schema};
+use crate::signals::interrupt_flag;
+use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The commands on benches.
 #[derive(Debug, Subcommand)]
@@ -66,6 +68,44 @@ pub enum RigCommand {
         #[arg(long, conflicts_with = "reason")]
         lift: bool,
     },
+}
+
+/// For `rig check`.
+#[derive(Debug, Args)]
+pub struct CheckRigArguments {
+    /// The rig: a name, a file, or sim:N.
+    rig: String,
+    /// How long to wait if another program holds the rig, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = crate::command::args::duration)]
+    wait: Option<Duration>,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t = ListFormat::Text)]
+    format: ListFormat,
+}
+
+impl CheckRigArguments {
+    /// How the bench is used.
+    fn options(&self) -> UseOptions {
+        UseOptions {
+            purpose: "rig check".to_owned(),
+            wait: self.wait.unwrap_or_default(),
+            keeps_lines: true,
+            interrupt: interrupt_flag(),
+            alarm: alarm(),
+            ..UseOptions::default()
+        }
+    }
+}
+
+/// Runs `rig check`.
+fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::io::Result<Exit> {
+    match find_any_rig(&arguments.rig, output) {
+        Some(rig) => {
+            let for_tools = arguments.format == ListFormat::Json;
+            check_rig(&rig, &arguments.options(), for_tools, output)
+        }
+        None => Ok(Exit::Usage),
+    }
 }
 
 /// Why a command on a bench came to no good end.

@@ -3,11 +3,9 @@
 use super::args::{RunArguments, Selection};
 use super::junit::Cases;
 use super::run_rig::{PlayOrder, reports, state_size, work};
-use super::run_segment;
 use super::tally::{EarlierVerdicts, Tally};
 use crate::buses::novobus::report::plot::plot;
-use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::{bus_of, find_any_rig};
+use crate::buses::{bus_of, find_any_rig, is_bare};
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -111,7 +109,7 @@ struct Chosen {
 impl Chosen {
     /// The rig, if it is more than a number of drives.
     fn in_use(&self) -> Option<&Rig> {
-        self.rig.as_ref().filter(|rig| !rig.is_bare())
+        self.rig.as_ref().filter(|rig| !is_bare(rig))
     }
 }
 
@@ -135,7 +133,7 @@ fn read_rig_and_scenarios(
         output.say("nothing was played\n");
         Exit::Usage
     })?;
-    let entries = match rig.as_ref().filter(|rig| !rig.is_bare()) {
+    let entries = match rig.as_ref().filter(|rig| !is_bare(rig)) {
         Some(rig) => of_rig(entries, rig, output),
         None => entries,
     };
@@ -222,9 +220,6 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     let played = chosen.entries.iter().filter(not_too_large);
     state_size(played, &job, output);
     match chosen.in_use() {
-        Some(rig) if rig.port().is_some() => {
-            run_segment::work(rig, &chosen.entries, &job, page, output)
-        }
         Some(rig) => work(rig, &chosen.entries, &job, page, output),
         None => {
             let done = on_simulated(&job, &chosen.entries, chosen.rig.as_ref(), page, output);

@@ -1,29 +1,28 @@
 //! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
 use super::junit::Cases;
-use super::qualify::{Live, settle};
 use super::run::{details, drives, line};
 use super::tally::{EarlierVerdicts, Tally};
-use crate::buses::commands::give_back_session as give_back;
-use crate::buses::novobus::qualify::{Qualification, QualificationFacts};
 use crate::buses::novobus::report::plot::plot;
-use crate::buses::novobus::rig::wrong_parity;
-use crate::buses::novobus::rig::{Run, Session};
+use crate::buses::run_on;
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::write;
 use crate::command::progress::progress_bar;
-use crate::command::rig_failure::{alarm, exit_of};
+use crate::command::rig_failure::{alarm, exit_of_end, tell_end, tell_session};
 use crate::counted::counted;
-use crate::evidence::{AboutRun, EvidenceError, Folder, Keep, PAGE, SplitRun, size};
+use crate::evidence::{
+    AboutRun, DEVIATIONS, EvidenceError, Folder, Keep, PAGE, PROFILE, SplitRun, size,
+};
 use crate::library::Entry;
-use crate::link::{Capability, Line, Octets, Trouble};
+use crate::link::Capability;
 use crate::report::pages::Head;
+use crate::rig::segment::{QualificationKeeper, QualificationStopped, SegmentRun};
 use crate::rig::{Keeper, PlayedScenario, Rig, SessionError, UseOptions};
-use crate::scenario::run::{Outcome, Skip, Why};
+use crate::scenario::run::{Outcome, Why};
+use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
-use harness_proto::line::Rate;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -86,35 +85,29 @@ pub(crate) fn work(
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
+    let needs = |entry: &Entry| {
+        let settled = entry.settled();
+        settled.is_some_and(|plan| plan.needs().contains(&Capability::LineErrors))
+    };
     let options = UseOptions {
         purpose: job.purpose.to_owned(),
         wait: job.wait,
         allow_motion: job.allow_motion,
         ill_as_well: job.qualify,
-        keeps_lines: false,
+        tries_line_errors: job.qualify || entries.iter().any(needs),
         interrupt: interrupt_flag(),
         alarm: alarm(),
+        ..UseOptions::default()
     };
-    let mut session = match Session::open(rig, &options) {
-        Ok(session) => session,
-        Err(error) => {
-            output.complain(&error.to_string());
-            return Ok(exit_of(&error));
-        }
+    let mut run = match run_on(rig, &options) {
+        Ok(run) => run,
+        Err(error) => return Ok(tell_session(&error, output)),
     };
     let mut folder = None;
-    let exit = match all(
-        &mut session,
-        entries,
-        job,
-        (&mut folder, page.as_mut()),
-        output,
-    ) {
+    let kept = (&mut folder, page.as_mut());
+    let exit = match all((rig, &mut *run), entries, job, kept, output) {
         Ok(exit) => exit,
-        Err(EarlyEnd::Session(error)) => {
-            output.complain(&error.to_string());
-            exit_of(&error)
-        }
+        Err(EarlyEnd::Session(error)) => tell_session(&error, output),
         Err(EarlyEnd::Evidence(error)) => {
             output.complain(&error.to_string());
             folder = None;
@@ -122,7 +115,9 @@ pub(crate) fn work(
         }
         Err(EarlyEnd::Output(error)) => output.unwritable(&error),
     };
-    let (end, exit) = give_back(session, exit, output);
+    let exit = exit_of_end(run.trouble().as_ref(), exit, output);
+    let end = run.close(matches!(exit, Exit::RigError | Exit::Interlock));
+    let exit = tell_end(&end, exit, output);
     let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
     Ok(match reports(rig, folder, page, safe, output) {
         true => exit,
@@ -204,53 +199,47 @@ pub(crate) fn reports(
 }
 
 fn all(
-    session: &mut Session,
+    (rig, run): (&Rig, &mut dyn SegmentRun),
     entries: &[Entry],
     job: &PlayOrder,
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, EarlyEnd> {
-    let needs = |entry: &Entry| {
-        let plan = entry.plan.as_ref();
-        plan.is_some_and(|plan| plan.needs.contains(&Capability::LineErrors))
-    };
-    if session.opening().is_some() && (job.qualify || entries.iter().any(needs)) {
-        for why in wrong_parity::obstacles(session)? {
-            output.say(&format!("{why}\n"));
-        }
-    }
-    let mut run = match Run::new(session) {
-        Ok(run) => run,
-        Err(problems) => {
-            output.mistakes(&problems);
-            return Ok(Exit::Usage);
-        }
-    };
-    if job.qualify {
-        run.repeat();
+    for why in run.obstacles()? {
+        output.say(&format!("{why}\n"));
     }
     if let Some(path) = &job.evidence {
-        *folder = Some(Folder::create(path, &about(&mut run, job, entries))?);
-    }
-    let course = job.qualify.then(|| {
-        let began = folder
-            .as_ref()
-            .map_or_else(String::new, |own| own.began().to_owned());
-        Qualification::new(QualificationFacts::of(&mut run, began, job.thorough))
-    });
-    let mut course = OnRings { run, course };
-    let mut exit = course_of(&mut course, entries, job, (folder.as_mut(), page), output)?;
-    let OnRings { mut run, course } = course;
-    if let Some(course) = course {
-        let live = Live {
-            run: &mut run,
-            folder: folder.as_mut(),
-            output,
+        let segment = run.segment();
+        let about = AboutRun {
+            rig,
+            rate: segment.rate,
+            tolerance: segment.tolerance,
+            capabilities: segment.capabilities,
+            anew: segment.anew,
+            own_rings: false,
+            purpose: job.purpose,
+            selected: entries.iter().map(|entry| &*entry.source.text).collect(),
+            part: job.part.as_ref(),
+            keep: job.keep,
+            sign: job.sign.as_deref(),
         };
-        exit = worse(exit, settle(course, live)?);
+        *folder = Some(Folder::create(path, &about)?);
     }
-    for gap in measured(&mut run) {
-        output.say(&gap);
+    let mut exit = selected(
+        (rig, &mut *run),
+        entries,
+        job,
+        (folder.as_mut(), page),
+        output,
+    )?;
+    if job.qualify {
+        exit = worse(
+            exit,
+            qualify((rig, &mut *run), job, folder.as_mut(), output)?,
+        );
+    }
+    for line in run.measured() {
+        output.say(&line);
     }
     Ok(exit)
 }
@@ -264,88 +253,22 @@ pub(super) fn worse(scenarios: Exit, all: Exit) -> Exit {
     }
 }
 
-/// Reports the outcome of a conversation of a qualification.
-pub(super) fn show(
-    entry: &Entry,
-    played: &PlayedScenario,
-    output: &mut Output,
-) -> std::io::Result<()> {
-    let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
-    let text = line(entry, &played.outcome, output);
-    output.result(&text)?;
-    output.say(&details(entry, &played.outcome, traces));
-    Ok(())
-}
-
-/// A rig on which scenarios are played one after another.
-pub(super) trait Course {
-    /// The name of the rig.
-    fn name(&mut self) -> String;
-
-    /// Plays a scenario, into the folder where there is one, and returns its name there.
-    ///
-    /// # Errors
-    /// Why nothing more is played.
-    fn play(
-        &mut self,
-        entry: &Entry,
-        folder: Option<&mut Folder>,
-    ) -> Result<(String, PlayedScenario), EarlyEnd>;
-
-    /// Notes what came of it.
-    fn note(&mut self, entry: &Entry, name: &str, played: &PlayedScenario, output: &mut Output);
-
-    /// Whether nothing more can or may be played; says why.
-    fn over(&mut self, output: &mut Output) -> bool;
-}
-
-/// The rings of a rig, and what a qualification has found out so far.
-struct OnRings<'s> {
-    run: Run<'s>,
-    course: Option<Qualification>,
-}
-
-impl Course for OnRings<'_> {
-    fn name(&mut self) -> String {
-        self.run.session().rig().id().to_owned()
-    }
-
-    fn play(
-        &mut self,
-        entry: &Entry,
-        folder: Option<&mut Folder>,
-    ) -> Result<(String, PlayedScenario), EarlyEnd> {
-        play(&mut self.run, entry, folder)
-    }
-
-    fn note(&mut self, entry: &Entry, name: &str, played: &PlayedScenario, _: &mut Output) {
-        // Those for another bus are no part of a qualification of this one.
-        if let Some(course) = self.course.as_mut().filter(|_| entry.plan.is_some()) {
-            course.note(name, played);
-        }
-    }
-
-    fn over(&mut self, _: &mut Output) -> bool {
-        over(&mut self.run)
-    }
-}
-
-/// Plays scenarios one after another and reports each. Returns the exit code of their verdicts.
-pub(super) fn course_of(
-    course: &mut dyn Course,
+/// Plays the selected scenarios one after another and reports each. Returns the exit code of their verdicts.
+fn selected(
+    (rig, run): (&Rig, &mut dyn SegmentRun),
     entries: &[Entry],
     job: &PlayOrder,
     (mut folder, mut page): (Option<&mut Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, EarlyEnd> {
     let bar = progress_bar(entries.len(), output.progress);
-    let name = course.name();
-    let mut cases = Cases::new(&name, job.junit.as_deref());
+    let mut cases = Cases::new(rig.id(), job.junit.as_deref());
     let mut tally = Tally::of_named(&job.named, job.earlier.clone());
     let mut left = entries.iter();
     while let Some(entry) = left.next() {
         bar.set_message(entry.short_name().to_owned());
-        let (name, played) = match course.play(entry, folder.as_deref_mut()) {
+        let mut play = |keeper: Option<&mut dyn Keeper>| run.play(&entry.source, keeper);
+        let (name, played) = match keep(entry, folder.as_deref_mut(), &mut play) {
             Err(EarlyEnd::Session(error)) => {
                 cases.note(entry, &Outcome::rig_error(error.to_string()), &[]);
                 cases.write(Exit::RigError, output);
@@ -368,9 +291,13 @@ pub(super) fn course_of(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        course.note(entry, &name, &played, output);
+        run.note(&name, &played);
+        for note in run.notes() {
+            output.say(&format!("  note: {note}\n"));
+        }
         // Behind the last one nothing is cut short.
-        if played.shows_an_ill_rig() || !left.as_slice().is_empty() && course.over(output) {
+        let more = !left.as_slice().is_empty();
+        if played.shows_an_ill_rig() || more && run.is_over(&mut |why| output.complain(why)) {
             break;
         }
     }
@@ -385,31 +312,16 @@ pub(super) fn course_of(
 }
 
 /// Plays a scenario, into the folder where there is one, and returns its name there.
-pub(super) fn play(
-    run: &mut Run<'_>,
+fn keep(
     entry: &Entry,
     folder: Option<&mut Folder>,
+    play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
 ) -> Result<(String, PlayedScenario), EarlyEnd> {
-    let own = || entry.short_name().to_owned();
-    let Some(plan) = &entry.plan else {
-        let outcome = Outcome::skipped(Skip::not_on_rig(entry.scenario.bus));
-        let attempts = Vec::new();
-        return Ok((own(), PlayedScenario { outcome, attempts }));
-    };
     let Some(folder) = folder else {
-        return Ok((own(), run.play(plan, None)?));
+        return Ok((entry.short_name().to_owned(), play(None)?));
     };
-    keep(entry, folder, |keeper| run.play(plan, Some(keeper)))
-}
-
-/// Plays a scenario into a folder, and returns its name there.
-pub(super) fn keep(
-    entry: &Entry,
-    folder: &mut Folder,
-    play: impl FnOnce(&mut dyn Keeper) -> Result<PlayedScenario, SessionError>,
-) -> Result<(String, PlayedScenario), EarlyEnd> {
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
-    let played = play(&mut kept);
+    let played = play(Some(&mut kept));
     let name = kept.finish()?;
     let lost;
     let outcome = match &played {
@@ -423,69 +335,109 @@ pub(super) fn keep(
     Ok((name, played?))
 }
 
-/// Whether nothing more can or may be played.
-pub(crate) fn over(run: &mut Run<'_>) -> bool {
-    let session = run.session();
-    session.end_if_overdue();
-    session.link().trouble().is_some_and(Trouble::ends_a_run)
-}
-
-/// What a record begins with.
-fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> AboutRun<'r> {
-    // Those for another bus are never begun.
-    let selected = entries.iter().filter(|entry| entry.plan.is_some());
-    let exactness = run.exactness();
-    let way = run.way();
-    let byte_time = run.session().link().byte_time();
-    let capabilities = run.capabilities();
-    let mut rates = Rate::ALL.into_iter();
-    let rate = rates.find(|rate| rate.byte_time() == byte_time);
-    AboutRun {
-        rate: rate.unwrap_or_default().bits_per_second(),
-        tolerance: exactness.tolerance,
-        capabilities,
-        anew: way.anew,
-        own_rings: false,
-        purpose: job.purpose,
-        selected: selected.map(|entry| &*entry.source.text).collect(),
-        part: job.part.as_ref(),
-        keep: job.keep,
-        sign: job.sign.as_deref(),
-        rig: run.session().rig(),
-    }
-}
-
-/// What bytes with a wrong parity bit and interposers have cost.
-fn measured(run: &mut Run<'_>) -> Vec<String> {
-    let Some(ports) = run.session().ports() else {
-        return Vec::new();
+/// Plays what a qualification plays behind the selected scenarios, and writes what all of it comes to.
+fn qualify(
+    (rig, run): (&Rig, &mut dyn SegmentRun),
+    job: &PlayOrder,
+    folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Exit, EarlyEnd> {
+    let mut shell = QualificationShell {
+        rig,
+        folder,
+        output,
+        end: None,
     };
-    let switches = ports.take_switches();
-    let mut lines = Vec::new();
-    if let Some(longest) = switches.iter().map(|switch| switch.idle).max() {
-        lines.push(format!(
-            "{} sent with a wrong parity bit; the line was idle for at most {:.1} ms around one\n",
-            counted(switches.len(), "byte"),
-            longest.as_secs_f64() * 1e3
-        ));
+    let qualified = run.qualify(job.thorough, &mut shell);
+    let QualificationShell {
+        folder,
+        output,
+        end,
+        ..
+    } = shell;
+    let qualified = match (qualified, end) {
+        (Ok(qualified), _) => qualified,
+        (Err(QualificationStopped), Some(end)) => return Err(end),
+        (Err(QualificationStopped), None) => return Ok(Exit::RigError),
+    };
+    if let Some(folder) = folder {
+        if let Some(profile) = &qualified.profile {
+            folder.add(PROFILE, profile)?;
+        }
+        folder.add(DEVIATIONS, &qualified.deviations)?;
     }
-    let unknown: u64 = switches.iter().map(|switch| switch.unknown).sum();
-    if unknown > 0 {
-        let marked: u64 = switches.iter().map(|switch| switch.marked).sum();
-        lines.push(format!(
-            "{} came meanwhile or soon after, {marked} of them with an error: they are compared without their line status, since a UART has one parity \
-             setting for both directions\n",
-            counted(unknown, "byte")
-        ));
+    output.result(&qualified.deviations)?;
+    Ok(Exit::of(&[qualified.verdict], false))
+}
+
+/// Keeps and shows what a qualification plays.
+struct QualificationShell<'s> {
+    rig: &'s Rig,
+    folder: Option<&'s mut Folder>,
+    output: &'s mut Output,
+    /// Why it was stopped.
+    end: Option<EarlyEnd>,
+}
+
+impl QualificationShell<'_> {
+    fn entry(&mut self, source: &Source) -> Result<Entry, QualificationStopped> {
+        let drives = Some(self.rig.ring_size()).filter(|own| *own > 0);
+        Entry::fitting(source.clone(), drives).map_err(|problems| {
+            self.output.mistakes(&problems);
+            QualificationStopped
+        })
     }
-    for inner in ports.inner_links().iter().filter(|inner| inner.passes()) {
-        let delay = inner.delay();
-        lines.push(format!(
-            "interposer: {} passed on, each delayed by a byte time and {:.3} ms (mean; {:.3} ms at most)\n",
-            counted(delay.bytes, "byte"),
-            delay.mean().as_secs_f64() * 1e3,
-            delay.longest.as_secs_f64() * 1e3
-        ));
+
+    fn unless<T>(
+        &mut self,
+        done: Result<T, impl Into<EarlyEnd>>,
+    ) -> Result<T, QualificationStopped> {
+        done.map_err(|why| {
+            self.end = Some(why.into());
+            QualificationStopped
+        })
     }
-    lines
+}
+
+impl QualificationKeeper for QualificationShell<'_> {
+    fn began(&self) -> String {
+        let folder = self.folder.as_ref();
+        folder.map_or_else(String::new, |own| own.began().to_owned())
+    }
+
+    fn play(
+        &mut self,
+        source: &Source,
+        play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
+    ) -> Result<PlayedScenario, QualificationStopped> {
+        let entry = self.entry(source)?;
+        let done = keep(&entry, self.folder.as_deref_mut(), play);
+        self.unless(done).map(|(_, played)| played)
+    }
+
+    fn show(
+        &mut self,
+        source: &Source,
+        played: &PlayedScenario,
+    ) -> Result<(), QualificationStopped> {
+        let entry = self.entry(source)?;
+        let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
+        let text = line(&entry, &played.outcome, self.output);
+        self.tell(&text)?;
+        self.say(&details(&entry, &played.outcome, traces));
+        Ok(())
+    }
+
+    fn tell(&mut self, text: &str) -> Result<(), QualificationStopped> {
+        let done = self.output.result(text);
+        self.unless(done)
+    }
+
+    fn say(&mut self, text: &str) {
+        self.output.say(text);
+    }
+
+    fn complain(&mut self, why: &str) {
+        self.output.complain(why);
+    }
 }

@@ -1,6 +1,7 @@
 //! `drivebench shrink`: a finding made small.
 
-use crate::buses::{RIG_BUSES, line_fuzz, shrink_rings};
+use crate::bus_name::BusName;
+use crate::buses::{RIG_BUSES, fuzz_of};
 use crate::command::exit::Exit;
 use crate::command::fuzz::shrink::ShrinkArguments;
 use crate::command::output::Output;
@@ -8,8 +9,8 @@ use crate::explore::bus_of;
 
 /// Makes a finding small, and writes what came of it beside it.
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
-    match bus_of(&arguments.finding).and_then(line_fuzz) {
+    match fuzz_of(bus_of(&arguments.finding).unwrap_or(BusName::DEFAULT)) {
         Some(own) => (own.shrink)(arguments, &RIG_BUSES, output),
-        None => shrink_rings(arguments, &RIG_BUSES, output),
+        None => Ok(Exit::Usage),
     }
 }

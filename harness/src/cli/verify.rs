@@ -1,14 +1,11 @@
 //! `drivebench verify`: every verdict of a folder of evidence, judged again.
 
 use super::args::VerifyArguments;
-use crate::buses::novobus::explore::Case;
-use crate::buses::shared_lines;
+use crate::buses::BUSES;
 use crate::command::exit::Exit;
-use crate::command::fuzz;
 use crate::command::output::Output;
 use crate::counted::counted;
 use crate::evidence::{MERGE, Signer, verify as judge_again, verify_merged};
-use crate::explore::read_as;
 
 /// Judges a folder again.
 pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -18,11 +15,8 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
         .zip(arguments.identity.as_deref());
     let signer = signer.map(|(allowed, identity)| Signer { allowed, identity });
     let is_merged = arguments.folder.join(MERGE).exists();
-    if let Ok((kept, _)) = read_as::<Case>(&arguments.folder) {
-        return fuzz::verify(&arguments.folder, &kept, signer, output);
-    }
-    for line in shared_lines() {
-        if let Some(exit) = (line.commands.fuzz.verify)(&arguments.folder, signer, output) {
+    for rigs in BUSES.iter().filter_map(|bus| bus.rigs.as_ref()) {
+        if let Some(exit) = (rigs.fuzz.verify)(&arguments.folder, signer, output) {
             return exit;
         }
     }

@@ -3,27 +3,15 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::RecordLine;
-use crate::buses::novobus::rig::BesideTwin;
-use crate::buses::novobus::rig::judge::known;
-use crate::buses::novobus::rig::judge::{AttemptFacts, judge};
-use crate::buses::novobus::rig::run::{Way, opening, twin};
-use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::novobus::rig::{Driven, play_one};
-use crate::buses::twin::{Conversation, Twin};
-use crate::file::values::LinkName;
 use crate::library::Entry;
-use crate::link::{
-    Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
-};
-use crate::rig::file::{Interposer, Transport};
-use crate::rig::segment::SegmentJudge;
-use crate::rig::{Attempt, Rig, SessionError};
+use crate::link::{LinkEvent, LinkFault, Moment, PlacedFault, Recording, link_name};
+use crate::rig::Attempt;
+use crate::rig::segment::{RecordedAttempt, SegmentJudge};
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
-use std::sync::Arc;
 
 /// How much longer a busy computer may have waited in one attempt; for records without looks.
 const WAITED: Span = Span::from_millis(1_000);
@@ -64,8 +52,6 @@ impl Recalled {
 pub(super) struct Again {
     /// Its outcome, and in a qualification its conversations and how they compare with the twin's.
     pub(super) attempt: Attempt,
-    /// The twin found something.
-    pub(super) stale: bool,
     /// What the record holds behind the end of the attempt.
     left: Option<String>,
     /// Where the record differs from what simulated rings of its own do.
@@ -79,109 +65,11 @@ pub(super) struct Again {
     ended: Ended,
 }
 
-/// Plays an attempt again from its record, in the way in which it went.
-pub(super) fn again(
-    recorded: &Recorded,
-    text: &str,
-    (header, way): (&Header, &Way),
-    rig: &Rig,
-    twin: &mut Twin,
-) -> Again {
-    let source = Source {
-        name: recorded.name.clone(),
-        text: text.to_owned().into(),
-    };
-    let size = header.way.rings.first().map(|ring| ring.drives());
-    let entry = Entry::fitting(source, size).map_err(|problems| problems.to_string());
-    let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
-    let mut plan = match plan {
-        Ok(plan) if plan.rings == header.way.rings => plan,
-        Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
-        Err(why) => return Again::impossible(why),
-    };
-    let own = rig.plan().ok().and_then(|rig| rig.master);
-    plan.master = own.or(plan.master);
-    let mut replay = Replay::new(
-        recorded.events.clone(),
-        header.rate,
-        header.exactness.tolerance,
-        header.drives.clone(),
-        header.capabilities.clone(),
-    )
-    .reaching(reached(rig, header))
-    .listening(heard(rig, header));
-    let exact = replay.is_exact();
-    let mut outcome = match play_one(&mut replay, &plan, way) {
-        Ok(outcome) => outcome,
-        Err((ring, ill)) => {
-            let rig = rig.id().to_owned();
-            let ring = ring + 1;
-            Outcome::rig_error(
-                SessionError::Ill {
-                    rig,
-                    ring,
-                    ill: Box::new(ill),
-                    cause: None,
-                }
-                .to_string(),
-            )
-        }
-    };
-    let all = Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
-    let opening = opening(rig, way, &all, header.exactness);
-    let (conversations, anew) = way.compared(all, header.exactness);
-    if anew && let Ok(fresh) = self::twin(rig, &known(rig)) {
-        *twin = fresh;
-    }
-    let (comparisons, stale) = twin.follow_all(&conversations, way.exactness(header.exactness));
-    let unplaced = recorded
-        .verdict
-        .as_ref()
-        .map_or(0, |recalled| recalled.unplaced);
-    let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
-    let driven = Driven::new(&plan, &recorded.events, way, capabilities, &outcome);
-    let driven = driven.filter(|_| header.simulated);
-    let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-    let heard = AttemptFacts {
-        rig,
-        plan: &plan,
-        way,
-        exactness: header.exactness,
-        conversations: &conversations,
-        comparisons: &comparisons,
-        unplaced,
-        alive: &|| {},
-    };
-    let assumed = judge(&mut outcome, &heard);
-    let mut attempt = Attempt::new(outcome, Vec::new());
-    (attempt.opening, attempt.unplaced) = (opening, unplaced);
-    if header.qualified {
-        let beside = BesideTwin {
-            conversations,
-            comparisons,
-            driven,
-            assumed: Default::default(),
-        };
-        attempt.master_is_right = master_is_right;
-        attempt.own = Some(Arc::new(beside.with(assumed)));
-    }
-    Again {
-        attempt,
-        stale,
-        left: replay.left(),
-        other: None,
-        capture: None,
-        exact,
-        trouble: replay.trouble().is_some(),
-        ended: Ended::of(&recorded.events),
-    }
-}
-
-/// Judges an attempt on a rig with a port again.
+/// Judges an attempt on a rig again.
 ///
 /// # Errors
 /// Its text is no scenario of the rig's bus, in a sentence.
-pub(super) fn again_on_segment(
+pub(super) fn again(
     recorded: &Recorded,
     text: &str,
     judge: &mut dyn SegmentJudge,
@@ -190,53 +78,51 @@ pub(super) fn again_on_segment(
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
-    let mut judged = judge.judge(&source, &recorded.events)?;
-    let unplaced = recorded.verdict.as_ref().map_or(0, |own| own.unplaced);
-    judged.outcome.unplaced(unplaced);
-    if unplaced > 0 {
-        judge.doubt();
-    }
+    let attempt = RecordedAttempt {
+        events: &recorded.events,
+        unplaced: recorded.verdict.as_ref().map_or(0, |own| own.unplaced),
+    };
+    let judged = judge.judge(&source, attempt)?;
     let (other, made) = match &judged.played {
         Some((events, traces)) => (
             first_difference(&recorded.events, events),
-            Some(capture(traces, &judged.outcome)),
+            Some(capture(traces, &judged.attempt.outcome)),
         ),
         None => (None, None),
     };
     Ok(Again {
-        attempt: Attempt {
-            opening: judged.before,
-            unplaced,
-            ..Attempt::new(judged.outcome, Vec::new())
-        },
-        stale: false,
+        attempt: judged.attempt,
         left: judged.left,
         other,
         capture: made,
-        exact: true,
+        exact: judged.exact,
         trouble: judged.trouble,
         ended: Ended::of(&recorded.events),
     })
 }
 
 /// Plays an attempt again on a simulated bench of its own.
-pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, header: &Header) -> Again {
+pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, drives: &[u8]) -> Again {
     let source = Source {
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
-    let rings = &header.way.rings;
-    let size = rings.first().map(|ring| ring.drives());
-    match Entry::fitting(source, size) {
+    match Entry::fitting(source, drives.first().copied()) {
         Err(problems) => Again::impossible(problems.to_string()),
-        Ok(entry) => match (&entry.plan, entry.settled()) {
-            (Some(plan), _) if plan.rings != *rings => {
+        Ok(entry) => match entry.settled() {
+            Some(plan) if plan.report().is_none() && plan.size() != written(drives) => {
                 Again::impossible("it is for other rings than the rig has".to_owned())
             }
-            (_, Some(plan)) => simulated_again(recorded, plan),
-            (_, None) => Again::impossible("no scenario of this bus".to_owned()),
+            Some(plan) => simulated_again(recorded, plan),
+            None => Again::impossible("no scenario of this bus".to_owned()),
         },
     }
+}
+
+/// The sizes of the rings of a bench, as a scenario states its own.
+fn written(drives: &[u8]) -> String {
+    let sizes: Vec<_> = drives.iter().map(u8::to_string).collect();
+    sizes.join("+")
 }
 
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
@@ -251,7 +137,6 @@ fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
         exact: true,
         trouble: false,
         attempt: Attempt::new(outcome, traces),
-        stale: false,
         left: None,
         other: first_difference(&recorded.events, &events),
         ended: Ended::of(&recorded.events),
@@ -282,7 +167,6 @@ impl Again {
     fn impossible(why: String) -> Self {
         Self {
             attempt: Attempt::new(Outcome::rig_error(why), Vec::new()),
-            stale: false,
             left: None,
             other: None,
             capture: None,
@@ -293,59 +177,7 @@ impl Again {
     }
 }
 
-/// The inner links at which the bench can put faults; those at its own ends need none.
-pub(super) fn reached(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
-    let interposers = rig.file.interposer.iter();
-    links(header, interposers.map(|own| (own.ring, own.link)))
-}
-
-/// Those of them on which no byte can get a wrong parity bit: with an interposer that has one serial port for both directions.
-pub(super) fn keeping_parity(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
-    let one = |own: &&Interposer| {
-        own.upstream == own.downstream && own.upstream.transport == Transport::Serial
-    };
-    let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
-    let interposers = rig.file.interposer.iter().filter(one);
-    interposers
-        .map(|own| place(&drives, own.ring, own.link))
-        .collect()
-}
-
-/// The links on which bytes were seen: by ring and place.
-pub(super) fn heard(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
-    let interposers = rig.file.interposer.iter().map(|own| (own.ring, own.link));
-    let taps = rig.file.tap.iter().map(|own| (own.ring, own.link));
-    links(header, interposers.chain(taps))
-}
-
-/// The ring and the place of a link between drives, as a rig's file names it.
-fn place(drives: &dyn Fn(usize) -> u8, ring: u8, link: LinkName) -> (usize, usize) {
-    let ring = usize::from(ring).saturating_sub(1);
-    let from = link.from;
-    let place = from.map_or(0, |from| drives(ring).saturating_sub(from));
-    (ring, usize::from(place))
-}
-
-/// The master's own links and those between drives that are given by the number of their ring; all links of simulated rings.
-fn links(header: &Header, inner: impl Iterator<Item = (u8, LinkName)>) -> Vec<(usize, usize)> {
-    let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
-    let inner: Vec<_> = inner
-        .map(|(ring, link)| place(&drives, ring, link))
-        .collect();
-    let all = (0..header.drives.len())
-        .flat_map(|ring| (0..=usize::from(drives(ring))).map(move |place| (ring, place)));
-    let end = |(ring, place): &(usize, usize)| *place == 0 || *place == usize::from(drives(*ring));
-    all.filter(|place| header.simulated || end(place) || inner.contains(place))
-        .collect()
-}
-
 impl Recorded {
-    /// Whether the rig's limits denied something in it.
-    pub(super) fn was_denied(&self) -> bool {
-        let denied = |event: &LinkEvent| matches!(event, LinkEvent::Trouble(Trouble::Denied(_)));
-        self.events.iter().any(denied)
-    }
-
     /// Its name, with the number of the attempt where there are several.
     pub(super) fn title(&self) -> String {
         match self.attempt {
@@ -471,7 +303,7 @@ impl Header {
     /// The shortest and the longest time that an attempt can have taken. Bytes sent last come round after its end, and if they
     /// are not fetched the record does not say when. In real time a wait also ends a little late.
     fn could_take(&self, took: Span, ended: &Ended) -> (Span, Span) {
-        let real = match self.exactness.tolerance {
+        let real = match self.tolerance {
             Span::ZERO => Span::ZERO,
             tolerance => tolerance + WAITED,
         };

@@ -3,12 +3,11 @@
 use super::files::{SCENARIOS, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
-use crate::buses::novobus::rig::run::not_played;
 use crate::counted::counted;
 use crate::library::Entry;
-use crate::link::{LinkEvent, Replay};
+use crate::link::LinkEvent;
 use crate::rig::{Again as Retries, Attempt, PlayedScenario, Rig, attempts_of};
-use crate::scenario::run::{DENIED, Outcome, Skip, Why};
+use crate::scenario::run::{Outcome, Skip, Why};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -18,7 +17,7 @@ type Texts<'t> = &'t dyn Fn(&str) -> Result<String, String>;
 
 /// What of the lines `case` and `end` does not follow from the attempts.
 pub(super) fn differences(opened: &Opened, judged: &[Judged], texts: Texts<'_>) -> Vec<String> {
-    let real = opened.header.exactness.tolerance > Span::ZERO;
+    let real = opened.header.tolerance > Span::ZERO;
     let mut settling = Settling {
         opened,
         texts,
@@ -132,7 +131,7 @@ impl Settling<'_> {
         if header.own_rings || header.schema < 2 || attempts.is_empty() {
             return;
         }
-        let real = header.exactness.tolerance > Span::ZERO;
+        let real = header.tolerance > Span::ZERO;
         let most = attempts_of(&self.opened.rig, real, header.qualified);
         let all = settled(attempts);
         let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n], most));
@@ -222,44 +221,20 @@ impl Opened {
             text: text.to_owned().into(),
         };
         // A rig on another bus has no ring for which a scenario could be made.
-        let rings = self.rig.port().is_none().then_some(&self.header.way.rings);
-        let drives = rings
-            .and_then(|rings| rings.first())
-            .map(|ring| ring.drives());
+        let rings = self.header.of_rings.then_some(&self.header.drives);
+        let drives = rings.and_then(|rings| rings.first()).copied();
         Entry::fitting(source, drives).map_err(|problems| problems.to_string())
     }
 
     /// Why a scenario is not played on this rig; `None` where it is.
     fn skipped(&self, entry: &Entry, remarks: &[String]) -> Option<Outcome> {
-        let header = &self.header;
-        if let Some(judge) = self.segment_judge() {
-            return judge.not_begun(&entry.source);
+        if let Some(judge) = self.judge().ok()? {
+            return judge.not_begun(&entry.source, remarks);
         }
-        let why = match (&entry.plan, header.own_rings) {
-            (None, true) if entry.settled().is_some() => too_large(entry, &self.rig)?,
-            (None, true) => Skip::no_bus(entry.scenario.bus),
-            (None, false) => Skip::not_on_rig(entry.scenario.bus),
-            (Some(_), true) => too_large(entry, &self.rig)?,
-            (Some(plan), false) => {
-                let link = Replay::new(
-                    Vec::new(),
-                    header.rate,
-                    header.exactness.tolerance,
-                    header.drives.clone(),
-                    header.capabilities.clone(),
-                )
-                .reaching(super::attempt::reached(&self.rig, header))
-                .keeping_parity(super::attempt::keeping_parity(&self.rig, header))
-                .listening(super::attempt::heard(&self.rig, header));
-                // What the guard knew of the drives is not in the record.
-                let limited = !header.limits.allow_everything();
-                let words = remarks.first().and_then(|own| own.strip_prefix(DENIED));
-                let denied = words.filter(|_| limited);
-                let denied = denied.map(|words| Why::Denied(words.to_owned()).into());
-                not_played(plan, &link, &header.way.rings).or(denied)?
-            }
-        };
-        Some(Outcome::skipped(why))
+        Some(Outcome::skipped(match entry.settled() {
+            Some(_) => too_large(entry, &self.rig)?,
+            None => Skip::no_bus(entry.scenario.bus),
+        }))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::derive::{CaseReport, Settled, case_reports};
 use super::error::EvidenceError;
 use super::junit::JunitCase;
-use super::qualified_parts::{QualifiedPart, qualified_parts};
+use super::qualified::cases;
 use super::read_parts::ReadPart;
 use super::record::PartItem;
 use super::selection;
@@ -11,7 +11,7 @@ use super::verify::{Judged, scenarios};
 use crate::counted::counted;
 use crate::partition::Partition;
 use crate::report::pages::ShownScenario;
-use crate::rig::segment::{Qualified, SegmentJudge};
+use crate::rig::segment::{QualificationRecord, Qualified, RecordedPart, SegmentJudge};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -45,7 +45,7 @@ pub(super) struct Gathering<'g> {
     played_behind: usize,
     pub(super) missing: Vec<String>,
     parts: Vec<JudgedPart<'g>>,
-    /// On a rig with a port: what judges the parts of a qualification together.
+    /// What judges the parts of a qualification together.
     judge: Option<Box<dyn SegmentJudge>>,
 }
 
@@ -61,9 +61,10 @@ struct JudgedPart<'g> {
 
 impl<'g> Gathering<'g> {
     /// Of the parts of one run; `first` is one of them.
-    pub(super) fn of(path: &'g Path, first: &'g ReadPart) -> Self {
+    pub(super) fn of(path: &'g Path, first: &'g ReadPart) -> Result<Self, EvidenceError> {
         let header = &first.opened.header;
-        Self {
+        let judge = first.opened.judge()?;
+        Ok(Self {
             path,
             rig: first.opened.rig.id(),
             all: first.scenarios(),
@@ -72,8 +73,8 @@ impl<'g> Gathering<'g> {
             played_behind: 0,
             missing: Vec::new(),
             parts: Vec::new(),
-            judge: first.opened.segment_judge().filter(|_| header.qualified),
-        }
+            judge: judge.filter(|_| header.qualified),
+        })
     }
 
     /// Takes the scenarios of a part that is there; `own` has their places.
@@ -87,7 +88,7 @@ impl<'g> Gathering<'g> {
             judge.begin_part();
         }
         let judged = match &mut self.judge {
-            Some(judge) => part.opened.judged_on_segment(judge.as_mut(), &texts),
+            Some(judge) => part.opened.judged_by(judge.as_mut(), &texts),
             None => part.opened.judged(&texts)?,
         };
         let behind = self.all.len() + self.played_behind;
@@ -177,24 +178,30 @@ impl<'g> Gathering<'g> {
     /// What the parts of a qualification come to; `None` for those of a run.
     ///
     /// # Errors
-    /// See [`qualified_parts`].
+    /// One of them was played with `--thorough` and another one without, or an attempt cannot be judged again.
     pub(super) fn qualified(&mut self) -> Result<Option<Qualified>, EvidenceError> {
-        let mut parts = self.parts.iter();
-        if !parts.clone().any(|own| own.part.opened.header.qualified) {
+        let Some(judge) = &mut self.judge else {
             return Ok(None);
+        };
+        let mut parts = Vec::new();
+        for own in &self.parts {
+            let name = own.part.partition.to_string();
+            let wrong = |why| EvidenceError::Merge(format!("part {name}: {why}"));
+            let mut left = cases(&own.part.opened, &own.judged).map_err(wrong)?;
+            let selected = left.drain(..own.places.len().min(left.len()));
+            let places = own.places.iter().copied();
+            parts.push(RecordedPart {
+                selected: places.zip(selected).collect(),
+                cases: left,
+                whole: own.whole,
+                name,
+            });
         }
-        if let Some(judge) = &mut self.judge {
-            let began = parts.by_ref().map(|own| &own.part.opened.header.started);
-            let began = began.min().map_or("", String::as_str);
-            return Ok(judge.qualified(began, self.missing.is_empty()));
-        }
-        let parts = parts.map(|own| QualifiedPart {
-            name: own.part.partition.to_string(),
-            opened: &own.part.opened,
-            judged: &own.judged,
-            places: own.places,
-            whole: own.whole,
-        });
-        qualified_parts(&parts.collect::<Vec<_>>(), &self.missing).map(Some)
+        let began = self.parts.iter().map(|own| &own.part.opened.header.started);
+        let began = began.min().map_or("", String::as_str);
+        let missing = &self.missing;
+        let made = judge.qualified(began, QualificationRecord::Parts { parts, missing });
+        let made = made.map_err(EvidenceError::Merge)?;
+        Ok(made.into_iter().next())
     }
 }

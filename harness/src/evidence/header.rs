@@ -3,22 +3,15 @@
 use super::files::{RIG, sum};
 use super::keep::Keep;
 use super::part;
-use super::record::{RecordLine, RunPart, capabilities};
-use crate::buses::novobus::rig::Way;
-use crate::buses::novobus::rig::limits;
-use crate::buses::novobus::rig::open::line_rate;
-use crate::buses::novobus::rig::sim::RigOfRings;
-use crate::buses::twin::Exactness;
-use crate::buses::{SimulatedLink, judge_of};
+use super::record::{RecordLine, RunPart};
+use crate::buses::{SimulatedLink, bus_of, is_bare, judge_of};
+use crate::capture::Carries;
 use crate::link::Capability;
-use crate::medium::ErrorMarks;
 use crate::rig::Rig;
-use crate::rig::file::{Endpoint, Transport};
 use crate::rig::rings::rings;
 use crate::rig::segment::OnSegment;
 use crate::scenario::run::sizes;
 use harness_proto::line::Rate;
-use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 
 /// What a record is judged by.
@@ -31,7 +24,8 @@ pub(super) struct Header {
     pub(super) started: String,
     pub(super) rate: Rate,
     pub(super) drives: Vec<u8>,
-    pub(super) exactness: Exactness,
+    /// How exact its times are.
+    pub(super) tolerance: Span,
     pub(super) capabilities: Vec<Capability>,
     pub(super) simulated: bool,
     /// Whether each scenario had simulated rings of its own.
@@ -44,10 +38,10 @@ pub(super) struct Header {
     pub(super) part: Option<RunPart>,
     /// Which captures the folder keeps.
     pub(super) keep: Keep,
-    pub(super) limits: Limits,
-    pub(super) way: Way,
-    /// Of a rig with a port: whether motors could turn.
-    pub(super) on_segment: Option<bool>,
+    /// The names of the capabilities in it.
+    pub(super) names: Vec<String>,
+    /// Whether the rig has rings.
+    pub(super) of_rings: bool,
 }
 
 /// Reads the first line. What the rig's file contradicts is added to `wrong`, and the file's value is used.
@@ -95,7 +89,7 @@ pub(super) fn header(
     if *rig_sha256 != sum(rig.text.as_bytes()) {
         wrong.push(format!("{RIG} is not the file that was used"));
     }
-    let rings = rings(drives)?;
+    rings(drives)?;
     let own = rig.sizes();
     if own != *drives {
         return Err(format!(
@@ -104,25 +98,18 @@ pub(super) fn header(
             sizes(&own)
         ));
     }
-    let segment = match own_rings {
-        true => None,
-        false => segment(names, rig),
+    let of_rings = bus_of(rig).carries == Carries::Link;
+    let expected = match own_rings {
+        true => OnSegment {
+            rate: Rate::default().bits_per_second(),
+            drives: rig.ring_size(),
+            tolerance: Span::ZERO,
+            capabilities: SimulatedLink::CAPABILITIES.to_vec(),
+            anew: false,
+        },
+        false => judge_of(rig, purpose.as_deref() == Some("qualify"))?.adopt(names),
     };
-    let on_segment = segment.as_ref().map(|(_, motion)| *motion);
-    let (capabilities, limits) = match (&segment, own_rings) {
-        (Some((segment, _)), _) => (segment.capabilities.clone(), Limits::default()),
-        (None, true) => (SimulatedLink::CAPABILITIES.to_vec(), limits(rig, true)),
-        (None, false) => possible(names, rig),
-    };
-    let expected_rate = match *own_rings || segment.is_some() {
-        true => Rate::default(),
-        false => line_rate(rig),
-    };
-    let expected_bits = match &segment {
-        Some((segment, _)) => segment.rate,
-        None => expected_rate.bits_per_second(),
-    };
-    let expected_anew = !own_rings && limits.reset && limits.motion;
+    let rate = Rate::from_bits_per_second(expected.rate).filter(|_| of_rings);
     let mut must = |what: &str, stated: String, expected: String| {
         if stated != expected {
             wrong.push(format!(
@@ -130,33 +117,29 @@ pub(super) fn header(
             ));
         }
     };
-    let expected_tolerance = match &segment {
-        Some((segment, _)) => segment.tolerance,
-        None => tolerance_of(rig),
-    };
     must("the rig", id.clone(), rig.id().to_owned());
     must(
         "the rate",
         stated_rate.to_string(),
-        expected_bits.to_string(),
+        expected.rate.to_string(),
     );
     must(
         "the tolerance",
         tolerance.to_string(),
-        expected_tolerance.units().to_string(),
+        expected.tolerance.units().to_string(),
     );
     must(
         "`simulated`",
         simulated.to_string(),
         rig.is_simulated().to_string(),
     );
-    let listed: Vec<_> = capabilities.iter().map(|own| own.name()).collect();
+    let listed: Vec<_> = expected.capabilities.iter().map(|own| own.name()).collect();
     must(
         "the list of capabilities",
         names.join(", "),
         listed.join(", "),
     );
-    must("`anew`", anew.to_string(), expected_anew.to_string());
+    must("`anew`", anew.to_string(), expected.anew.to_string());
     let purposes = match *own_rings {
         true => &["run"][..],
         false => &["run", "qualify"],
@@ -173,7 +156,7 @@ pub(super) fn header(
     // again in any case.
     let bare = match rig.port() {
         Some(_) => rig.is_simulated() && *own_rings,
-        None => rig.is_bare(),
+        None => is_bare(rig),
     };
     let bare_run = bare && stated == Some("run");
     if *schema > 1 && *own_rings != bare_run {
@@ -183,143 +166,17 @@ pub(super) fn header(
         schema: *schema,
         program: drivebench.clone(),
         started: started.clone(),
-        rate: expected_rate,
+        rate: rate.unwrap_or_default(),
         drives: drives.clone(),
-        exactness: Exactness {
-            tolerance: expected_tolerance,
-            line_errors: capabilities.contains(&Capability::LineErrors),
-            knows_cells: rig.is_simulated(),
-            looks: None,
-        },
-        capabilities,
+        tolerance: expected.tolerance,
+        capabilities: expected.capabilities,
         simulated: rig.is_simulated(),
         own_rings: *own_rings,
         qualified: purpose.as_deref() == Some("qualify"),
         selected: selected.clone(),
         part: part.clone(),
         keep,
-        limits,
-        way: Way {
-            rings,
-            attempts: rig.examinations().filter(|_| on_segment.is_none()),
-            anew: expected_anew,
-        },
-        on_segment,
+        names: names.clone(),
+        of_rings,
     })
-}
-
-/// What the first line must say of a rig with a port that has these capabilities, and whether motors could turn; `None` for rings.
-fn segment(names: &[String], rig: &Rig) -> Option<(OnSegment, bool)> {
-    let [moving, still] = judge_of(rig, true, false)?.segments();
-    let listed = |own: &OnSegment| {
-        let own = own.capabilities.iter().map(|own| own.name());
-        own.eq(names.iter().map(String::as_str))
-    };
-    match listed(&still) {
-        true => Some((still, false)),
-        false => Some((moving, true)),
-    }
-}
-
-/// How exact the times of a rig are.
-fn tolerance_of(rig: &Rig) -> Span {
-    let of_ring = rig.rings().map(|(_, ring)| ring.time_tolerance.0);
-    let longest = of_ring.max().unwrap_or_default();
-    match rig.is_simulated() {
-        true => Span::ZERO,
-        false => Span::from_nanos(u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX)),
-    }
-}
-
-/// The capabilities that a rig can have had and the limits of the run: those named, where they are possible with or without
-/// `--allow-motion`, and whether or not its ports show line errors.
-fn possible(names: &[String], rig: &Rig) -> (Vec<Capability>, Limits) {
-    let named = capabilities(names);
-    let mut all = Vec::new();
-    for motion in [true, false] {
-        let limits = limits(rig, motion);
-        for seen in [(true, true), (false, true), (true, false), (false, false)] {
-            let able = abilities(rig, limits, seen);
-            let listed = able.iter().map(|own| own.name());
-            if able == named && listed.eq(names.iter().map(String::as_str)) {
-                return (able, limits);
-            }
-            all.push((able, limits));
-        }
-    }
-    all.swap_remove(0)
-}
-
-/// Whether the ports of a rig show line errors, where its file decides it: those of pseudo terminals and sockets do with in-band marks alone.
-fn shows_errors_by_marks(rig: &Rig) -> Option<bool> {
-    let shows = |end: &Endpoint| match end.transport {
-        Transport::Pty | Transport::Tcp => Some(end.marks == ErrorMarks::InBand),
-        Transport::Serial | Transport::Rfc2217 | Transport::Sim => None,
-    };
-    let mut all = rig.rings().map(|(_, ring)| shows(&ring.endpoint));
-    all.try_fold(true, |all, shows| Some(all && shows?))
-}
-
-/// What a rig can do within these limits, beside what no record shows.
-fn abilities(rig: &Rig, limits: Limits, (line_errors, taps): (bool, bool)) -> Vec<Capability> {
-    let file = &rig.file;
-    let has_inner = !file.tap.is_empty() || !file.interposer.is_empty();
-    let marked = shows_errors_by_marks(rig).filter(|_| !has_inner);
-    let has = |capability: &Capability| match capability {
-        Capability::Power | Capability::Simulator => false,
-        // A record of an earlier version shows no taps.
-        Capability::Tap => taps && !rig.is_simulated() && has_inner,
-        Capability::Motion => limits.motion,
-        Capability::Eeprom => limits.eeprom,
-        // A reset ends block and stop (ND21 11.8).
-        Capability::Reset => limits.reset && limits.motion,
-        Capability::Memory => true,
-        Capability::TwoRings => rig.is_simulated() || rig.rings().count() > 1,
-        Capability::Interposer => rig.is_simulated() || !file.interposer.is_empty(),
-        Capability::LineErrors => rig.is_simulated() || marked.unwrap_or(line_errors),
-    };
-    let order = match rig.is_simulated() {
-        true => &SimulatedLink::CAPABILITIES[..],
-        false => &[
-            Capability::Memory,
-            Capability::Motion,
-            Capability::Eeprom,
-            Capability::Reset,
-            Capability::TwoRings,
-            Capability::Interposer,
-            Capability::Tap,
-            Capability::LineErrors,
-        ],
-    };
-    order.iter().copied().filter(has).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::buses::parse_rig as parse;
-    use crate::scenario::source::Source;
-
-    /// A record that says that a port showed no line errors, although the rig's file says that it does, is changed: scenarios that need them would
-    /// look as if they were skipped with a reason.
-    #[test]
-    fn marks_decide_whether_line_errors_are_seen() {
-        let seen = |marks: &str, names: &[&str]| {
-            let text = format!(
-                "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"{marks}\"\n"
-            );
-            let source = Source {
-                name: "desk.toml".to_owned(),
-                text: text.into(),
-            };
-            let rig = parse(&source).expect("a rig");
-            let names: Vec<_> = names.iter().map(|name| (*name).to_owned()).collect();
-            let (able, _) = possible(&names, &rig);
-            able.contains(&Capability::LineErrors)
-        };
-        for stated in [&["memory"][..], &["memory", "line-errors"]] {
-            assert!(seen("in-band", stated), "{stated:?}");
-            assert!(!seen("none", stated), "{stated:?}");
-        }
-    }
 }

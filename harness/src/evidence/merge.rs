@@ -210,7 +210,7 @@ fn make(path: &Path) -> Result<Made, EvidenceError> {
         let owner = first.partition.owner(place, &item.name);
         places.entry(owner).or_default().push(place);
     }
-    let mut gathering = Gathering::of(path, first);
+    let mut gathering = Gathering::of(path, first)?;
     for (number, own) in &places {
         let place = parts.binary_search_by_key(number, |part| part.partition.number);
         match place {

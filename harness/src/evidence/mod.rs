@@ -30,7 +30,6 @@ mod keep;
 mod merge;
 mod part;
 mod qualified;
-mod qualified_parts;
 mod read_parts;
 mod reports;
 mod rerun;

@@ -1,53 +1,51 @@
 //! The files of a qualification, made again from its record.
 
-use super::attempt::reached;
-use super::files::{DEVIATIONS, PROFILE, read_text, sum};
+use super::files::{DEVIATIONS, PROFILE, read_text};
 use super::record::RecordLine;
+use super::selection;
 use super::verify::{Judged, Opened};
-use crate::buses::novobus::language::read::RingScenario;
-use crate::buses::novobus::qualify::{Qualification, QualificationFacts, QualifiedBench, thorough};
-use crate::buses::novobus::rig::run::twin;
-use crate::buses::syntax::Header;
-use crate::buses::twin::Twin;
-use crate::rig::segment::Qualified;
+use crate::rig::segment::{QualificationRecord, Qualified, RecordedCase, SegmentJudge};
 use crate::rig::{Attempt, PlayedScenario};
-use crate::scenario::problem::Problems;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use std::collections::VecDeque;
 use std::path::Path;
 
+/// What a qualification comes to by its record: each outcome that it allows. Or what is wrong, in a sentence.
+pub(super) type QualifiedAgain = Result<Vec<Qualified>, String>;
+
+/// What the record of a qualification comes to.
+pub(super) fn again(
+    opened: &Opened,
+    judged: &[Judged],
+    judge: &mut dyn SegmentJudge,
+) -> QualifiedAgain {
+    let header = &opened.header;
+    let record = QualificationRecord::Run {
+        cases: cases(opened, judged)?,
+        selected: header.selected.as_ref().map_or(0, Vec::len),
+        whole: selection::compare(opened).missing.is_none(),
+    };
+    judge.qualified(&header.started, record)
+}
+
 /// What of `profile.toml` and `deviations.txt` does not follow from the record, in sentences.
-pub(super) fn differences(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
-    let cases = match cases(opened, judged) {
-        Ok(cases) => cases,
+pub(super) fn differences(path: &Path, made: QualifiedAgain) -> Vec<String> {
+    let made = match made {
+        Ok(made) => made,
         Err(why) => return vec![why],
     };
-    let mut differences = None;
-    // A record shows that a run ended early where a scenario is missing; behind the last one it may have ended too, by `max_run`.
-    for ended in [false, true] {
-        match qualified(opened, cases.clone(), ended) {
-            Err(Stop::Missing) => {}
-            Err(Stop::Other(name)) => {
-                return vec![format!(
-                    "case {name}: a qualification with the scenarios before it plays another one here"
-                )];
-            }
-            Ok(made) => {
-                let wrong = compare(path, &made);
-                if wrong.is_empty() {
-                    return wrong;
-                }
-                differences.get_or_insert(wrong);
-            }
-        }
-    }
-    differences.unwrap_or_else(|| {
+    let mut differences = made.iter().map(|made| compare(path, made));
+    let Some(first) = differences.next() else {
         let why = "the record ends within a probe, which leaves no such file";
         let there = [PROFILE, DEVIATIONS];
         let there = there.into_iter().filter(|file| path.join(file).exists());
-        there.map(|file| format!("{file}: {why}")).collect()
-    })
+        return there.map(|file| format!("{file}: {why}")).collect();
+    };
+    match first.is_empty() || differences.any(|wrong| wrong.is_empty()) {
+        true => Vec::new(),
+        false => first,
+    }
 }
 
 /// Compares the files of a folder with those that its record gives.
@@ -91,19 +89,8 @@ fn difference(path: &Path, file: &str, made: &str) -> Option<String> {
     ))
 }
 
-/// A scenario as it was played.
-#[derive(Clone)]
-pub(super) struct Case {
-    pub(super) name: String,
-    /// The sum of its text.
-    pub(super) sum: String,
-    pub(super) played: PlayedScenario,
-    /// Whether the rig's line was lost in it, or the like.
-    pub(super) ends_the_run: bool,
-}
-
 /// The scenarios of a record in order.
-pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>, String> {
+pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<RecordedCase>, String> {
     let mut left = judged;
     let mut pending = 0;
     let mut cases = VecDeque::new();
@@ -126,7 +113,7 @@ pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>
                     true => not_played(verdict, remarks),
                     false => PlayedScenario::of(attempts),
                 };
-                cases.push_back(Case {
+                cases.push_back(RecordedCase {
                     name: name.clone(),
                     sum: sha256.clone().unwrap_or_default(),
                     played,
@@ -148,103 +135,6 @@ fn not_played(verdict: &str, remarks: &[String]) -> PlayedScenario {
             ..Outcome::rig_error(String::new())
         },
         attempts: Vec::new(),
-    }
-}
-
-/// Whether the long conversations are among the scenarios of a record.
-pub(super) fn is_thorough(opened: &Opened, cases: &VecDeque<Case>) -> bool {
-    let drives = opened.header.drives.first().copied().unwrap_or(1);
-    let long = thorough(drives).unwrap_or_default();
-    let long = long.first().map(|entry| sum(entry.source.text.as_bytes()));
-    long.is_some_and(|long| cases.iter().any(|case| case.sum == long))
-}
-
-/// A qualification like that of a record, of which nothing was noted yet.
-pub(super) fn course(opened: &Opened, thorough: bool, began: String) -> Qualification {
-    let header = &opened.header;
-    let reached = reached(&opened.rig, header);
-    Qualification::new(QualificationFacts {
-        rig: opened.rig.clone(),
-        byte_time: header.rate.byte_time(),
-        exactness: header.exactness,
-        resets: header.way.anew,
-        reached: reached
-            .into_iter()
-            .filter_map(|(ring, place)| (ring == 0).then_some(place))
-            .collect(),
-        began,
-        thorough,
-    })
-}
-
-/// What a record comes to. Where it has `ended`, nothing may be played behind its last scenario.
-fn qualified(opened: &Opened, mut cases: VecDeque<Case>, ended: bool) -> Result<Qualified, Stop> {
-    let header = &opened.header;
-    let thorough = is_thorough(opened, &cases);
-    let mut course = course(opened, thorough, header.started.clone());
-    let selected = header.selected.as_ref().map_or(0, Vec::len);
-    let mut over = false;
-    for case in cases.drain(..selected.min(cases.len())) {
-        over |= case.ends_the_run;
-        course.note(&case.name, &case.played);
-    }
-    let mut record = Record {
-        opened,
-        cases,
-        ended,
-        over,
-    };
-    let made = course.settle(&mut record)?;
-    match record.cases.pop_front() {
-        Some(case) => Err(Stop::Other(case.name)),
-        None => Ok(made),
-    }
-}
-
-/// A record in place of a rig.
-struct Record<'o> {
-    opened: &'o Opened,
-    /// What was not asked for yet.
-    cases: VecDeque<Case>,
-    /// Whether nothing may be played behind the last one.
-    ended: bool,
-    over: bool,
-}
-
-/// Why a record does not go on.
-enum Stop {
-    /// It has no more scenarios.
-    Missing,
-    /// It has another scenario, of this name.
-    Other(String),
-}
-
-impl QualifiedBench for Record<'_> {
-    type Stop = Stop;
-
-    fn play(&mut self, entry: &RingScenario) -> Result<PlayedScenario, Stop> {
-        let case = self.cases.pop_front().ok_or(Stop::Missing)?;
-        if case.sum != sum(entry.source.text.as_bytes()) {
-            return Err(Stop::Other(case.name));
-        }
-        self.over |= case.ends_the_run;
-        Ok(case.played)
-    }
-
-    fn over(&mut self) -> bool {
-        self.over || self.ended && self.cases.is_empty()
-    }
-
-    fn twin(&self, header: &Header) -> Result<Twin, Problems> {
-        twin(&self.opened.rig, header)
-    }
-
-    fn tell(&mut self, _: &str) -> Result<(), Stop> {
-        Ok(())
-    }
-
-    fn show(&mut self, _: &RingScenario, _: &PlayedScenario) -> Result<(), Stop> {
-        Ok(())
     }
 }
 

@@ -127,7 +127,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
         Ok(read) => read,
         Err(error) => return Some(format!("{name}: {error}")),
     };
-    if opened.header.on_segment.is_some() {
+    if !opened.header.of_rings {
         // An adapter may stamp a frame before the conversation began, where a capture has no place for its first bit.
         let looks = !opened.rig.file.interlock.is_empty();
         let differs = frames_differ(&own.recorded, &capture_read.traces, looks)?;

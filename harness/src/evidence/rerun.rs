@@ -4,23 +4,24 @@ use super::files::{CAPTURES, read_text};
 use super::folder::capture;
 use super::record::RecordLine;
 use super::verify::{Opened, text_of};
-use crate::buses::novobus::rig::{Run, Session};
+use crate::buses::run_on;
 use crate::link::{LinkEvent, Sink};
-use crate::rig::{Alarm, Attempt, Keeper, PlayedScenario, UseOptions};
-use crate::scenario::run::{Outcome, Skip};
+use crate::rig::segment::SegmentRun;
+use crate::rig::{Attempt, Keeper, PlayedScenario, UseOptions};
+use crate::scenario::run::Outcome;
 use std::path::Path;
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Plays every scenario of a run on a simulated rig again, and says where the record or a capture is not what comes of it. Nothing for
-/// rings with ports, and for scenarios that had rings of their own: these are compared one by one.
+/// drives behind ports, and for scenarios whose attempts are compared one by one.
 pub(super) fn rerun(
     path: &Path,
     opened: &Opened,
     texts: &dyn Fn(&str) -> Result<String, String>,
 ) -> Vec<String> {
     let header = &opened.header;
-    if !header.simulated || header.own_rings || header.schema < 2 || header.on_segment.is_some() {
+    let judge = opened.judge().ok().flatten();
+    let one_by_one = judge.is_none_or(|judge| judge.plays_again());
+    if !header.simulated || header.schema < 2 || one_by_one {
         return Vec::new();
     }
     let mut rig = opened.rig.clone();
@@ -30,24 +31,14 @@ pub(super) fn rerun(
     rig.file.quarantine = None;
     let options = UseOptions {
         purpose: "verify".to_owned(),
-        wait: Duration::ZERO,
         allow_motion: true,
         ill_as_well: header.qualified,
-        keeps_lines: false,
-        interrupt: Arc::default(),
-        alarm: Alarm::default(),
+        ..UseOptions::default()
     };
-    let mut session = match Session::open(&rig, &options) {
-        Ok(session) => session,
+    let mut run = match run_on(&rig, &options) {
+        Ok(run) => run,
         Err(error) => return vec![format!("the run cannot be played again: {error}")],
     };
-    let mut run = match Run::new(&mut session) {
-        Ok(run) => run,
-        Err(problems) => return vec![format!("the run cannot be played again: {problems}")],
-    };
-    if header.qualified {
-        run.repeat();
-    }
     let mut wrong = Vec::new();
     let mut lines = &opened.lines[1..];
     while let Some(end) = lines
@@ -55,7 +46,7 @@ pub(super) fn rerun(
         .position(|line| matches!(line, RecordLine::Case { .. }))
     {
         let (own, rest) = lines.split_at(end + 1);
-        match scenario(&mut run, path, opened, own, texts) {
+        match scenario(&mut *run, path, opened, own, texts) {
             Ok(differs) => wrong.extend(differs),
             Err(why) => {
                 wrong.push(why);
@@ -69,7 +60,7 @@ pub(super) fn rerun(
 
 /// Plays one scenario again and compares it with its lines.
 fn scenario(
-    run: &mut Run<'_>,
+    run: &mut dyn SegmentRun,
     path: &Path,
     opened: &Opened,
     lines: &[RecordLine],
@@ -88,12 +79,9 @@ fn scenario(
     };
     // A run of an earlier version has begun what the limits deny, and its record has the attempt.
     run.rehearse(lines.len() == 1);
-    let outcome = match &entry.plan {
-        None => Outcome::skipped(Skip::not_on_rig(entry.scenario.bus)),
-        Some(plan) => match run.play(plan, Some(&mut tape)) {
-            Ok(PlayedScenario { outcome, .. }) => outcome,
-            Err(error) => Outcome::rig_error(error.to_string()),
-        },
+    let outcome = match run.play(&entry.source, Some(&mut tape)) {
+        Ok(PlayedScenario { outcome, .. }) => outcome,
+        Err(error) => Outcome::rig_error(error.to_string()),
     };
     let title = entry.scenario.title.as_str();
     tape.lines.push(RecordLine::of_case(

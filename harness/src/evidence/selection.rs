@@ -1,11 +1,9 @@
 //! Whether a record has each scenario that was selected, and what a qualification plays behind them.
 
-use super::attempt::reached;
 use super::files::sum;
 use super::record::RecordLine;
 use super::verify::Opened;
-use crate::buses::novobus::language::read::RingScenario;
-use crate::buses::novobus::qualify::{TRIALS, conversations, probes, thorough};
+use crate::rig::segment::SegmentJudge;
 
 /// How the scenarios of a record compare with those that were to be played.
 #[derive(Debug, Default)]
@@ -44,12 +42,11 @@ pub(super) fn compare(opened: &Opened) -> Selection {
         return selection;
     }
     let more = &cases[selected.len()..];
-    let qualifying = match header.qualified {
-        true => qualifying(opened),
-        false => Vec::new(),
-    };
+    let judge = opened.judge().ok().flatten();
+    let judge = judge.filter(|_| header.qualified);
+    let qualifying = judge.as_deref().map(qualifying).unwrap_or_default();
     let known = |sum: &String| qualifying.iter().any(|own| own.sum == *sum);
-    let trial = |name: &str| header.qualified && TRIALS.iter().any(|own| name.starts_with(own));
+    let trial = |name: &str| judge.as_ref().is_some_and(|own| own.is_trial(name));
     let unknown = more
         .iter()
         .filter(|(name, sum)| !known(sum) && !trial(name));
@@ -93,36 +90,12 @@ struct Qualifying {
     always: bool,
 }
 
-fn qualifying(opened: &Opened) -> Vec<Qualifying> {
-    let header = &opened.header;
-    if let Some(judge) = opened.segment_judge() {
-        let all = judge.conversations().into_iter();
-        let listed = all.map(|source| Qualifying {
-            sum: sum(source.text.as_bytes()),
-            name: source.name,
-            always: true,
-        });
-        return listed.collect();
-    }
-    let drives = header.drives.first().copied().unwrap_or(1);
-    let all = reached(&opened.rig, header);
-    let reaches =
-        |place: usize| place == 0 || place < usize::from(drives) && all.contains(&(0, place));
-    let listed = |entry: &RingScenario, always| Qualifying {
-        name: entry.short_name().to_owned(),
-        sum: sum(entry.source.text.as_bytes()),
-        always,
-    };
-    let own = conversations(drives, &reaches).unwrap_or_default();
-    let mut list: Vec<_> = own.iter().map(|entry| listed(entry, true)).collect();
-    let long = thorough(drives).unwrap_or_default();
-    list.extend(long.iter().map(|entry| listed(entry, false)));
-    for probe in probes(drives).unwrap_or_default() {
-        // A drive that is silent while it tests itself is asked by the other conversation.
-        let other = probe.of_silent.as_ref();
-        let entries = probe.entries.iter().enumerate();
-        list.extend(entries.map(|(place, entry)| listed(entry, place == 0 && other.is_none())));
-        list.extend(other.map(|entry| listed(entry, false)));
-    }
-    list
+fn qualifying(judge: &dyn SegmentJudge) -> Vec<Qualifying> {
+    let all = judge.conversations().into_iter();
+    let listed = all.map(|own| Qualifying {
+        sum: sum(own.source.text.as_bytes()),
+        name: own.source.name,
+        always: own.always,
+    });
+    listed.collect()
 }

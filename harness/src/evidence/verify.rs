@@ -1,8 +1,6 @@
 //! Every verdict of a folder, judged again from its record, and everything that follows from the record compared.
 
-use super::attempt::{
-    Again, Recalled, Recorded, UNUSED, again, again_on_own_bench, again_on_segment,
-};
+use super::attempt::{Again, Recalled, Recorded, UNUSED, again, again_on_own_bench};
 use super::cases;
 use super::derive::derived;
 use super::error::EvidenceError;
@@ -13,7 +11,7 @@ use super::files::{
 };
 use super::header::{Header, header};
 use super::keep::left_out;
-use super::qualified;
+use super::qualified::{self, QualifiedAgain};
 use super::read::{read, unlike_written};
 use super::record::RecordLine;
 use super::reports;
@@ -21,12 +19,10 @@ use super::rerun::rerun;
 use super::sealed::unsigned;
 use super::selection;
 use super::signature::{self, Signer};
-use crate::buses::novobus::rig::judge::known;
-use crate::buses::novobus::rig::run::twin;
 use crate::buses::{RIG_BUSES, judge_of};
 use crate::counted::counted;
 use crate::regular;
-use crate::rig::segment::{Qualified, SegmentJudge};
+use crate::rig::segment::SegmentJudge;
 use crate::rig::{Rig, parse_beside};
 use crate::scenario::run::DENIED;
 use crate::scenario::source::Source;
@@ -131,11 +127,8 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
         verified.files.extend(wrong);
         verified.files.extend(rerun(path, &opened, &scenario));
         if opened.header.qualified && verified.is_right() {
-            let wrong = match &qualification {
-                Some(made) => qualified::compare(path, made),
-                None => qualified::differences(path, &opened, &judged),
-            };
-            verified.files.extend(wrong);
+            let made = qualification.unwrap_or_else(|| Ok(Vec::new()));
+            verified.files.extend(qualified::differences(path, made));
         } else if opened.header.qualified {
             verified.unconfirmed.push(format!(
                 "{PROFILE} and {DEVIATIONS}: they are compared where nothing else is wrong"
@@ -228,83 +221,45 @@ impl Opened {
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Vec<Judged>, EvidenceError> {
-        match self.segment_judge() {
-            Some(mut judge) => Ok(self.judged_on_segment(judge.as_mut(), scenario)),
-            None if self.header.own_rings => Ok(self.judged_each(scenario, |recorded, text| {
-                Ok(again_on_own_bench(recorded, text, &self.header))
-            })),
-            None => self.judged_on_rings(scenario),
-        }
+        Ok(match self.judge()? {
+            Some(mut judge) => self.judged_by(judge.as_mut(), scenario),
+            None => self.judged_each(scenario, |recorded, text| {
+                Ok(again_on_own_bench(recorded, text, &self.header.drives))
+            }),
+        })
     }
 
-    /// The same, and what a qualification on a rig with a port comes to.
+    /// The same, and what a qualification comes to.
     fn judged_and_qualified(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<(Vec<Judged>, Option<Qualified>), EvidenceError> {
-        let Some(mut judge) = self.segment_judge().filter(|_| self.header.qualified) else {
+    ) -> Result<(Vec<Judged>, Option<QualifiedAgain>), EvidenceError> {
+        let Some(mut judge) = self.judge()?.filter(|_| self.header.qualified) else {
             return Ok((self.judged(scenario)?, None));
         };
-        let judged = self.judged_on_segment(judge.as_mut(), scenario);
-        let whole = selection::compare(self).missing.is_none();
-        let made = judge.qualified(&self.header.started, whole);
-        Ok((judged, made))
+        let judged = self.judged_by(judge.as_mut(), scenario);
+        let made = qualified::again(self, &judged, judge.as_mut());
+        Ok((judged, Some(made)))
     }
 
-    fn judged_on_rings(
-        &self,
-        scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Vec<Judged>, EvidenceError> {
-        let fresh = || {
-            twin(&self.rig, &known(&self.rig))
-                .map_err(|problems| EvidenceError::Foreign(RIG.to_owned(), problems.to_string()))
-        };
-        let mut own = fresh()?;
-        let mut all = Vec::new();
-        let mut denied = false;
-        for recorded in group(&self.lines[1..]) {
-            let mut way = self.header.way.clone();
-            if std::mem::replace(&mut denied, recorded.was_denied()) {
-                way.examine_after_denial(&self.rig);
-            }
-            let text = text_of(&recorded.name, &recorded.sha256, scenario);
-            let again = match text {
-                Err(why) => Err(why),
-                Ok(text) => {
-                    let again = again(&recorded, &text, (&self.header, &way), &self.rig, &mut own);
-                    if again.stale {
-                        own = fresh()?;
-                    }
-                    Ok((text, again))
-                }
-            };
-            let differs = match &again {
-                Err(why) => Some(why.clone()),
-                Ok((_, again)) => recorded.differs(again, &self.header),
-            };
-            all.push(Judged {
-                recorded,
-                again,
-                differs,
-            });
+    /// What judges attempts on a rig; `None` where each scenario had a bench of its own.
+    pub(super) fn judge(&self) -> Result<Option<Box<dyn SegmentJudge>>, EvidenceError> {
+        if self.header.own_rings {
+            return Ok(None);
         }
-        Ok(all)
+        let foreign = |why| EvidenceError::Foreign(RIG.to_owned(), why);
+        let mut judge = judge_of(&self.rig, self.header.qualified).map_err(foreign)?;
+        judge.adopt(&self.header.names);
+        Ok(Some(judge))
     }
 
-    /// What judges attempts on a rig with a port; `None` for rings, and where each scenario had a bench of its own.
-    pub(super) fn segment_judge(&self) -> Option<Box<dyn SegmentJudge>> {
-        judge_of(&self.rig, self.header.on_segment?, self.header.qualified)
-    }
-
-    /// Judges every attempt on a rig with a port again.
-    pub(super) fn judged_on_segment(
+    /// Judges every attempt on a rig again.
+    pub(super) fn judged_by(
         &self,
         judge: &mut dyn SegmentJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Vec<Judged> {
-        self.judged_each(scenario, |recorded, text| {
-            again_on_segment(recorded, text, judge)
-        })
+        self.judged_each(scenario, |recorded, text| again(recorded, text, judge))
     }
 
     /// Judges every attempt again, each for itself.

@@ -57,5 +57,6 @@ pub static BUS: Bus = Bus {
     sim: |_, _, _| Err(Failure::refused("valves are not served yet")),
     live: |_, _| Box::new(report::ValveText),
     fuzz: (&[], &[]),
+    rigs: None,
     shared: None,
 };

@@ -44,9 +44,9 @@ pub static BUS: Bus = Bus {
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
     live: |_, _| Box::new(report::table::FrameText),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
+    rigs: Some(rig::COMMANDS),
     shared: Some(SharedLine {
         port: &rig::PORT,
-        commands: rig::COMMANDS,
         report: &report::FrameReport,
         description: dbc::dbc,
         replayed: capture::scenario,

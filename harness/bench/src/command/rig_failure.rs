@@ -43,10 +43,19 @@ pub fn alarm() -> Alarm {
     })
 }
 
+/// Reports why a rig cannot be used, and gives the exit code for it.
+pub fn tell_session(error: &SessionError, output: &mut Output) -> Exit {
+    match error {
+        SessionError::Mistakes(problems) => output.mistakes(problems),
+        error => output.complain(&error.to_string()),
+    }
+    exit_of(error)
+}
+
 /// The exit code for a rig that cannot be used.
 pub fn exit_of(error: &SessionError) -> Exit {
     match error {
-        SessionError::OtherBus { .. } => Exit::Usage,
+        SessionError::OtherBus { .. } | SessionError::Mistakes(_) => Exit::Usage,
         SessionError::Lock(LockError::Busy { .. }) | SessionError::PortInUse { .. } => Exit::Busy,
         SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
         SessionError::Interrupted { .. } => Exit::Interrupted,

@@ -22,6 +22,8 @@ pub struct UseOptions {
     pub ill_as_well: bool,
     /// Whether the lines of a ring that has timed out are [kept](crate::link::Line::keep) until the caller's own master sends.
     pub keeps_lines: bool,
+    /// Whether to find out first if bytes with a wrong parity bit can be sent, where the bus has a parity.
+    pub tries_line_errors: bool,
     /// Set to end the program.
     pub interrupt: Arc<AtomicBool>,
     /// Called when the program shows no sign of life, after the watchdog has stopped the drives.

@@ -3,6 +3,7 @@
 use super::hook::HookError;
 use super::in_use::End;
 use super::lock::LockError;
+use crate::scenario::problem::Problems;
 use std::error::Error;
 
 /// What the bus of a rig says of it.
@@ -27,6 +28,9 @@ pub enum SessionError {
         /// What is wrong, in a sentence.
         why: String,
     },
+    /// Its file describes drives that cannot be.
+    #[error("{0}")]
+    Mistakes(Box<Problems>),
     /// Another program has its port.
     #[error("rig {rig}: {why}")]
     PortInUse {

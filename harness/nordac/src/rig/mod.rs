@@ -21,10 +21,11 @@ pub(crate) use session::{Inverters, OfNordac, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
-use harness_bench::command::fuzz::LineFuzz;
+use harness_bench::command::failure::Failure;
+use harness_bench::command::fuzz::FuzzCommands;
 use harness_bench::command::held::HeldPort;
 use harness_bench::command::port_bench::PortBench;
-use harness_bench::command::port_row::PortCommands;
+use harness_bench::command::rig_commands::{RigCommands, unusable};
 use harness_bench::rig::buses::PortRow;
 use harness_bench::rig::port_file::{Node, Port, PortBus};
 use harness_bench::rig::segment::run::{PortJudge, PortRun};
@@ -73,16 +74,22 @@ pub(crate) const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub(crate) const COMMANDS: PortCommands = PortCommands {
-    bus: PortBus::Nordac,
+pub(crate) const COMMANDS: RigCommands = RigCommands {
+    // Of a file of its own the drives are set up, or the limits are to be tried.
+    is_bare: |rig| rig.origin.starts_with("sim:"),
     run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
-    judge: |rig, allow_motion, qualifies| {
-        Box::new(PortJudge::<Player>::new(rig, allow_motion, qualifies))
+    judge: |rig, qualifies| Ok(Box::new(PortJudge::<Player>::new(rig, qualifies))),
+    command: |rig, command, output| match rig {
+        Some(rig) => super::cli::drive(PortBench::Rig(&rig), &command, output),
+        None => Err(Failure::refused("--rig names no bench of this bus")),
     },
-    command: |rig, command, output| super::cli::drive(PortBench::Rig(rig), command, output),
-    hold: |rig, options| Ok(Box::new(HeldPort::<Inverters>::open(rig, options)?)),
+    hold: |rig, options, _| {
+        Ok(Box::new(
+            HeldPort::<Inverters>::open(rig, options).map_err(unusable)?,
+        ))
+    },
     check: super::cli::check,
-    fuzz: LineFuzz::of::<Nordac>(),
+    fuzz: FuzzCommands::of_line::<Nordac>(),
 };
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.

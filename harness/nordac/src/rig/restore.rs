@@ -31,6 +31,9 @@ const BUS_MODE: u16 = 1619;
 /// The most places at which slaves that a scenario moves are stopped by a watchdog: each takes it up to 1.3 s.
 const MOST_STOPPED: usize = 8;
 
+/// How often a parameter is put back where the exchange is left meanwhile.
+const TRIES: usize = 3;
+
 /// A parameter: its number and IND.
 type Place = (u16, u16);
 
@@ -226,7 +229,7 @@ impl<'k, 'l> Back<'k, 'l> {
         let mut left = Vec::new();
         let mut reasons = Vec::new();
         for place in places {
-            if let Err(why) = self.one(*place) {
+            if let Err(why) = self.insist(*place) {
                 left.push(*place);
                 reasons.push(why);
             }
@@ -235,23 +238,33 @@ impl<'k, 'l> Back<'k, 'l> {
         (!left.is_empty()).then_some((left, why))
     }
 
-    /// Puts a parameter back that does not read as it did.
-    fn one(&mut self, place: Place) -> Result<(), String> {
-        let text = |error: TalkError| error.to_string();
+    /// Puts a parameter back; again where the exchange was left, as by the watchdog of a slave while the computer stood still.
+    fn insist(&mut self, place: Place) -> Result<(), String> {
+        let mut done = self.one(place);
+        for _ in 1..TRIES {
+            if done.is_err() && self.begin().is_ok() {
+                done = self.one(place);
+            }
+        }
+        done.unwrap_or_else(|error| Err(error.to_string()))
+    }
+
+    /// Puts a parameter back that does not read as it did. The inner error says how the slave refuses it.
+    fn one(&mut self, place: Place) -> Result<Result<(), String>, TalkError> {
         let (Some(raw), Some(parameter)) = (self.known.values.get(&place), Parameter::of(place.0))
         else {
-            return Ok(());
+            return Ok(Ok(()));
         };
         let (raw, number) = (*raw, place.0);
         let (reads, writes) = (Task::read(parameter).ak(), Task::change(parameter).ak());
-        let was = self.task(reads, place, 0).map_err(text)?;
+        let was = self.task(reads, place, 0)?;
         if was == Some(raw) {
-            return Ok(());
+            return Ok(Ok(()));
         }
         if number == INTERFACE {
             // The terminals control it from then on, and it goes on holding this word.
             let ppo = self.slave.ppo.unwrap_or_default();
-            idle((self.slave.address, ppo), &mut self.talk).map_err(text)?;
+            idle((self.slave.address, ppo), &mut self.talk)?;
         }
         match self.task(writes, place, raw) {
             Err(TalkError::Exchange {
@@ -259,23 +272,23 @@ impl<'k, 'l> Back<'k, 'l> {
                 ..
             }) if restarts(number) => {}
             other => {
-                other.map_err(text)?;
+                other?;
             }
         }
         if number == ADDRESS {
             self.slave.address = self.known.slave.address;
         }
         if restarts(number) {
-            self.begin().map_err(text)?;
+            self.begin()?;
         }
-        match self.task(reads, place, 0).map_err(text)? {
+        Ok(match self.task(reads, place, 0)? {
             Some(reads) if reads == raw => Ok(()),
             Some(reads) => Err(format!(
                 "{number} ({}) reads {reads}, and was {raw}",
                 parameter.name
             )),
             None => Err(format!("{number} ({}) is not read", parameter.name)),
-        }
+        })
     }
 
     /// Acknowledges a fault that the scenario has left, where the bench may.

@@ -103,7 +103,7 @@ impl PortPlayer for Player {
         conversations(rig)
     }
 
-    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
-        Some(qualify(parts, rig, began, whole))
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Qualified {
+        qualify(parts, rig, began, whole)
     }
 }

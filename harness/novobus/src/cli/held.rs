@@ -15,12 +15,12 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::held::{HeldBench, HeldRecord, record_from_now};
 use harness_bench::command::output::Output;
+use harness_bench::command::rig_commands::unusable;
 use harness_bench::command::rig_name::Use;
 use harness_bench::link::{Line, Link, Moment, PlacedFault, Trouble};
 use harness_bench::rig::End;
 use harness_bench::rig::PlayedScenario;
 use harness_bench::rig::Rig;
-use harness_bench::rig::SessionError;
 use harness_bench::rig::UseOptions;
 use harness_bench::scenario::files;
 use harness_bench::scenario::parse;
@@ -43,19 +43,13 @@ struct HeldRings {
 ///
 /// # Errors
 /// [`SessionError`], as text with its exit code.
-pub fn hold(
+pub(super) fn hold(
     rig: &Rig,
     options: &UseOptions,
     output: &mut Output,
 ) -> Result<Box<dyn HeldBench>, Failure> {
     let plan = rig.plan()?;
-    let failed = |error: SessionError| {
-        Failure::Said(
-            harness_bench::command::rig_failure::exit_of(&error),
-            error.to_string(),
-        )
-    };
-    let rig = Shared::new(Session::open(rig, options).map_err(failed)?);
+    let rig = Shared::new(Session::open(rig, options).map_err(unusable)?);
     let mut held = HeldRings {
         rig,
         plan,
@@ -181,12 +175,7 @@ impl HeldBench for HeldRings {
             // What is written between scenarios is meant to stay.
             let ended = session.link().trouble().is_some_and(Trouble::ends_a_run);
             let notes = session.put_back(!ended);
-            let mut played = played.map_err(|error| {
-                Failure::Said(
-                    harness_bench::command::rig_failure::exit_of(&error),
-                    error.to_string(),
-                )
-            })?;
+            let mut played = played.map_err(unusable)?;
             played.outcome.remarks.extend(notes);
             Ok(played)
         })?

@@ -4,8 +4,8 @@ mod axes;
 pub mod cells;
 mod control;
 pub mod deviations;
-pub mod fuzz;
-pub mod held;
+pub(crate) mod fuzz;
+mod held;
 mod info;
 mod params;
 mod params_file;
@@ -14,9 +14,8 @@ pub mod power;
 mod read;
 mod recover;
 mod rig;
-pub mod rig_check;
+mod rig_check;
 mod scope;
-pub mod shrink;
 mod signal;
 pub mod sim;
 mod top;
@@ -27,19 +26,29 @@ mod write;
 pub use rig::give_back_session;
 
 use crate::driver;
+use crate::rig::sim::is_bare;
+use crate::rig::{RingJudge, RingRun};
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
+use harness_bench::command::rig_commands::RigCommands;
 
-/// Runs a command and reports its errors.
-pub fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
-    match perform(command, output) {
-        Ok(exit) => Ok(exit),
-        Err(Failure::Output(error)) => Err(error),
-        Err(failure) => Ok(failure.tell(output)),
-    }
-}
+/// Commands on rigs with rings.
+pub(crate) const COMMANDS: RigCommands = RigCommands {
+    is_bare,
+    run: |rig, options| Ok(Box::new(RingRun::open(rig, options)?)),
+    judge: |rig, qualifies| Ok(Box::new(RingJudge::new(rig, qualifies)?)),
+    command: |rig, mut command, output| {
+        if let Some(arguments) = command.rig_mut() {
+            arguments.found = rig;
+        }
+        perform(&command, output)
+    },
+    hold: held::hold,
+    check: rig_check::check,
+    fuzz: fuzz::COMMANDS,
+};
 
 /// Runs a command.
 ///

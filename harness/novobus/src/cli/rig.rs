@@ -270,6 +270,7 @@ pub(crate) fn take(
         allow_motion: as_what.moves,
         ill_as_well,
         keeps_lines: true,
+        tries_line_errors: false,
         interrupt: interrupt_flag(),
         alarm: alarm(),
     };

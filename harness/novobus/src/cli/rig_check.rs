@@ -3,61 +3,26 @@
 use crate::driver::{Error, SpelledOut, SpellingCause};
 use crate::rig::Session;
 use crate::rig::figures::{Figures, RingFigures, WrongParity, measure};
-use clap::Args;
-use harness_bench::command::args::ListFormat;
 use harness_bench::command::exit::Exit;
-use harness_bench::command::failure::exit_of_trouble;
+use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
 use harness_bench::command::progress::progress_bar;
-use harness_bench::command::rig_failure::{alarm, exit_of, tell_end};
+use harness_bench::command::rig_commands::unusable;
+use harness_bench::command::rig_failure::tell_end;
 use harness_bench::counted::counted;
 use harness_bench::rig::{Rig, UseOptions};
-use harness_bench::signals::interrupt_flag;
 use harness_proto::time::Span;
 use serde_json::json;
 use std::fmt::Write as _;
-use std::time::Duration;
-
-/// For `rig check`.
-#[derive(Debug, Args)]
-pub struct CheckRigArguments {
-    /// The rig: a name, a file, or sim:N.
-    pub rig: String,
-    /// How long to wait if another program holds the rig, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = harness_bench::command::args::duration)]
-    pub wait: Option<Duration>,
-    /// Output format.
-    #[arg(long, value_enum, default_value_t = ListFormat::Text)]
-    pub format: ListFormat,
-}
-
-impl CheckRigArguments {
-    /// How the bench is used.
-    pub fn options(&self) -> UseOptions {
-        UseOptions {
-            purpose: "rig check".to_owned(),
-            wait: self.wait.unwrap_or_default(),
-            keeps_lines: true,
-            interrupt: interrupt_flag(),
-            alarm: alarm(),
-            ..UseOptions::default()
-        }
-    }
-}
 
 /// Opens a bench and says what it shows.
-pub fn check(
+pub(crate) fn check(
     rig: &Rig,
-    arguments: &CheckRigArguments,
+    options: &UseOptions,
+    for_tools: bool,
     output: &mut Output,
-) -> std::io::Result<Exit> {
-    let session = match Session::open(rig, &arguments.options()) {
-        Ok(session) => session,
-        Err(error) => {
-            output.complain(&error.to_string());
-            return Ok(exit_of(&error));
-        }
-    };
+) -> Result<Exit, Failure> {
+    let session = Session::open(rig, options).map_err(unusable)?;
     let all = rig.rings().map(|(_, ring)| usize::from(ring.drives)).sum();
     let bar = progress_bar(all, output.progress);
     let measured = measure(session, &mut |axis| {
@@ -81,9 +46,9 @@ pub fn check(
             return Ok(ended(exit, output));
         }
     };
-    let text = match arguments.format {
-        ListFormat::Text => text(rig, &figures),
-        ListFormat::Json => format!("{:#}\n", object(rig, &figures)),
+    let text = match for_tools {
+        false => text(rig, &figures),
+        true => format!("{:#}\n", object(rig, &figures)),
     };
     let mut exit = match output.result(&text) {
         Ok(()) => Exit::Passed,

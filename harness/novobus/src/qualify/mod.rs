@@ -11,6 +11,7 @@ mod parts;
 mod pinned;
 mod probes;
 mod qualification;
+mod recorded;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
@@ -20,6 +21,7 @@ pub use hypothesis::{Fit, Hypothesis, explaining};
 pub use pinned::{Pinned, Question, questions};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
 pub use qualification::{Qualification, QualificationFacts, QualifiedBench};
+pub(crate) use recorded::{of_parts, of_run};
 pub use settle::{Answer, answer};
 
 /// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the

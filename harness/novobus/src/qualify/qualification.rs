@@ -92,15 +92,11 @@ pub struct QualificationFacts {
     pub resets: bool,
     /// On which links of the first ring faults can be put, counted from the master's outgoing one.
     pub reached: Vec<usize>,
-    /// When it began, as a date and time of day in UTC.
-    pub began: String,
-    /// Whether the long conversations are played too.
-    pub thorough: bool,
 }
 
 impl QualificationFacts {
     /// Those of a qualification that begins on a rig in use.
-    pub fn of(run: &mut Run<'_>, began: String, thorough: bool) -> Self {
+    pub fn of(run: &mut Run<'_>) -> Self {
         let rig = run.session().rig().clone();
         let links = 0..usize::from(rig.ring_size());
         Self {
@@ -111,8 +107,6 @@ impl QualificationFacts {
             reached: links
                 .filter(|link| run.session().link().reaches(0, *link))
                 .collect(),
-            began,
-            thorough,
         }
     }
 }
@@ -120,6 +114,10 @@ impl QualificationFacts {
 /// A qualification in progress.
 pub struct Qualification {
     facts: QualificationFacts,
+    /// When it began, as a date and time of day in UTC.
+    began: String,
+    /// Whether the long conversations are played too.
+    thorough: bool,
     drives: u8,
     findings: Findings,
     /// The choices of the manual that show in every attempt, before the scenario begins.
@@ -147,6 +145,8 @@ impl Qualification {
             silent: BTreeSet::new(),
             parts: Parts::default(),
             lacks_a_part: false,
+            began: String::new(),
+            thorough: false,
             facts,
         }
     }
@@ -175,11 +175,18 @@ impl Qualification {
         }
     }
 
-    /// Plays what is judged by the model alone, settles what the manual leaves open, and names the deviations of drives.
+    /// Plays what is judged by the model alone, settles what the manual leaves open, and names the deviations of drives. It `began` at this
+    /// date and time of day in UTC, and is `thorough` if the long conversations are played too.
     ///
     /// # Errors
     /// Those of the bench.
-    pub fn settle<B: QualifiedBench>(mut self, bench: &mut B) -> Result<Qualified, B::Stop> {
+    pub fn settle<B: QualifiedBench>(
+        mut self,
+        bench: &mut B,
+        began: String,
+        thorough: bool,
+    ) -> Result<Qualified, B::Stop> {
+        (self.began, self.thorough) = (began, thorough);
         if bench.over() {
             self.findings.note_open(ENDED.to_owned());
             return Ok(self.qualified(None, self.findings.text(None, &[])));
@@ -239,7 +246,7 @@ impl Qualification {
         let reaches = |place: usize| place == 0 || self.facts.reached.contains(&place);
         let mut entries = conversations(drives, &reaches).unwrap_or_default();
         let mut read = Vec::new();
-        if self.facts.thorough {
+        if self.thorough {
             entries.extend(thorough(drives).unwrap_or_default());
             read = dumps(drives);
         }
@@ -400,7 +407,7 @@ impl Qualification {
         let mut profile = Profile {
             schema: 1,
             rig: self.facts.rig.id().to_owned(),
-            date: self.facts.began.clone(),
+            date: self.began.clone(),
             rings,
             property: BTreeMap::new(),
             open: BTreeMap::new(),

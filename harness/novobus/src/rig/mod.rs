@@ -1,5 +1,6 @@
 //! A ring with ports: in use, its scenarios, whether it is sound, what its line is like, and its figures.
 
+mod able;
 mod beside;
 #[cfg(test)]
 mod busy;
@@ -8,6 +9,7 @@ mod condition;
 mod driven;
 pub mod figures;
 pub(crate) mod health;
+mod held_session;
 pub(crate) mod interlock;
 pub mod judge;
 pub(crate) mod left_open;
@@ -15,6 +17,9 @@ pub(crate) mod line_test;
 pub mod open;
 mod permitted;
 mod put_back;
+mod reach;
+mod ring_judge;
+mod ring_run;
 pub mod run;
 pub(crate) mod session;
 pub mod shared;
@@ -28,6 +33,8 @@ pub use driven::Driven;
 pub(crate) use health::examine;
 pub use health::{RingHealth, Unhealthy};
 pub use permitted::limits;
+pub(crate) use ring_judge::RingJudge;
+pub(crate) use ring_run::RingRun;
 pub use run::{Run, Way, play_one};
 pub use session::Session;
 pub use sim::RINGS;

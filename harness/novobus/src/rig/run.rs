@@ -4,6 +4,7 @@
 use super::beside::BesideTwin;
 use super::driven::Driven;
 use super::health::{Unhealthy, examine};
+use super::held_session::HeldSession;
 use super::judge::{AttemptFacts, judge, known};
 use super::put_back::within;
 use super::session::Session;
@@ -39,7 +40,7 @@ const LATEST: Span = Span::from_millis(250);
 
 /// A rig that scenarios are played on, and its twin.
 pub struct Run<'s> {
-    session: &'s mut Session,
+    session: HeldSession<'s>,
     twin: Twin,
     exactness: Exactness,
     byte_time: Span,
@@ -59,21 +60,46 @@ pub struct Run<'s> {
     master: Option<&'static MasterDeviation>,
 }
 
+/// The model of a rig.
+pub(super) struct RigModel {
+    twin: Twin,
+    master: Option<&'static MasterDeviation>,
+}
+
+impl RigModel {
+    /// # Errors
+    /// Known deviations of the rig's file that make no ring.
+    pub(super) fn of(rig: &Rig) -> Result<Self, Problems> {
+        Ok(Self {
+            twin: twin(rig, &known(rig))?,
+            master: rig.plan()?.master,
+        })
+    }
+}
+
 impl<'s> Run<'s> {
     /// Scenarios on a rig in use.
     ///
     /// # Errors
     /// Known deviations of the rig's file that make no ring.
     pub fn new(session: &'s mut Session) -> Result<Self, Problems> {
-        let twin = twin(session.rig(), &known(session.rig()))?;
+        let model = RigModel::of(session.rig())?;
+        Ok(Self::on(HeldSession::Lent(session), model))
+    }
+
+    /// The same, for as long as the rig is in use.
+    pub(super) fn of(session: Session, model: RigModel) -> Run<'static> {
+        Run::on(HeldSession::Own(Box::new(session)), model)
+    }
+
+    fn on(mut session: HeldSession<'s>, RigModel { twin, master }: RigModel) -> Self {
         session.begin();
         let tolerance = session.link().time_tolerance();
         let simulated = session.rig().is_simulated();
         let abilities = session.link().capabilities();
         let line_errors = abilities.contains(&harness_bench::link::Capability::LineErrors);
         let byte_time = session.link().byte_time();
-        let master = session.rig().plan()?.master;
-        Ok(Self {
+        Self {
             master,
             exactness: Exactness {
                 tolerance,
@@ -90,7 +116,7 @@ impl<'s> Run<'s> {
             played: false,
             as_they_are: false,
             rehearses: true,
-        })
+        }
     }
 
     /// What the rig can be asked, with what only a simulated one shows left out.
@@ -109,7 +135,7 @@ impl<'s> Run<'s> {
 
     /// The rig.
     pub fn session(&mut self) -> &mut Session {
-        self.session
+        &mut self.session
     }
 
     /// A fresh twin. Its drives are set up as the rig's file and this header say.

@@ -15,10 +15,6 @@ use harness_sim::nd21::Stimulus;
 
 /// A rig with rings.
 pub trait RigOfRings {
-    /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, and allows
-    /// everything, so that every scenario may bring drives of its own.
-    fn is_bare(&self) -> bool;
-
     /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
     /// no model.
     ///
@@ -34,32 +30,6 @@ pub trait RigOfRings {
 }
 
 impl RigOfRings for Rig {
-    fn is_bare(&self) -> bool {
-        let file = &self.file;
-        if self.port().is_some() {
-            // Of a file of its own the drives are set up, or the limits are to be tried.
-            return self.origin.starts_with("sim:");
-        }
-        let is_input = |own: &Setup| match &own.what {
-            SetupKind::Influence(Influence::Stimuli(all)) => {
-                all.iter().all(|own| matches!(own, Stimulus::Input(..)))
-            }
-            _ => false,
-        };
-        let limits = limits(self, true);
-        self.is_simulated()
-            && limits.allow_everything()
-            && limits.bytes_per_second.is_none()
-            && file.limits.max_run.is_none()
-            && file.retry == Retry::default()
-            && file.interlock.is_empty()
-            && file.deviation.is_empty()
-            && file.power.is_empty()
-            && file.hooks == Hooks::default()
-            && self.profile.is_none()
-            && setup(self).only(|own| !is_input(own)).is_empty()
-    }
-
     fn plan(&self) -> Result<Plan, Problems> {
         self.plan_with(&Header::default())
     }
@@ -81,6 +51,29 @@ impl RigOfRings for Rig {
         let own = header(&self.file, profile, &setup(self));
         plan_header(&self.origin, &own.and(more), &sizes(&self.file))
     }
+}
+
+/// Whether a rig is simulated and its file says no more than how large its rings are and which inputs are connected, and allows everything.
+pub(crate) fn is_bare(rig: &Rig) -> bool {
+    let file = &rig.file;
+    let is_input = |own: &Setup| match &own.what {
+        SetupKind::Influence(Influence::Stimuli(all)) => {
+            all.iter().all(|own| matches!(own, Stimulus::Input(..)))
+        }
+        _ => false,
+    };
+    let limits = limits(rig, true);
+    rig.is_simulated()
+        && limits.allow_everything()
+        && limits.bytes_per_second.is_none()
+        && file.limits.max_run.is_none()
+        && file.retry == Retry::default()
+        && file.interlock.is_empty()
+        && file.deviation.is_empty()
+        && file.power.is_empty()
+        && file.hooks == Hooks::default()
+        && rig.profile.is_none()
+        && setup(rig).only(|own| !is_input(own)).is_empty()
 }
 
 /// How many drives each ring of a rig has.

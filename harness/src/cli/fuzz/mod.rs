@@ -2,10 +2,9 @@
 
 mod coverage;
 mod distil;
-mod replay;
 mod run;
 
-use crate::buses::RIG_BUSES;
+use crate::buses::{RIG_BUSES, bus_of, find_any_rig, fuzz_of};
 use crate::command::exit::Exit;
 use crate::command::fuzz::replay::ReplayArguments;
 use crate::command::fuzz::run::FuzzRunArguments;
@@ -21,7 +20,7 @@ pub enum FuzzCommand {
     /// Play the conversations that a run has kept, the most telling first.
     Replay(ReplayArguments),
     /// Count the cases that it takes to find each planted deviation.
-    Power(crate::buses::commands::power::PowerArguments),
+    Power(crate::buses::novobus::cli::power::PowerArguments),
     /// Show which protocol transitions the kept inputs reach.
     ///
     /// The exit code is 1 if a reachable transition is missing.
@@ -34,11 +33,22 @@ pub enum FuzzCommand {
 pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Result<Exit> {
     match command {
         FuzzCommand::Run(arguments) => run::run(arguments, output),
-        FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
+        FuzzCommand::Replay(arguments) => replay(arguments, output),
         FuzzCommand::Power(arguments) => {
-            crate::buses::commands::power::power(arguments, &RIG_BUSES, output)
+            crate::buses::novobus::cli::power::power(arguments, &RIG_BUSES, output)
         }
         FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
         FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
+    }
+}
+
+/// Plays again what a run has kept.
+fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let Some(rig) = find_any_rig(&arguments.rig, output) else {
+        return Ok(Exit::Usage);
+    };
+    match fuzz_of(bus_of(&rig).name) {
+        Some(own) => (own.replay)(&rig, arguments, output),
+        None => Ok(Exit::Usage),
     }
 }

@@ -176,6 +176,7 @@ fn serve(
         wait: arguments.wait.unwrap_or_default(),
         allow_motion: arguments.leave,
         keeps_lines: true,
+        tries_line_errors: false,
         interrupt: Arc::clone(&interrupt),
         alarm: alarm(),
         ..UseOptions::default()

@@ -7,7 +7,7 @@ use super::people::{self, Turn};
 use super::people_output;
 use super::request::{self, SessionEvent, SessionLine, SessionRequest};
 use crate::bus_name::BusName;
-use crate::buses::novobus::rig::sim::RigOfRings;
+use crate::buses::is_bare;
 use crate::cli::args::{Arguments, ProgramCommand};
 use crate::cli::help::command;
 use crate::command::exit::Exit;
@@ -590,7 +590,7 @@ impl HeldSession {
                 "a scenario does not meet the faults of this session: write them into the scenario",
             ));
         }
-        if self.rig.is_bare() {
+        if is_bare(&self.rig) {
             // Drives of its own.
             let played = play_entry_until(entry, AtMismatch::Stop, &self.interrupt);
             return Ok(played.outcome);

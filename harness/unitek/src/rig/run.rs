@@ -119,7 +119,7 @@ impl PortPlayer for Player {
         conversations(&rig.port().map(axes).unwrap_or_default())
     }
 
-    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Option<Qualified> {
-        Some(qualify(parts, rig, began, whole))
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Qualified {
+        qualify(parts, rig, began, whole)
     }
 }

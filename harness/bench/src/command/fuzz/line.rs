@@ -2,18 +2,16 @@
 
 use super::replay::{ReplayArguments, kept, play};
 use super::run::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore};
-use super::{tell, verify};
+use super::{FuzzCommands, tell, verify_as};
 use crate::command::exit::Exit;
-use crate::command::fuzz::promote::{PromoteArguments, keep};
+use crate::command::fuzz::promote::keep;
 use crate::command::fuzz::shrink::{RUNS, RUNS_ON_RIG, ShrinkArguments, write_smaller};
 use crate::command::output::Output;
 use crate::command::rig_failure::{alarm, exit_of, exit_of_end, find_any_rig, tell_end};
 use crate::counted::counted;
-use crate::evidence::Signer;
 use crate::explore::line::{
     LineRig, LineScope, LineSetup, LineTalk, OnAdapter, OnLine, PlantedDrive, SessionOf,
 };
-use crate::explore::promote::Plays;
 use crate::explore::smaller::{Smaller, smaller};
 use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzRun, FuzzSettings, KeptRun, Spiced, Target, read_as,
@@ -23,41 +21,21 @@ use crate::rig::buses::RigBuses;
 use crate::rig::{Rig, UseOptions};
 use crate::signals::interrupt_flag;
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::time::Duration;
 
 /// How often a finding is tried before it is made small on a rig.
 const TRIES: u8 = 3;
 
-/// What the commands do with the drives of a bus.
-pub struct LineFuzz {
-    /// `fuzz run`
-    pub run: fn(&Rig, &FuzzRunArguments, &mut Output) -> std::io::Result<Exit>,
-    /// `fuzz replay`
-    pub replay: fn(&Rig, &ReplayArguments, &mut Output) -> std::io::Result<Exit>,
-    /// `shrink`
-    pub shrink: fn(&ShrinkArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>,
-    /// `promote`
-    pub promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
-    /// `verify` of the folder of a run; `None` if the folder has no run of this bus.
-    pub verify: Verify,
-}
-
-/// Judges the findings of a run again.
-type Verify = fn(&Path, Option<Signer<'_>>, &mut Output) -> Option<std::io::Result<Exit>>;
-
-impl LineFuzz {
-    /// The commands on a bus.
-    pub const fn of<B: LineRig>() -> Self {
+impl FuzzCommands {
+    /// The commands on a bus whose stations share one line.
+    pub const fn of_line<B: LineRig>() -> Self {
         Self {
             run: run::<B>,
             replay: replay::<B>,
             shrink: shrink::<B>,
             promote: keep::<LineTalk<B>>,
-            verify: |folder, signer, output| {
-                let (kept, _) = read_as::<LineTalk<B>>(folder).ok()?;
-                Some(verify(folder, &kept, signer, output))
-            },
+            verify: verify_as::<LineTalk<B>>,
+            page: None,
         }
     }
 }

@@ -11,10 +11,37 @@ pub mod watch;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::rig_failure::exit_of;
+use crate::evidence::Signer;
+use crate::explore::promote::Plays;
 use crate::explore::{ExploreError, FuzzCase, FuzzRun};
+use crate::rig::Rig;
+use crate::rig::buses::RigBuses;
+use promote::PromoteArguments;
+use replay::ReplayArguments;
+use run::FuzzRunArguments;
+use shrink::ShrinkArguments;
+use std::path::Path;
 
-pub use line::LineFuzz;
-pub use verify::verify;
+pub use verify::verify_as;
+
+/// What the commands do with the drives of a bus.
+pub struct FuzzCommands {
+    /// `fuzz run`
+    pub run: fn(&Rig, &FuzzRunArguments, &mut Output) -> std::io::Result<Exit>,
+    /// `fuzz replay`
+    pub replay: fn(&Rig, &ReplayArguments, &mut Output) -> std::io::Result<Exit>,
+    /// `shrink`
+    pub shrink: fn(&ShrinkArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>,
+    /// `promote`
+    pub promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
+    /// `verify` of the folder of a run; `None` if the folder has no run of this bus.
+    pub verify: Verify,
+    /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
+    pub page: Option<fn(&Path) -> Result<String, ExploreError>>,
+}
+
+/// Judges the findings of a run again.
+type Verify = fn(&Path, Option<Signer<'_>>, &mut Output) -> Option<std::io::Result<Exit>>;
 
 /// Tells why exploring ended early, and gives the exit code for it.
 pub fn tell(error: &ExploreError, output: &mut Output) -> Exit {

@@ -7,7 +7,7 @@ use crate::evidence::{SIGNATURE, SUMS, Signer, sealed, unsigned};
 use crate::explore::files::read_text;
 use crate::explore::{
     Differing as _, ExploreError, Finding, FuzzCase, JudgedAgain, KeptRun, LogLine, RECORD,
-    count_finding, file_of, impossible,
+    count_finding, file_of, impossible, read_as,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -18,8 +18,17 @@ const UNCONFIRMED: &str = "unconfirmed  which cases were tried and showed nothin
      unconfirmed  the counts within the last round of cases, the numbers of cases within their rounds, the time on the line, the cases that were \
      kept, and in the first line what follows from no finding, such as the seed, `of` and `spices`\n";
 
-/// Checks the files of a run, and judges its findings again.
-pub fn verify<C: FuzzCase>(
+/// Checks the files of a run of a bus, and judges its findings again; `None` where the folder holds none.
+pub fn verify_as<C: FuzzCase>(
+    folder: &Path,
+    signer: Option<Signer<'_>>,
+    output: &mut Output,
+) -> Option<std::io::Result<Exit>> {
+    let (kept, _) = read_as::<C>(folder).ok()?;
+    Some(verify(folder, &kept, signer, output))
+}
+
+fn verify<C: FuzzCase>(
     folder: &Path,
     kept: &KeptRun<C>,
     signer: Option<Signer<'_>>,

@@ -3,13 +3,14 @@
 pub mod observed;
 pub mod run;
 
-use super::{End, Keeper, PlayedScenario, Rig, SessionError};
+use super::{Attempt, End, Keeper, PlayedScenario, Rig, SessionError};
 use crate::link::{Capability, LinkEvent, Trouble};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
+use std::collections::VecDeque;
 
 /// What the link of a rig with an adapter can do, within the limits of the rig.
 pub const ON_PORT: [Capability; 3] = [Capability::Memory, Capability::Motion, Capability::Eeprom];
@@ -25,6 +26,8 @@ pub struct OnSegment {
     pub tolerance: Span,
     /// What its link can do.
     pub capabilities: Vec<Capability>,
+    /// Whether every drive is reset before a scenario.
+    pub anew: bool,
 }
 
 impl OnSegment {
@@ -53,6 +56,7 @@ impl OnSegment {
             drives: u8::try_from(drives).unwrap_or(u8::MAX),
             tolerance,
             capabilities: all.iter().filter(has).copied().collect(),
+            anew: false,
         }
     }
 }
@@ -68,10 +72,66 @@ pub struct Qualified {
     pub verdict: Verdict,
 }
 
+/// A qualification was ended by what keeps its scenarios.
+#[derive(Clone, Copy, Debug)]
+pub struct QualificationStopped;
+
+/// What keeps and shows the scenarios that a qualification plays behind the selected ones.
+pub trait QualificationKeeper {
+    /// When it began, as a date and time of day in UTC.
+    fn began(&self) -> String;
+
+    /// Plays a scenario into the folder of evidence, where there is one.
+    ///
+    /// # Errors
+    /// Nothing more can be played or kept.
+    fn play(
+        &mut self,
+        source: &Source,
+        play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
+    ) -> Result<PlayedScenario, QualificationStopped>;
+
+    /// Shows the outcome of a scenario.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn show(
+        &mut self,
+        source: &Source,
+        played: &PlayedScenario,
+    ) -> Result<(), QualificationStopped>;
+
+    /// Shows a result.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn tell(&mut self, text: &str) -> Result<(), QualificationStopped>;
+
+    /// Says something for people.
+    fn say(&mut self, text: &str);
+
+    /// Reports an error.
+    fn complain(&mut self, why: &str);
+}
+
 /// A rig in use, on which scenarios of its bus are played.
 pub trait SegmentRun {
     /// What a record begins with.
-    fn segment(&self) -> OnSegment;
+    fn segment(&mut self) -> OnSegment;
+
+    /// Why scenarios are not played that need line errors, in sentences; see [`UseOptions::tries_line_errors`].
+    ///
+    /// # Errors
+    /// The drives do not answer since then.
+    ///
+    /// [`UseOptions::tries_line_errors`]: crate::rig::UseOptions::tries_line_errors
+    fn obstacles(&mut self) -> Result<Vec<String>, SessionError> {
+        Ok(Vec::new())
+    }
+
+    /// Whether a scenario that the rig's limits do not permit to its end is skipped before anything of it is sent, where the bus can tell.
+    /// By default it is.
+    fn rehearse(&mut self, _rehearses: bool) {}
 
     /// Plays a scenario, and again if it did not pass, as often as the rig's file says. Afterwards the drives are in their safe state, with
     /// the registers that the scenario changed set back.
@@ -84,16 +144,18 @@ pub trait SegmentRun {
         keeper: Option<&mut dyn Keeper>,
     ) -> Result<PlayedScenario, SessionError>;
 
-    /// The scenarios that a qualification plays behind the selected ones.
-    fn conversations(&self) -> Vec<Source> {
-        Vec::new()
-    }
+    /// Takes note of a selected scenario of a qualification, by its name in the folder of evidence.
+    fn note(&mut self, _name: &str, _played: &PlayedScenario) {}
 
-    /// What the attempts so far come to, in a qualification that began at this date and time of day in UTC; `whole` if everything was played.
-    /// `None` for a bus whose drives cannot be qualified.
-    fn qualified(&mut self, _began: &str, _whole: bool) -> Option<Qualified> {
-        None
-    }
+    /// Plays what a qualification plays behind the selected scenarios; with `thorough` the long conversations too. Returns what all comes to.
+    ///
+    /// # Errors
+    /// [`QualificationStopped`].
+    fn qualify(
+        &mut self,
+        thorough: bool,
+        keeper: &mut dyn QualificationKeeper,
+    ) -> Result<Qualified, QualificationStopped>;
 
     /// Notes about the drives since the last call, in sentences.
     fn notes(&mut self) -> Vec<String>;
@@ -102,53 +164,139 @@ pub trait SegmentRun {
     fn over(&mut self) -> Option<String>;
 
     /// Why the link carries nothing more.
-    fn trouble(&self) -> Option<Trouble>;
+    fn trouble(&mut self) -> Option<Trouble>;
+
+    /// Whether nothing more can or may be played. `complain` is given the reason, where the link does not tell it.
+    fn is_over(&mut self, complain: &mut dyn FnMut(&str)) -> bool {
+        if let Some(why) = self.over() {
+            complain(&why);
+            return true;
+        }
+        self.trouble().is_some_and(|trouble| trouble.ends_a_run())
+    }
+
+    /// What the transport has measured in the run, in lines.
+    fn measured(&mut self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
     fn close(self: Box<Self>, error: bool) -> End;
 }
 
+/// An attempt as it is recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedAttempt<'r> {
+    pub events: &'r [LinkEvent],
+    /// Number of line errors that the transport reported without their bytes.
+    pub unplaced: u64,
+}
+
 /// An attempt judged again from its record.
 #[derive(Clone, Debug)]
 pub struct RepeatedVerdict {
-    pub outcome: Outcome,
-    /// What was received before the scenario, in words.
-    pub before: Option<String>,
+    pub attempt: Attempt,
     /// What the record holds behind the end of the attempt.
     pub left: Option<String>,
     /// Of simulated drives, for which the attempt was played again: what happened, and what the bus carried.
     pub played: Option<(Vec<LinkEvent>, Vec<Trace>)>,
     /// Whether it ends in trouble.
     pub trouble: bool,
+    /// Whether the outcome must be the same to the last remark and moment.
+    pub exact: bool,
+}
+
+/// A scenario that a qualification plays behind the selected ones.
+#[derive(Clone, Debug)]
+pub struct QualifyingScenario {
+    pub source: Source,
+    /// Whether it is played each time; a probe may end with its first conversation.
+    pub always: bool,
+}
+
+/// A scenario of a record, as it was played.
+#[derive(Clone, Debug)]
+pub struct RecordedCase {
+    pub name: String,
+    /// The sum of its text.
+    pub sum: String,
+    /// Its attempts, judged again.
+    pub played: PlayedScenario,
+    /// Whether the rig's line was lost in it, or the like.
+    pub ends_the_run: bool,
+}
+
+/// A part of a qualification that was split.
+#[derive(Clone, Debug)]
+pub struct RecordedPart {
+    /// Which.
+    pub name: String,
+    /// The selected scenarios, with their places in the list of all.
+    pub selected: Vec<(usize, RecordedCase)>,
+    /// What it has played behind them.
+    pub cases: VecDeque<RecordedCase>,
+    /// Whether it was played to its end.
+    pub whole: bool,
+}
+
+/// What was played in a qualification.
+#[derive(Clone, Debug)]
+pub enum QualificationRecord<'r> {
+    /// The scenarios of one run, and how many of them were selected; `whole` if everything was played.
+    Run {
+        cases: VecDeque<RecordedCase>,
+        selected: usize,
+        whole: bool,
+    },
+    /// The parts of a run that was split, and what none of them has played, in sentences.
+    Parts {
+        parts: Vec<RecordedPart>,
+        missing: &'r [String],
+    },
 }
 
 /// Judges the attempts of a record again, in their order: what one of them found out about the drives counts for those behind it.
 pub trait SegmentJudge {
-    /// What the first line of the record must say. It names the capabilities of the rig with and without `--allow-motion`.
-    fn segments(&self) -> [OnSegment; 2];
+    /// Takes the capabilities in the first line of a record, and returns what that line must say. They tell whether motors could turn.
+    fn adopt(&mut self, capabilities: &[String]) -> OnSegment;
 
-    /// Why a scenario is not begun on this rig; `None` if it is.
-    fn not_begun(&self, source: &Source) -> Option<Outcome>;
+    /// Whether attempts on simulated drives are played again one by one. Where drives are not restarted for each attempt, the whole run is.
+    fn plays_again(&self) -> bool {
+        true
+    }
+
+    /// Why a scenario is not begun on this rig; `None` if it is. The record gives these remarks for it.
+    fn not_begun(&self, source: &Source, remarks: &[String]) -> Option<Outcome>;
 
     /// The scenarios that a qualification plays behind the selected ones.
-    fn conversations(&self) -> Vec<Source> {
-        Vec::new()
+    fn conversations(&self) -> Vec<QualifyingScenario>;
+
+    /// Whether a qualification makes scenarios of such a name from what it has heard.
+    fn is_trial(&self, _name: &str) -> bool {
+        false
     }
 
     /// The attempts behind are those of another part of a qualification: nothing is known of its drives.
     fn begin_part(&mut self);
 
-    /// What the attempts of all parts judged so far come to; see [`SegmentRun::qualified`].
-    fn qualified(&mut self, _began: &str, _whole: bool) -> Option<Qualified> {
-        None
-    }
+    /// What a qualification comes to that began at this date and time of day in UTC: each outcome that its record allows, none if the record
+    /// ends where it has no outcome.
+    ///
+    /// # Errors
+    /// The record is none of a qualification, in a sentence.
+    fn qualified(
+        &mut self,
+        began: &str,
+        record: QualificationRecord<'_>,
+    ) -> Result<Vec<Qualified>, String>;
 
     /// Judges an attempt again.
     ///
     /// # Errors
     /// The text is no scenario of this bus, in a sentence.
-    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String>;
-
-    /// Something was lost in the attempt that was judged last.
-    fn doubt(&mut self) {}
+    fn judge(
+        &mut self,
+        source: &Source,
+        recorded: RecordedAttempt<'_>,
+    ) -> Result<RepeatedVerdict, String>;
 }

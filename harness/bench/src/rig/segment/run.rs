@@ -1,7 +1,10 @@
 //! Scenarios on a rig with a port, and their attempts judged again from a record, whatever the bus.
 
 use super::observed::Beats;
-use super::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
+use super::{
+    OnSegment, QualificationKeeper, QualificationRecord, QualificationStopped, Qualified,
+    QualifyingScenario, RecordedAttempt, RepeatedVerdict, SegmentJudge, SegmentRun,
+};
 use crate::bus_name::BusName;
 use crate::guard::Safe;
 use crate::link::{Line, Link, LinkEvent, Recording, Replay, Sink, Trouble};
@@ -80,14 +83,11 @@ pub trait PortPlayer: Sized {
     -> Vec<String>;
 
     /// The scenarios that a qualification plays behind the selected ones.
-    fn conversations(_rig: &Rig) -> Vec<Source> {
-        Vec::new()
-    }
+    fn conversations(rig: &Rig) -> Vec<Source>;
 
-    /// What the attempts of these players come to, one for each part of a qualification; see [`SegmentRun::qualified`].
-    fn qualified(_parts: &[&Self], _rig: &Rig, _began: &str, _whole: bool) -> Option<Qualified> {
-        None
-    }
+    /// What the attempts of these players come to, one for each part of a qualification that began at this date and time of day in UTC;
+    /// `whole` if everything was played.
+    fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Qualified;
 }
 
 /// A rig in use.
@@ -258,7 +258,7 @@ impl<P: PortPlayer> PortRun<P> {
 }
 
 impl<P: PortPlayer> SegmentRun for PortRun<P> {
-    fn segment(&self) -> OnSegment {
+    fn segment(&mut self) -> OnSegment {
         P::segment(self.session.rig(), self.options.allow_motion)
     }
 
@@ -297,12 +297,25 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
         }
     }
 
-    fn conversations(&self) -> Vec<Source> {
-        P::conversations(self.session.rig())
-    }
-
-    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
-        P::qualified(&[&self.player], self.session.rig(), began, whole)
+    fn qualify(
+        &mut self,
+        _thorough: bool,
+        keeper: &mut dyn QualificationKeeper,
+    ) -> Result<Qualified, QualificationStopped> {
+        let mut whole = true;
+        for source in P::conversations(self.session.rig()) {
+            whole &= !self.is_over(&mut |why| keeper.complain(why));
+            if !whole {
+                break;
+            }
+            let played = keeper.play(&source, &mut |keeper| self.play(&source, keeper))?;
+            keeper.show(&source, &played)?;
+            for note in self.notes() {
+                keeper.say(&format!("  note: {note}\n"));
+            }
+        }
+        let (player, rig) = (&self.player, self.session.rig());
+        Ok(P::qualified(&[player], rig, &keeper.began(), whole))
     }
 
     fn notes(&mut self) -> Vec<String> {
@@ -315,7 +328,7 @@ impl<P: PortPlayer> SegmentRun for PortRun<P> {
         self.over.clone()
     }
 
-    fn trouble(&self) -> Option<Trouble> {
+    fn trouble(&mut self) -> Option<Trouble> {
         self.session.guarded().trouble().cloned()
     }
 
@@ -350,13 +363,13 @@ pub struct PortJudge<P: PortPlayer> {
 }
 
 impl<P: PortPlayer> PortJudge<P> {
-    /// See [`PortPlayer::new`].
-    pub fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
+    /// Of a qualification or of a run in which motors may turn, as far as the rig's file permits it; see [`SegmentJudge::adopt`].
+    pub fn new(rig: &Rig, qualifies: bool) -> Self {
         Self {
-            allow_motion,
+            allow_motion: true,
             qualifies,
             run: None,
-            player: P::new(rig, allow_motion, qualifies),
+            player: P::new(rig, true, qualifies),
             rig: rig.clone(),
             before: Vec::new(),
         }
@@ -384,26 +397,60 @@ impl<P: PortPlayer> PortJudge<P> {
         let attempt = run.attempt(own, &mut events);
         let trouble = run.trouble().is_some();
         self.run = Some(run);
+        let traces = attempt.traces.clone();
         Ok(RepeatedVerdict {
-            outcome: attempt.outcome,
-            before: attempt.opening,
+            attempt: Attempt {
+                traces: Vec::new(),
+                ..attempt
+            },
             left: None,
-            played: Some((events, attempt.traces)),
+            played: Some((events, traces)),
             trouble,
+            exact: true,
+        })
+    }
+
+    fn repeated(
+        &mut self,
+        own: &Arc<P::Own>,
+        events: &[LinkEvent],
+    ) -> Result<RepeatedVerdict, String> {
+        if self.rig.is_simulated() {
+            return self.again(own);
+        }
+        let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
+        let mut replay = self.player.replay(events, tolerance);
+        let (outcome, before) = self.player.attempt(own, &mut replay);
+        Ok(RepeatedVerdict {
+            attempt: Attempt {
+                opening: Some(before),
+                ..Attempt::new(outcome, Vec::new())
+            },
+            left: replay.left(),
+            played: None,
+            trouble: replay.trouble().is_some(),
+            exact: true,
         })
     }
 }
 
 impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
-    fn doubt(&mut self) {
-        self.player.doubt();
+    fn adopt(&mut self, capabilities: &[String]) -> OnSegment {
+        let [moving, still] = [true, false].map(|motion| P::segment(&self.rig, motion));
+        let named = |own: &OnSegment| {
+            let own = own.capabilities.iter().map(|own| own.name());
+            own.eq(capabilities.iter().map(String::as_str))
+        };
+        let segment = match named(&still) {
+            true => (still, false),
+            false => (moving, true),
+        };
+        self.allow_motion = segment.1;
+        self.player = P::new(&self.rig, self.allow_motion, self.qualifies);
+        segment.0
     }
 
-    fn segments(&self) -> [OnSegment; 2] {
-        [true, false].map(|motion| P::segment(&self.rig, motion))
-    }
-
-    fn not_begun(&self, source: &Source) -> Option<Outcome> {
+    fn not_begun(&self, source: &Source, _remarks: &[String]) -> Option<Outcome> {
         let skip = match read::<P>(source) {
             Err(skip) => Some(skip),
             Ok(own) => self.player.not_begun(&own),
@@ -411,8 +458,13 @@ impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
         skip.map(Outcome::skipped)
     }
 
-    fn conversations(&self) -> Vec<Source> {
-        P::conversations(&self.rig)
+    fn conversations(&self) -> Vec<QualifyingScenario> {
+        let all = P::conversations(&self.rig).into_iter();
+        let listed = all.map(|source| QualifyingScenario {
+            source,
+            always: true,
+        });
+        listed.collect()
     }
 
     fn begin_part(&mut self) {
@@ -422,28 +474,33 @@ impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
         self.before.push(player);
     }
 
-    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+    fn qualified(
+        &mut self,
+        began: &str,
+        record: QualificationRecord<'_>,
+    ) -> Result<Vec<Qualified>, String> {
+        let whole = match record {
+            QualificationRecord::Run { whole, .. } => whole,
+            QualificationRecord::Parts { missing, .. } => missing.is_empty(),
+        };
         let last = self.run.as_ref().map_or(&self.player, |run| &run.player);
         let parts: Vec<&P> = self.before.iter().chain([last]).collect();
-        P::qualified(&parts, &self.rig, began, whole)
+        Ok(vec![P::qualified(&parts, &self.rig, began, whole)])
     }
 
-    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {
+    fn judge(
+        &mut self,
+        source: &Source,
+        recorded: RecordedAttempt<'_>,
+    ) -> Result<RepeatedVerdict, String> {
         let own = P::read(source).map_err(|problems| problems.to_string())?;
-        let own = Arc::new(own);
-        if self.rig.is_simulated() {
-            return self.again(&own);
+        let mut repeated = self.repeated(&Arc::new(own), recorded.events)?;
+        repeated.attempt.unplaced = recorded.unplaced;
+        repeated.attempt.outcome.unplaced(recorded.unplaced);
+        if recorded.unplaced > 0 {
+            self.player.doubt();
         }
-        let tolerance = P::segment(&self.rig, self.allow_motion).tolerance;
-        let mut replay = self.player.replay(events, tolerance);
-        let (outcome, before) = self.player.attempt(&own, &mut replay);
-        Ok(RepeatedVerdict {
-            outcome,
-            before: Some(before),
-            left: replay.left(),
-            played: None,
-            trouble: replay.trouble().is_some(),
-        })
+        Ok(repeated)
     }
 }
 

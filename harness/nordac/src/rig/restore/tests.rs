@@ -9,7 +9,10 @@ use crate::safe_state::{last_words, safe_state};
 use crate::simulate::{Bench, Setup, SlaveSetup};
 use crate::stream::telegrams;
 use harness_bench::guard::{Guarded, Standstill};
-use harness_bench::link::{Capability, Line as _, LinkEvent, Octets as _, Recording, Sink};
+use harness_bench::link::{
+    Capability, DriveFault, Line as _, Link as _, LinkEvent, Moment, Octets as _, PlacedFault,
+    Recording, Sink,
+};
 use harness_bench::medium::Pieces;
 use harness_bench::scenario::files;
 use harness_bench::scenario::run::Outcome;
@@ -92,12 +95,7 @@ impl Desk {
     }
 
     fn text(&mut self, text: &str) -> (Outcome, Vec<String>) {
-        let text = format!("title T\nbus nordac\n{text}");
-        let source = Source {
-            name: "t.scn".to_owned(),
-            text: text.into(),
-        };
-        self.play(&source)
+        self.play(&source(text))
     }
 
     /// Where the slave is, and what its parameters hold.
@@ -114,6 +112,13 @@ impl Desk {
     }
 }
 
+fn source(text: &str) -> Source {
+    Source {
+        name: "t.scn".to_owned(),
+        text: format!("title T\nbus nordac\n{text}").into(),
+    }
+}
+
 fn verdict(played: &(Outcome, Vec<String>)) -> Verdict {
     assert_eq!(played.1, [] as [String; 0]);
     played.0.verdict
@@ -123,6 +128,29 @@ const BUS_CONTROL: &str = "slave 8\nslave 8 parameter 1621 = 2\nstart 8\non 8\n"
 const LOCAL: &str =
     "slave 8\nslave 8 parameter 1621 = 4\nstart 8\nexchange 8 STW=047E -> ZSW=0970\n";
 const DELIVERED: &str = "slave 8\nstart 8\nread 8 967 = 0006\n";
+
+/// A slave that leaves the exchange while it is put back is taken into it again, whenever that happens.
+#[test]
+fn a_slave_that_leaves_meanwhile_is_put_back() {
+    for after in (0..24).step_by(3) {
+        let mut desk = Desk::new(0, &[], Limits::unlimited());
+        let before = desk.held();
+        let own = Arc::new(Own::read(&source(LOCAL)).expect("a scenario"));
+        let (outcome, _) = desk.player.attempt(&own, &mut desk.line);
+        assert_eq!(outcome.verdict, Verdict::Passed);
+        let at = desk.line.now() + Span::from_millis(after);
+        for (at, fault) in [
+            (at, DriveFault::Off),
+            (at + Span::from_millis(2), DriveFault::On),
+        ] {
+            let fault = PlacedFault::Drive(8, fault);
+            desk.line.inject(0, fault, Moment::At(at));
+        }
+        let notes = desk.player.put_back(&mut desk.line, "desk.toml");
+        assert_eq!(notes, [] as [String; 0], "after {after} ms");
+        assert_eq!(desk.held(), before, "after {after} ms");
+    }
+}
 
 /// NORDAC 2.5.1, 3.2.1: an inverter that its terminals control goes on holding the word that came last while the bus controlled it. It is not
 /// accused for that, and shows neither OFF2 nor OFF3 to the scenarios behind.

@@ -79,9 +79,9 @@ fn blamed(drives: &str, (seed, one_in): (u64, u64)) -> Vec<String> {
     let mut session = session(&rig, drives, stalls).expect("a right ring that opens");
     let mut run = Run::new(&mut session).expect("a run");
     run.repeat();
-    let facts = QualificationFacts::of(&mut run, String::new(), false);
+    let facts = QualificationFacts::of(&mut run);
     let mut watched = Watched::new(&mut run);
-    let mut said = match Qualification::new(facts).settle(&mut watched) {
+    let mut said = match Qualification::new(facts).settle(&mut watched, String::new(), false) {
         Ok(found) => {
             let named = found.deviations.lines();
             let named = named.filter(|line| {
@@ -203,10 +203,10 @@ fn of_parts(drives: [&str; 2]) -> Qualified {
     let mut runs = [&mut one, &mut other].map(|own| Run::new(own).expect("a run"));
     runs.iter_mut().for_each(Run::repeat);
     let [one, other] = &mut runs;
-    let facts = QualificationFacts::of(one, String::new(), false);
+    let facts = QualificationFacts::of(one);
     let mut watched = Watched::new(one);
     watched.others.push(Watched::new(other));
-    let qualified = Qualification::new(facts).settle(&mut watched);
+    let qualified = Qualification::new(facts).settle(&mut watched, String::new(), false);
     qualified.expect("rings that are played to the end")
 }
 

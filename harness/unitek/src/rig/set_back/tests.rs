@@ -6,7 +6,7 @@ use crate::simulate::Bench;
 use harness_bench::link::{FrameFault, Line as _, Link as _, LinkEvent, Moment, PlacedFault, Sink};
 use harness_bench::rig::port_file::CONFIRMATION;
 use harness_bench::rig::segment::SegmentRun as _;
-use harness_bench::rig::segment::run::PortRun;
+use harness_bench::rig::segment::run::{PortPlayer as _, PortRun};
 use harness_bench::rig::{Attempt, Keeper, UseOptions, parse};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
@@ -313,7 +313,7 @@ fn two_drives_are_qualified_one_after_the_other() {
         let setup = format!("drive 1 property id-change = {property}");
         let (mut run, _) = bench(ALL, &[&setup], true);
         let before = state(&run);
-        let moving = run.conversations().into_iter();
+        let moving = Player::conversations(run.session().rig()).into_iter();
         for own in moving.filter(|own| own.name.contains("write-identifier")) {
             let played = run.play(&own, None).expect("a rig");
             assert_ne!(played.outcome.verdict, Verdict::Skipped, "{}", own.name);

@@ -1,38 +1,34 @@
-//! `drivebench fuzz replay`: a minute on hardware.
+//! `drivebench fuzz replay` on rings: a minute on hardware.
 
-use crate::buses::find_any_rig;
-use crate::buses::line_fuzz;
-use crate::buses::novobus::cli::fuzz::{on_ports, rings, scope, simulated, sizes};
-use crate::buses::novobus::explore::{
-    Act, ActKind, Case, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
+use super::{on_ports, rings, scope, simulated, sizes};
+use crate::explore::{
+    Act, ActKind, Case, CaseScope, FuzzRun, FuzzSettings, MOST_BYTES, OnRig, OnSim, RingSetup,
 };
-use crate::command::exit::Exit;
-use crate::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
-use crate::command::fuzz::tell;
-use crate::command::output::Output;
-use crate::explore::ExploreError;
-use crate::regular::{self, Links};
-use crate::rig::{Rig, UseOptions};
+use harness_bench::command::exit::Exit;
+use harness_bench::command::fuzz::replay::{MOST_CASES, ReplayArguments, kept, play};
+use harness_bench::command::fuzz::tell;
+use harness_bench::command::output::Output;
+use harness_bench::explore::{ExploreError, RECORD};
+use harness_bench::regular::{self, Links};
+use harness_bench::rig::{Rig, UseOptions};
 use harness_proto::novobus::guard::Limits;
 use std::path::Path;
 
 /// The largest file of a corpus.
 const LARGEST: u64 = 64 * 1024;
 
-/// Replays.
-pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let Some(rig) = find_any_rig(&arguments.rig, output) else {
-        return Ok(Exit::Usage);
-    };
-    if let Some(own) = rig.port().and_then(|port| line_fuzz(port.bus.bus())) {
-        return (own.replay)(&rig, arguments, output);
-    }
-    let cases = match cases(&arguments.folder, &rig) {
+/// Replays on the rings of a rig.
+pub(super) fn replay(
+    rig: &Rig,
+    arguments: &ReplayArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let cases = match cases(&arguments.folder, rig) {
         Ok(cases) => cases,
         Err(error) => return Ok(tell(&error, output)),
     };
     if cases.is_empty() {
-        let sizes: Vec<_> = sizes(&rig).iter().map(u8::to_string).collect();
+        let sizes: Vec<_> = sizes(rig).iter().map(u8::to_string).collect();
         output.complain(&format!(
             "{} holds no case for a ring of {}",
             arguments.folder.display(),
@@ -41,13 +37,13 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
         return Ok(Exit::NothingSelected);
     }
     if rig.is_simulated() {
-        let setup = RingSetup::of_rig(&rig, &[], false);
-        let mut target = match OnSim::ready(setup.clone(), &sizes(&rig)) {
+        let setup = RingSetup::of_rig(rig, &[], false);
+        let mut target = match OnSim::ready(setup.clone(), &sizes(rig)) {
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
         };
-        let scope = simulated(&rig, Limits::unlimited(), &setup);
-        let campaign = campaign(arguments, &rig, setup, scope);
+        let scope = simulated(rig, Limits::unlimited(), &setup);
+        let campaign = campaign(arguments, rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);
     }
     let options = UseOptions {
@@ -56,12 +52,12 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
         wait: arguments.wait.unwrap_or_default(),
         ..UseOptions::default()
     };
-    on_ports(&rig, options, output, |run, output| {
+    on_ports(rig, options, output, |run, output| {
         let scope = scope(run);
         let limits = scope.limits;
         let campaign = campaign(
             arguments,
-            &rig,
+            rig,
             RingSetup::of_ports(rig.rings().count()),
             scope,
         );
@@ -72,12 +68,7 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     })
 }
 
-fn campaign(
-    arguments: &ReplayArguments,
-    rig: &Rig,
-    setup: RingSetup,
-    scope: crate::buses::novobus::explore::CaseScope,
-) -> FuzzRun {
+fn campaign(arguments: &ReplayArguments, rig: &Rig, setup: RingSetup, scope: CaseScope) -> FuzzRun {
     let about = FuzzSettings {
         schema: <FuzzSettings>::SCHEMA,
         rig: arguments.rig.clone(),
@@ -97,7 +88,7 @@ fn campaign(
 fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
     let (first, second) = rings(rig, |_, _| true);
     let places: Vec<_> = std::iter::once(first).chain(second).collect();
-    if folder.join(crate::explore::RECORD).exists() {
+    if folder.join(RECORD).exists() {
         let placed = kept::<Case>(folder)?.into_iter().flat_map(|case| {
             let fit = places.iter().filter(move |own| own.drives == case.drives);
             fit.map(move |own| own.case(case.acts.clone()))
@@ -105,7 +96,7 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
         return Ok(placed.take(MOST_CASES).collect());
     }
     let unreadable = |error: std::io::Error| {
-        let error = crate::regular::in_words(folder, error);
+        let error = regular::in_words(folder, error);
         ExploreError::File(format!("failed to read {}: {error}", folder.display()))
     };
     let mut files = Vec::new();

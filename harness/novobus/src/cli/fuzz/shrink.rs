@@ -1,7 +1,7 @@
 //! `drivebench shrink` for a finding on rings.
 
-use super::rig::find_rig;
-use crate::cli::fuzz::{on_ports, scope, sizes};
+use super::super::rig::find_rig;
+use super::{on_ports, scope, sizes};
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{Case, Difference, Finding, OnRig, OnSim, RingSetup};
 use crate::rig::Run;
@@ -18,7 +18,7 @@ use harness_sim::novobus::deviation::deviations;
 use std::path::Path;
 
 /// Makes a finding small, and writes what came of it beside it.
-pub fn shrink(
+pub(super) fn shrink(
     arguments: &ShrinkArguments,
     buses: &'static RigBuses,
     output: &mut Output,

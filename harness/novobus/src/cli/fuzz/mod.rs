@@ -1,11 +1,17 @@
 //! What `fuzz` and `shrink` do on rings. A rig with ports is opened as `run --rig` opens it and given back in its safe state.
 
+mod replay;
+mod run;
+mod shrink;
+
 use super::give_back_session as give_back;
-use crate::explore::{CaseScope, RingScope, RingSetup, Spice};
+use crate::explore::{Case, CaseScope, RingScope, RingSetup, Spice, page};
 use crate::language::run::over_bus::start_anew;
 use crate::rig::wrong_parity;
 use crate::rig::{Run, Session};
 use harness_bench::command::exit::Exit;
+use harness_bench::command::fuzz::promote::keep;
+use harness_bench::command::fuzz::{FuzzCommands, verify_as};
 use harness_bench::command::output::Output;
 use harness_bench::command::rig_failure::{alarm, exit_of};
 use harness_bench::link::Line as _;
@@ -14,8 +20,18 @@ use harness_bench::rig::{Rig, UseOptions};
 use harness_bench::signals::interrupt_flag;
 use harness_proto::novobus::guard::Limits;
 
+/// How rings are explored.
+pub(crate) const COMMANDS: FuzzCommands = FuzzCommands {
+    run: run::run,
+    replay: replay::replay,
+    shrink: shrink::shrink,
+    promote: keep::<Case>,
+    verify: verify_as::<Case>,
+    page: Some(page),
+};
+
 /// Opens a rig with ports, works on it, and gives it back in its safe state.
-pub fn on_ports(
+pub(crate) fn on_ports(
     rig: &Rig,
     options: UseOptions,
     output: &mut Output,
@@ -72,18 +88,21 @@ fn leave_clean(session: &mut Session, output: &mut Output) {
 }
 
 /// How many drives the rings of a rig have.
-pub fn sizes(rig: &Rig) -> Vec<u8> {
+pub(crate) fn sizes(rig: &Rig) -> Vec<u8> {
     rig.rings().map(|(_, ring)| ring.drives).collect()
 }
 
 /// The rings of a rig, and where faults can be put on them.
-pub fn rings(rig: &Rig, reaches: impl Fn(usize, u8) -> bool) -> (RingScope, Option<RingScope>) {
+pub(crate) fn rings(
+    rig: &Rig,
+    reaches: impl Fn(usize, u8) -> bool,
+) -> (RingScope, Option<RingScope>) {
     let second = rig.file.rings().nth(1).map(|ring| ring.drives);
     RingScope::both(rig.ring_size(), second, reaches)
 }
 
 /// What cases may have on simulated rings; plain drives have nothing behind their bus.
-pub fn simulated(rig: &Rig, limits: Limits, setup: &RingSetup) -> CaseScope {
+pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &RingSetup) -> CaseScope {
     let behind = [Spice::Motion, Spice::Eeprom];
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
     let (first, second) = rings(rig, |_, _| true);
@@ -100,7 +119,7 @@ pub fn simulated(rig: &Rig, limits: Limits, setup: &RingSetup) -> CaseScope {
 
 /// What cases may have on a rig with ports. What a case leaves in a drive's RAM the next reset takes away (ND21 10.5): without leave for
 /// it cases only read, stop and block. The EEPROM is never written.
-pub fn scope(run: &mut Run<'_>) -> CaseScope {
+pub(crate) fn scope(run: &mut Run<'_>) -> CaseScope {
     let capabilities = run.capabilities();
     let session = run.session();
     let own = session.limits();
