@@ -12,7 +12,7 @@ const REPEATS: usize = 4;
 /// takes those before it for ones in the error mode (the figure of ND21 9.8).
 pub(crate) const FALSE: usize = 10;
 /// Maximum number of zeros in front of an address (ND21 9.7).
-pub const MAX_ZEROS: usize = 25;
+pub(crate) const MAX_ZEROS: usize = 25;
 
 /// A drive that the ring spells out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;
 
 /// The ND21 User Manual 1/96.
-pub const MANUAL: Manual = Manual {
+pub(crate) const MANUAL: Manual = Manual {
     bus: BusName::Novobus,
     title: "ND21 User Manual 1/96",
     document: "nd21",

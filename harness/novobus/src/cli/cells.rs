@@ -7,14 +7,14 @@ use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::EEPROM;
 
 /// The printed names of the cells that can be read, first those of the RAM.
-pub fn names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     let all = RAM.iter().chain(EEPROM);
     let used = all.filter(|cell| cell.access != Access::Reserved);
     used.map(|cell| cell.printed)
 }
 
 /// Shows the cells.
-pub fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
     let filter = arguments
         .filter
         .as_deref()

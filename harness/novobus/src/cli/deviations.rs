@@ -3,13 +3,8 @@
 use harness_bench::command::deviations::DeviationRow;
 use harness_sim::novobus::deviation::{deviations, master_deviations};
 
-/// The names of the deviations of drives.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    deviations().map(|deviation| deviation.name)
-}
-
 /// The deviations of drives, and those of the bench's own master.
-pub fn rows() -> [Vec<DeviationRow>; 2] {
+pub(crate) fn rows() -> [Vec<DeviationRow>; 2] {
     let drives = deviations().map(|own| DeviationRow {
         name: own.name,
         section: own.section,

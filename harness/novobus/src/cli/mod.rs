@@ -1,29 +1,28 @@
 //! Commands on a bus: one file a command, over the driver [`crate::driver`].
 
 mod axes;
-pub mod cells;
+pub(crate) mod cells;
 mod control;
-pub mod deviations;
+pub(crate) mod deviations;
 pub(crate) mod fuzz;
 mod held;
 mod info;
 mod params;
 mod params_file;
 mod position;
-pub mod power;
 mod read;
 mod recover;
 mod rig;
 mod rig_check;
 mod scope;
 mod signal;
-pub mod sim;
+pub(crate) mod sim;
 mod top;
 mod top_page;
 mod watch;
 mod write;
 
-pub use rig::give_back_session;
+pub(crate) use rig::give_back_session;
 
 use crate::driver;
 use crate::rig::sim::is_bare;

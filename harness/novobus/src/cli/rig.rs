@@ -333,7 +333,11 @@ fn give_back(
 }
 
 /// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
-pub fn give_back_session(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
+pub(crate) fn give_back_session(
+    mut session: Session,
+    exit: Exit,
+    output: &mut Output,
+) -> (End, Exit) {
     let exit = exit_of_end(session.link().trouble(), exit, output);
     let end = match exit {
         Exit::RigError | Exit::Interlock => session.close_with_error(),

@@ -4,8 +4,10 @@ mod coverage;
 mod distil;
 mod run;
 
+use crate::bus_name::BusName;
 use crate::buses::{RIG_BUSES, bus_of, find_any_rig, fuzz_of};
 use crate::command::exit::Exit;
+use crate::command::fuzz::power::PowerArguments;
 use crate::command::fuzz::replay::ReplayArguments;
 use crate::command::fuzz::run::FuzzRunArguments;
 use crate::command::output::Output;
@@ -20,7 +22,7 @@ pub enum FuzzCommand {
     /// Play the conversations that a run has kept, the most telling first.
     Replay(ReplayArguments),
     /// Count the cases that it takes to find each planted deviation.
-    Power(crate::buses::novobus::cli::power::PowerArguments),
+    Power(PowerArguments),
     /// Show which protocol transitions the kept inputs reach.
     ///
     /// The exit code is 1 if a reachable transition is missing.
@@ -35,7 +37,10 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay(arguments, output),
         FuzzCommand::Power(arguments) => {
-            crate::buses::novobus::cli::power::power(arguments, &RIG_BUSES, output)
+            let power = fuzz_of(BusName::DEFAULT).and_then(|own| own.power);
+            power.map_or(Ok(Exit::Usage), |power| {
+                power(arguments, &RIG_BUSES, output)
+            })
         }
         FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
         FuzzCommand::Distil(arguments) => distil::distil(arguments, output),

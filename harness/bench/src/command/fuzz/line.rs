@@ -35,6 +35,7 @@ impl FuzzCommands {
             shrink: shrink::<B>,
             promote: keep::<LineTalk<B>>,
             verify: verify_as::<LineTalk<B>>,
+            power: None,
             page: None,
         }
     }

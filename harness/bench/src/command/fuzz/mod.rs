@@ -1,6 +1,7 @@
 //! What `fuzz`, `shrink` and `promote` do on every bus.
 
 pub mod line;
+pub mod power;
 pub mod promote;
 pub mod replay;
 pub mod run;
@@ -16,6 +17,7 @@ use crate::explore::promote::Plays;
 use crate::explore::{ExploreError, FuzzCase, FuzzRun};
 use crate::rig::Rig;
 use crate::rig::buses::RigBuses;
+use power::PowerArguments;
 use promote::PromoteArguments;
 use replay::ReplayArguments;
 use run::FuzzRunArguments;
@@ -36,9 +38,14 @@ pub struct FuzzCommands {
     pub promote: fn(&PromoteArguments, Plays, &mut Output) -> std::io::Result<Exit>,
     /// `verify` of the folder of a run; `None` if the folder has no run of this bus.
     pub verify: Verify,
+    /// `fuzz power`, where the bus has it.
+    pub power: Option<Power>,
     /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
     pub page: Option<fn(&Path) -> Result<String, ExploreError>>,
 }
+
+/// Counts the cases that it takes to find each deviation.
+type Power = fn(&PowerArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>;
 
 /// Judges the findings of a run again.
 type Verify = fn(&Path, Option<Signer<'_>>, &mut Output) -> Option<std::io::Result<Exit>>;

@@ -1,5 +1,6 @@
 //! What `fuzz` and `shrink` do on rings. A rig with ports is opened as `run --rig` opens it and given back in its safe state.
 
+mod power;
 mod replay;
 mod run;
 mod shrink;
@@ -27,6 +28,7 @@ pub(crate) const COMMANDS: FuzzCommands = FuzzCommands {
     shrink: shrink::shrink,
     promote: keep::<Case>,
     verify: verify_as::<Case>,
+    power: Some(power::power),
     page: Some(page),
 };
 

@@ -1,10 +1,10 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
-use crate::cli::fuzz::simulated;
+use super::simulated;
 use crate::explore::masters;
 use crate::explore::{Case, Finding, FuzzRun, FuzzSettings, OnSim, Pool, RingSetup, Swarm};
-use clap::Args;
 use harness_bench::command::exit::Exit;
+use harness_bench::command::fuzz::power::PowerArguments;
 use harness_bench::command::fuzz::tell;
 use harness_bench::command::output::Output;
 use harness_bench::counted::counted;
@@ -19,28 +19,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-const FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/deviations.toml");
+const FOUND_BY_SCENARIOS: &str = include_str!("../../../../../corpora/deviations.toml");
 
-const MASTERS_FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/masters.toml");
+const MASTERS_FOUND_BY_SCENARIOS: &str = include_str!("../../../../../corpora/masters.toml");
 
 /// How many drives the ring has; one of them deviates, another one with each seed.
 const DRIVES: u8 = 3;
-
-/// For `fuzz power`.
-#[derive(Clone, Debug, Args)]
-pub struct PowerArguments {
-    /// Only deviations with this text in their name.
-    pub filter: Option<String>,
-    /// Number of seeds per deviation.
-    #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    pub seeds: u64,
-    /// Judge complete ND21s with witnesses, as `fuzz run --whole` does. Only for deviations of drives.
-    #[arg(long)]
-    pub whole: bool,
-    /// Number of cases after which a deviation counts as not found.
-    #[arg(long, value_name = "NUMBER", default_value_t = 10_000)]
-    pub cases: u64,
-}
 
 /// By which scenario a deviation is found, and by what means; see the head of the file.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -130,7 +114,7 @@ impl<'a> Table<'a> {
 }
 
 /// Shows the tables.
-pub fn power(
+pub(super) fn power(
     arguments: &PowerArguments,
     buses: &'static RigBuses,
     output: &mut Output,
