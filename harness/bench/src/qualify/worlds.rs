@@ -279,7 +279,10 @@ fn judge_one<M: RightDrive>(
                 return Judged::TooMany;
             }
             if !world.model.knows() {
-                return Judged::Unknown;
+                match talk.refutes(&world, place) {
+                    true => continue,
+                    false => return Judged::Unknown,
+                }
             }
             if let Some(said) = world.said.front() {
                 expected = Some(said.piece.clone());
@@ -307,6 +310,22 @@ fn judge_one<M: RightDrive>(
 }
 
 impl<P: Clone + Eq + Hash> Dialogue<P> {
+    /// Whether a world cannot have sent what came at a place, whatever it does from now on: what it has said before would have come first.
+    fn refutes<M: RightDrive<Piece = P>>(&self, world: &World<M>, place: usize) -> bool {
+        let Some(came) = self.came.get(place).filter(|_| self.most_lost == 0) else {
+            return false;
+        };
+        for said in &world.said {
+            if world.model.is(&said.piece, &came.piece) {
+                return false;
+            }
+            if !(said.may_wait && self.overtakes) {
+                return true;
+            }
+        }
+        false
+    }
+
     /// Where what a world has said is what came at a place, the world behind it. Returns whether it can do nothing else before that.
     fn say<M: RightDrive<Piece = P>>(
         &self,
@@ -427,12 +446,14 @@ mod tests {
         number: u8,
         /// Says its number at 100 by itself.
         alarm: bool,
+        /// Whether it was told to do what nothing is known of.
+        wanders: bool,
         /// At which numbers it was stopped, as a checksum.
         stops: u64,
         said: VecDeque<u8>,
     }
 
-    /// 0 asks, 1 starts, 2 stops; a higher number is set.
+    /// 0 asks, 1 starts, 2 stops, 3 makes it wander; a higher number is set.
     impl RightDrive for Counter {
         type Piece = u8;
         const SCAN: Span = Span::from_millis(1);
@@ -460,8 +481,13 @@ mod tests {
                     self.runs = false;
                     self.stops = self.stops.wrapping_mul(1_000_003) + u64::from(self.number);
                 }
+                3 => self.wanders = true,
                 other => self.number = *other,
             }
+        }
+
+        fn knows(&self) -> bool {
+            !self.wanders
         }
 
         fn say(&mut self) -> Option<u8> {
@@ -473,7 +499,8 @@ mod tests {
         }
 
         fn state(&self) -> u64 {
-            self.stops << 9 ^ u64::from(self.number) << 1 | u64::from(self.runs)
+            let own = self.stops << 10 ^ u64::from(self.number) << 2;
+            own | u64::from(self.runs) << 1 | u64::from(self.wanders)
         }
     }
 
@@ -578,6 +605,14 @@ mod tests {
         assert_eq!(came(&one[1..], 2), Judged::Right);
         assert_ne!(came(&[(22, 7), (62, 8)], 2), Judged::Right);
         assert_ne!(came(&[(22, 7), (24, 7)], 2), Judged::Right);
+    }
+
+    /// What came before nothing more is known is compared, although what was sent behind it may have been on its way.
+    #[test]
+    fn what_is_not_known_later_excuses_nothing_before() {
+        let sent = [(10, 7), (20, 0), (22, 3), (40, 0)];
+        assert_eq!(judged(false, &sent, &[(22, 8)]), Judged::Wrong(0, Some(7)));
+        assert_eq!(judged(false, &sent, &[(22, 7), (42, 99)]), Judged::Unknown);
     }
 
     /// Where there are more worlds than are kept, nothing is accused.
