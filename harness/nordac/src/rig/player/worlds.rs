@@ -12,7 +12,7 @@ use harness_bench::rig::segment::observed::Beats;
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::nordac::properties::Description;
-use harness_proto::nordac::words::zsw;
+use harness_proto::nordac::words::{State, zsw};
 use harness_proto::nordac::{Image, PpoType};
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::rate::SYN_BITS;
@@ -36,6 +36,11 @@ const OWN: [u16; 10] = [1807, 1808, 1812, 1825, 1801, 1802, 1803, 1804, 1805, 18
 
 /// How many of them are the fault memory.
 const FAULT_MEMORY: usize = 6;
+
+/// The last fault, and what is kept of it that follows from the conversation in which it has come: its code, the frequency and the
+/// parameter set (5.7).
+const LAST_FAULT: u16 = 1801;
+const FOLLOWS: [u16; 3] = [0, 2, 6];
 
 /// The rate at which the slaves hear: a stream may hand a telegram over at once, whatever the rate of the line.
 const HEARD_AT: BusRate = BusRate::K1500;
@@ -123,6 +128,8 @@ struct World {
     slaves: Vec<Deviant>,
     /// The parameters whose values are not compared.
     own: &'static [u16],
+    /// Whether the slave was without a fault, so that a present one has come since.
+    worked: bool,
     rate: BusRate,
     /// When the last octet had passed.
     free: Instant,
@@ -158,6 +165,7 @@ impl World {
                 true => &OWN,
                 false => &OWN[..OWN.len() - FAULT_MEMORY],
             },
+            worked: false,
             rate,
             free: Instant::START,
             ahead: (0, 0),
@@ -308,11 +316,26 @@ impl World {
         let (pdu, ppo) = inputs(octets)?;
         let mut image = Image::decode(ppo, pdu.data()).filter(|_| ppo.has_pkw())?;
         let shows = matches!(image.pkw.ak(), 1 | 4);
-        if !shows || !self.own.contains(&image.pkw.number()) {
+        let number = image.pkw.number();
+        let known = number == LAST_FAULT && FOLLOWS.contains(&(image.pkw.ind >> 8));
+        if !shows || !self.own.contains(&number) || known && self.has_failed() {
             return None;
         }
         image.pkw.pwe = 0;
         Some((pdu.fc().0, image))
+    }
+
+    /// Whether the slave, the only one, has a fault.
+    fn has_fault(&self) -> bool {
+        match &self.slaves[..] {
+            [slave] => slave.drive().inverter().state() == State::Fault,
+            _ => false,
+        }
+    }
+
+    /// Whether the slave has a fault that has come in this conversation.
+    fn has_failed(&self) -> bool {
+        self.worked && self.has_fault()
     }
 
     /// The slaves behind octets of which the last one ends at this time, and what they reply.
@@ -336,6 +359,7 @@ impl World {
                 reply.extend(sent.iter().map(|own| own.byte));
             }
         }
+        world.worked |= !world.has_fault();
         (world, reply)
     }
 
