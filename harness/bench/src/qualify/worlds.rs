@@ -278,14 +278,15 @@ fn judge_one<M: RightDrive>(
             if steps > talk.most_steps || worlds.all.len() + explained.all.len() > MOST_WORLDS {
                 return Judged::TooMany;
             }
-            if !world.model.knows() {
-                match talk.refutes(&world, place) {
-                    true => continue,
-                    false => return Judged::Unknown,
-                }
+            let refuted = talk.refutes(&world, place);
+            if !refuted && !world.model.knows() {
+                return Judged::Unknown;
             }
             if let Some(said) = world.said.front() {
                 expected = Some(said.piece.clone());
+            }
+            if refuted {
+                continue;
             }
             if let Some(own) = world.losing(talk.most_lost) {
                 steps += 1;
