@@ -36,6 +36,8 @@ pub(crate) struct DriveSetup {
     pub(crate) control: Option<Control>,
     /// Whether a lock was released after its power-up (`enable-after-lock`).
     pub(crate) released: bool,
+    /// Whether it has the error of a time-out of the bus (D0).
+    pub(crate) timed_out: bool,
     /// How it breaks the manual.
     pub(crate) deviation: Option<&'static Deviation>,
 }
@@ -53,6 +55,7 @@ impl DriveSetup {
             registers: Vec::new(),
             control: None,
             released: false,
+            timed_out: false,
             deviation: None,
         }
     }
@@ -70,6 +73,9 @@ impl DriveSetup {
         }
         if self.released {
             drive = drive.with_release();
+        }
+        if self.timed_out {
+            drive = drive.with_time_out();
         }
         Deviant::new(drive, self.deviation)
     }

@@ -151,6 +151,14 @@ impl Drive {
         self
     }
 
+    /// The drive with the error of a time-out of the bus that was before (D0).
+    #[must_use]
+    pub fn with_time_out(mut self) -> Self {
+        self.timed_out = true;
+        self.last_status = self.status();
+        self
+    }
+
     /// Switches the drive off: nothing is heard, sent or moved until [`Drive::restart`].
     pub fn switch_off(&mut self, at: Instant) {
         self.advance(at);

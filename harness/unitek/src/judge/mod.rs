@@ -18,6 +18,7 @@ mod supply;
 mod symptom;
 #[cfg(test)]
 mod tests;
+mod way;
 mod world;
 #[cfg(test)]
 mod world_tests;

@@ -4,12 +4,15 @@
 //! the model of the drive.
 
 use super::held::{is_live, takes_writes};
+use super::way::Way;
 use harness_bench::qualify::worlds::RightDrive;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Dlc4;
-use harness_proto::unitek::words::{ERRORS_NOT_READY, MODE_EVENT, MODE_LOCK, status};
-use harness_proto::unitek::{Register, Reply, Request};
+use harness_proto::unitek::words::{
+    ERROR_TIME_OUT, ERRORS_NOT_READY, MODE_EVENT, MODE_LOCK, status,
+};
+use harness_proto::unitek::{Access, Register, Reply, Request};
 use harness_sim::segment::Station as _;
 use harness_sim::unitek::deviation::Deviant;
 use harness_sim::unitek::{Cause, Control, Drive};
@@ -39,17 +42,37 @@ const POSITION: u8 = 0x6D;
 const PRESET: u8 = 0x7A;
 const POSITION_BAND: i64 = 655;
 
-/// Whether the position is in tolerance (ex 12).
+/// Whether the position is in tolerance, the destination, and how far it may be off (ex 12).
 const IN_TOLERANCE: u8 = 0xF4;
+const DESTINATION: u8 = 0x6E;
+
+/// The commands of speed, torque and position, and the start of homing (App 5).
+const COMMANDS: [u8; 4] = [0x31, 0x90, DESTINATION, 0x78];
+const WINDOW: u8 = 0x79;
+
+/// What decides how fast an axis moves: rpm at 100 %, the limit, and the ramps in their lower halves (6.1, ex 11).
+const FULL_SPEED: u8 = 0xC8;
+const LIMIT: u8 = 0x34;
+const RAMPS: [u8; 2] = [0x35, 0xED];
 
 /// The scale of the speed, which is what C8 holds (App 7).
 const SCALE: u8 = 0xCE;
+
+/// Inputs and outputs in one register, and its bits for ready and running (App 7, UNITEK 4).
+const IO: u8 = 0xD8;
+const IO_LOGIC: u32 = 1 << 10 | 1 << 11;
+
+/// The position error, which has the sign of the way that is left (dump).
+const POSITION_ERROR: u8 = 0x70;
 
 /// Inputs, in conversations in which none of them changes (UNITEK 4).
 const INPUT: std::ops::RangeInclusive<u8> = 0xE4..=0xE8;
 
 /// The oscilloscope, which may write its own registers.
 const CAPTURE: std::ops::RangeInclusive<u8> = 0x10..=0x18;
+
+/// Functions: what they read changes by their calls only (5.2, dump). READ and those of the oscilloscope are called by others.
+const FUNCTIONS: [u8; 7] = [0x78, 0x83, 0x84, 0x85, 0x8E, 0xF9, 0xFA];
 
 /// What a cell without a meaning reads (dump).
 const UNASSIGNED: u32 = 0xFACE;
@@ -68,6 +91,8 @@ enum Compared {
     Bits(u32),
     /// Within a band.
     Near(i64),
+    /// Between these numbers.
+    Between(i64, i64),
 }
 
 /// A drive, right or with a known deviation.
@@ -80,6 +105,17 @@ pub(crate) struct World {
     astray: bool,
     /// Whether its position is known: it was set in this conversation, by POS_PRESET (App 6) or by homing.
     placed: bool,
+    /// Whether an input has changed at a time that is not known.
+    disturbed: bool,
+    /// Whether it was given a command while it was homing: what comes of that is open (ex 12).
+    interrupted: bool,
+    /// Whether a function was called in this conversation.
+    called: bool,
+    /// Whether its moves to positions are followed, and the one that it makes.
+    follows: bool,
+    way: Option<Way>,
+    /// Its clock.
+    now: Instant,
     /// Whether it is known how long homing takes, and whether homing ran before the last step.
     homing: (bool, bool),
     /// What it sends now, and whether a request asked for it.
@@ -96,7 +132,7 @@ impl World {
     pub(crate) fn compares(number: u8) -> bool {
         let known =
             CONSTANT.contains(&number) || LOGIC.contains(&number) || SPEEDS.contains(&number);
-        known || is_parameter(number)
+        known || number == SCALE || is_parameter(number)
     }
 
     /// A drive that stands, of which these registers are not compared. Its clock begins at the start.
@@ -107,11 +143,32 @@ impl World {
             unlike,
             astray: false,
             placed: false,
+            disturbed: false,
+            interrupted: false,
+            called: false,
+            follows: false,
+            way: None,
+            now: Instant::START,
             homing: (homing_is_known, false),
             said: VecDeque::new(),
             asked: false,
             held: 0,
         }
+    }
+
+    /// The same drive, of which an input changes at a time that is not known: what no input decides is compared.
+    #[must_use]
+    pub(crate) const fn disturbed(mut self) -> Self {
+        self.disturbed = true;
+        self
+    }
+
+    /// The same drive, whose moves to positions are followed.
+    #[must_use]
+    pub(crate) fn following(mut self) -> Self {
+        let inputs = self.drive().inputs();
+        self.follows = !(inputs.limit1 || inputs.limit2);
+        self
     }
 
     /// The drive that is right but for its deviation.
@@ -140,31 +197,122 @@ impl World {
         let homed = self.homing.1 && !self.drive().is_homing() && self.drive().is_enabled();
         self.placed |= homed;
         self.homing.1 = self.drive().is_homing();
-        self.astray = self.speed() != 0 || self.astray && !homed;
+        let travels = self.follow();
+        self.astray = self.speed() != 0 && !travels || self.astray && !homed;
+    }
+
+    /// Where its axis stands, and where it is to go.
+    fn places(&self) -> [i64; 2] {
+        [self.drive().register(POSITION), self.cell(DESTINATION)]
+            .map(|own| i64::from(own.cast_signed()))
+    }
+
+    /// Follows a move to a position. Returns whether all that moves is followed.
+    fn follow(&mut self) -> bool {
+        let [place, destination] = self.places();
+        let drive = self.drive();
+        let positions = drive.control() == Control::Position && drive.is_enabled();
+        let travels = positions && !drive.is_homing() && self.follows && self.placed;
+        match self.way {
+            // It was given another destination, or none, on its way.
+            Some(way) if !travels || way.destination() != destination => {
+                self.way = None;
+                self.astray = true;
+            }
+            Some(_) => {}
+            None if travels && !self.astray && place != destination => {
+                let scale = self.cell(FULL_SPEED);
+                let limit = Register::of(LIMIT).number_of(self.cell(LIMIT)).abs();
+                let ramps = RAMPS.map(|own| self.cell(own) & 0xFFFF);
+                self.way = Some(Way::new([place, destination], scale, limit, ramps));
+            }
+            None => {}
+        }
+        travels && !self.astray
+    }
+
+    /// Between which positions its axis is.
+    fn whereabouts(&self) -> (i64, i64) {
+        let [place, _] = self.places();
+        let slowest = self.way.map_or(place, |own| own.place());
+        let between = (place.min(slowest), place.max(slowest));
+        (between.0 - POSITION_BAND, between.1 + POSITION_BAND)
+    }
+
+    /// Whether it is certain that the position is in tolerance, or that it is not (79, ex 12).
+    fn tolerance_is_certain(&self) -> bool {
+        let [place, destination] = self.places();
+        let positions = self.drive().control() == Control::Position;
+        let (least, most) = self.whereabouts();
+        let window = i64::from(self.cell(WINDOW) & 0xFFFF);
+        let inside = destination - window <= least && most <= destination + window;
+        let outside = most < destination - window || destination + window < least;
+        let arrived = self.way.is_none() && place == destination;
+        !self.astray && (!positions || arrived || inside || outside)
+    }
+
+    /// Between which numbers the position error is on the way: what commands the axis is at its destination or lags behind.
+    fn error_on_its_way(&self) -> Option<Compared> {
+        self.way?;
+        let [_, destination] = self.places();
+        let (least, most) = self.whereabouts();
+        let (below, above) = (destination - most, destination - least);
+        Some(Compared::Between(
+            below.min(0) - POSITION_BAND,
+            above.max(0) + POSITION_BAND,
+        ))
     }
 
     /// How a register is compared; `None` if it is not.
     fn compared(&self, number: u8) -> Option<Compared> {
-        if self.unlike.contains(&number) {
+        let positions = self.drive().control() == Control::Position;
+        // Whether a position is in tolerance where nothing asks for one is our choice.
+        let unlike = self.unlike.contains(&number);
+        if unlike && !(number == IN_TOLERANCE && positions) {
             return None;
         }
-        let moves = self.drive().control() == Control::Position && !self.drive().is_homing();
+        if self.disturbed {
+            return match number {
+                0x8F => Some(Compared::Bits(ERROR_TIME_OUT)),
+                own if CONSTANT.contains(&own) || own == SCALE || is_parameter(own) => {
+                    Some(Compared::Bits(!0))
+                }
+                _ => None,
+            };
+        }
+        let followed = self.follows && self.placed && !self.astray;
+        let moves = positions && !self.drive().is_homing() && !followed;
+        let speed = |way: Way| {
+            let (least, most) = way.speeds();
+            Compared::Between(least - SPEED_BAND, most + SPEED_BAND)
+        };
         match number {
             own if CONSTANT.contains(&own) || LOGIC.contains(&own) || INPUT.contains(&own) => {
                 Some(Compared::Bits(!0))
             }
-            own if SPEEDS.contains(&own) && !moves => Some(Compared::Near(SPEED_BAND)),
+            own if SPEEDS.contains(&own) && !moves => {
+                let near = Compared::Near(SPEED_BAND);
+                Some(self.way.map_or(near, speed))
+            }
             own if CURRENTS.contains(&own) && self.drive().control() == Control::Torque => {
                 Some(Compared::Near(CURRENT_BAND))
             }
             SCALE => Some(Compared::Bits(!0)),
-            POSITION if self.placed && !self.astray => Some(Compared::Near(POSITION_BAND)),
-            IN_TOLERANCE if !self.astray && !moves => Some(Compared::Bits(!0)),
+            own if FUNCTIONS.contains(&own) && !self.called => Some(Compared::Bits(!0)),
+            IO => Some(Compared::Bits(IO_LOGIC)),
+            POSITION if self.placed && !self.astray => {
+                let (least, most) = self.whereabouts();
+                Some(Compared::Between(least, most))
+            }
+            POSITION_ERROR => self.error_on_its_way(),
+            IN_TOLERANCE if self.tolerance_is_certain() => Some(Compared::Bits(!0)),
             // The speed alone decides it.
-            0xF5 if (self.speed().abs() - 328).abs() > SPEED_BAND => Some(Compared::Bits(!0)),
-            0x40 => Some(Compared::Bits(match self.astray {
-                true => PRINTED & !status::TOLERANCE,
-                false => PRINTED,
+            0xF5 if self.way.is_none() && (self.speed().abs() - 328).abs() > SPEED_BAND => {
+                Some(Compared::Bits(!0))
+            }
+            0x40 => Some(Compared::Bits(match self.tolerance_is_certain() {
+                true => PRINTED,
+                false => PRINTED & !status::TOLERANCE,
             })),
             0x8F => Some(Compared::Bits(ERRORS_NOT_READY)),
             own if is_parameter(own) => Some(Compared::Bits(!0)),
@@ -187,19 +335,35 @@ impl RightDrive for World {
     fn due(&self) -> Option<Instant> {
         let waits = self.drive.wants().map(|own| own.0);
         let scan = self.drive.next_action();
-        [waits, scan].into_iter().flatten().min()
+        let way = self.way.map(|_| self.now + Self::SCAN);
+        [waits, scan, way].into_iter().flatten().min()
     }
 
     fn advance(&mut self, to: Instant) {
         self.drive.advance(to);
+        let scans = to.since(self.now).units() / Self::SCAN.units();
+        self.now += Self::SCAN * scans;
+        if let Some(way) = &mut self.way {
+            (0..scans).for_each(|_| way.step());
+        }
         self.speak(to);
+        // The slowest drive has arrived, too.
+        self.way = self.way.filter(|own| own.place() != own.destination());
     }
 
     fn hear(&mut self, at: Instant, piece: &Frame) {
         let rx = self.drive().identifiers().0;
         let request = Request::decode(piece, rx, Dlc4::As3);
-        self.placed |= matches!(request, Ok(Request::Write { register, .. }) if register == PRESET);
+        let homed = self.drive().is_homing();
         self.drive.hear(at, piece);
+        if let Ok(Request::Write { register, .. }) = request {
+            self.interrupted |= homed && COMMANDS.contains(&register);
+            self.called |= Register::of(register).access == Access::FN;
+            if register == PRESET {
+                self.placed = true;
+                self.astray = self.speed() != 0;
+            }
+        }
         self.speak(at);
         let mut held = DefaultHasher::new();
         self.drive().held().hash(&mut held);
@@ -237,6 +401,7 @@ impl RightDrive for World {
             None => true,
             Some(Compared::Bits(mask)) => (said.data.bits() ^ came.data.bits()) & mask & known == 0,
             Some(Compared::Near(band)) => (said.number() - came.number()).abs() <= band,
+            Some(Compared::Between(least, most)) => (least..=most).contains(&came.number()),
         }
     }
 
@@ -246,11 +411,15 @@ impl RightDrive for World {
         let events = mode & u32::from(MODE_EVENT) != 0;
         let chosen = self.cell(0x52);
         let shown = PRINTED | INPUTS;
-        let unknown = chosen & !shown != 0 || self.astray && chosen & status::TOLERANCE != 0;
+        let moves = self.astray || self.way.is_some();
+        let unknown = chosen & !shown != 0
+            || moves && chosen & status::TOLERANCE != 0
+            || self.disturbed && chosen != 0;
         let locked = mode & u32::from(MODE_LOCK) != 0;
         let homes = self.drive().is_homing();
         let travels = self.drive().control() == Control::Position && self.astray && !locked;
-        !(events && unknown || travels && !homes || homes && !self.homing.0)
+        let homing = homes && !self.homing.0 || self.interrupted;
+        !(events && unknown || travels && !homes || homing)
     }
 
     fn state(&self) -> u64 {
@@ -261,6 +430,8 @@ impl RightDrive for World {
         self.drive.state()
             ^ self.held
             ^ u64::from(self.placed)
+            ^ u64::from(self.interrupted) << 1
             ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ self.way.map_or(0, |own| own.state())
     }
 }

@@ -67,7 +67,7 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
         overtakes: late > Span::from_millis(5),
     };
     let drive = drive.drive(setup.rate, Instant::START);
-    let world = World::new(drive, Arc::default(), true);
+    let world = World::new(drive, Arc::default(), true).following();
     Some(judge(vec![world], &talk))
 }
 

@@ -6,7 +6,7 @@ use crate::simulate::DriveSetup;
 use harness_proto::time::Span;
 use harness_proto::unitek::frame::Reply;
 use harness_proto::unitek::properties::{Description, PROPERTIES, Properties, Setting};
-use harness_proto::unitek::words::{ERROR_NO_POWER, status};
+use harness_proto::unitek::words::{ERROR_NO_POWER, ERROR_TIME_OUT, status};
 use harness_proto::unitek::{REGISTERS, Register};
 use harness_sim::unitek::{Control, Inputs};
 use std::collections::{BTreeMap, BTreeSet};
@@ -67,8 +67,8 @@ impl Known {
     pub(super) fn read_all(&mut self, driver: &mut Driver<'_>) -> Result<(), Error> {
         let assigned = REGISTERS.iter().filter(|own| own.dump != UNASSIGNED);
         let read = self.read(driver, assigned.map(|own| own.number));
-        if self.first.is_empty() {
-            self.first.clone_from(&self.cells);
+        for (register, read) in &self.cells {
+            self.first.entry(*register).or_insert(*read);
         }
         read
     }
@@ -125,6 +125,12 @@ impl Known {
         self.cell(0xDC) & 0x0100 != 0
     }
 
+    /// Whether it has the error of a time-out of the bus, which has come since its registers were read at first: it is known what clears it.
+    pub(super) fn has_timed_out(&self) -> bool {
+        let at_first = self.first.get(&0x8F).copied().unwrap_or(ERROR_TIME_OUT);
+        self.cell(0x8F) & !at_first & ERROR_TIME_OUT != 0
+    }
+
     /// The same drive with what its registers read at first.
     pub(super) fn as_at_first(&self) -> Self {
         Self {
@@ -156,6 +162,10 @@ impl Known {
         let word = |register| (self.cell(register) & 0xFFFF) as u16;
         let calibrated = self.cell(0x40) & status::CALIBRATED != 0;
         let dc_bus = self.cell(0x8F) & ERROR_NO_POWER == 0;
+        let time_out = match self.has_timed_out() {
+            true => ERROR_TIME_OUT,
+            false => 0,
+        };
         let inputs = Inputs {
             run: on(0xE8),
             rfe: self.cell(0xD8) >> 5 & 1 == 1,
@@ -169,7 +179,7 @@ impl Known {
             igbt_temperature: word(0x4A),
             air_temperature: word(0x4B),
             voltage: word(0xEB),
-            faults: self.cell(0x8F) & !ERROR_NO_POWER,
+            faults: self.cell(0x8F) & !ERROR_NO_POWER & !time_out,
             calibrated: calibrated.then_some(true),
             ..Inputs::default()
         };
@@ -186,6 +196,7 @@ impl Known {
                 .collect(),
             control: Some(Control::Speed),
             released: self.cell(0x40) & status::ENABLED != 0,
+            timed_out: time_out != 0,
             ..DriveSetup::new(self.axis.node)
         }
     }

@@ -73,6 +73,13 @@ impl Exchange {
         );
     }
 
+    /// Whether something came behind the last frame that was sent.
+    pub(super) fn answers_last(&self) -> bool {
+        let sent = self.sent.last().map(|own| own.0);
+        let came = self.came.last().map(|own| own.1);
+        came >= sent
+    }
+
     /// A time of the link.
     fn at(&self, at: Instant) -> Option<Instant> {
         self.behind.map(|behind| at + behind)

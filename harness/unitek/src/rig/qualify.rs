@@ -18,9 +18,9 @@ use std::ops::RangeInclusive;
 /// The conversations that are played with each drive behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/qualify/unitek");
 
-/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of the first one, the next higher one, and
-/// two that no drive of the rig uses, each with its bytes: one as printed and one that is not.
-const DRIVE: [&str; 12] = [
+/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of each of them, the next higher one, and
+/// three that no drive of the rig uses, each with its bytes: one as printed to receive, one that is not, and one to send.
+const DRIVE: [&str; 16] = [
     "{node}",
     "{rx}",
     "{tx}",
@@ -33,10 +33,17 @@ const DRIVE: [&str; 12] = [
     "{other}",
     "{other-low}",
     "{other-high}",
+    "{tx-low}",
+    "{tx-high}",
+    "{send-low}",
+    "{send-high}",
 ];
 
 /// The identifiers in which a drive may receive (UNITEK 3.1).
 const PRINTED: RangeInclusive<u16> = 0x201..=0x27F;
+
+/// The identifiers on which a drive may send (UNITEK 3.1).
+const PRINTED_TO_SEND: RangeInclusive<u16> = 0x181..=0x1FF;
 
 /// What a probe needs that is not made by default.
 #[derive(Clone, Copy)]
@@ -117,6 +124,18 @@ pub(super) fn free(axes: &[Axis], axis: Axis) -> [u16; 2] {
     [free, other().nth(place)].map(|own| own.unwrap_or(axis.rx))
 }
 
+/// An identifier on which a drive can be tried to send: one that no drive of the rig uses, as printed (UNITEK 3.1) while there are some left.
+fn free_to_send(axes: &[Axis], axis: Axis) -> u16 {
+    let place = axes.iter().position(|own| *own == axis).unwrap_or(0);
+    let tried: Vec<_> = axes.iter().flat_map(|own| free(axes, *own)).collect();
+    let used = |id: &u16| {
+        let own = axes.iter().any(|own| own.rx == *id || own.tx == *id);
+        own || tried.contains(id)
+    };
+    let sends = PRINTED_TO_SEND.rev().chain(0x100..=0x7FF);
+    sends.filter(|id| !used(id)).nth(place).unwrap_or(axis.tx)
+}
+
 /// The conversations with these drives.
 pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
     let mut files: Vec<_> = CONVERSATIONS.files().collect();
@@ -126,6 +145,7 @@ pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
         let bytes = |id: u16| [id, id & 0xFF, id >> 8];
         let [free, free_low, free_high] = bytes(free);
         let [other, other_low, other_high] = bytes(other);
+        let [_, send_low, send_high] = bytes(free_to_send(axes, *axis));
         let values = [
             axis.node.to_string(),
             format!("{:03X}", axis.rx),
@@ -139,6 +159,10 @@ pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
             format!("{other:03X}"),
             format!("{other_low:02X}"),
             format!("{other_high:02X}"),
+            format!("{:02X}", axis.tx & 0xFF),
+            format!("{:02X}", axis.tx >> 8),
+            format!("{send_low:02X}"),
+            format!("{send_high:02X}"),
         ];
         let several = axes.len() > 1;
         let node = axis.node;
@@ -310,7 +334,10 @@ mod tests {
                 tx: 0x180 + u16::from(node),
             };
             let axes: Vec<_> = (1..=drives).map(axis).collect();
-            let tried = axes.iter().flat_map(|own| free(&axes, *own));
+            let tried = axes.iter().flat_map(|own| {
+                let sends = free_to_send(&axes, *own);
+                free(&axes, *own).into_iter().chain([sends])
+            });
             let own = axes.iter().flat_map(|own| [own.rx, own.tx]);
             let all: Vec<_> = tried.chain(own).collect();
             let each: std::collections::BTreeSet<_> = all.iter().collect();

@@ -5,6 +5,7 @@
 //! it. A line that the rig does not meet then accuses the drive, unless a right drive with another value of a property that is not settled
 //! would not meet it either, the drive and its model read differently at rest, or the computer was late.
 
+mod counted;
 mod note;
 mod own;
 #[cfg(test)]
@@ -15,7 +16,7 @@ mod worlds;
 
 pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
-use verdict::unlike;
+use verdict::{explained, unlike};
 use worlds::{BY_LINES, Shown, Told};
 
 use super::Axis;
@@ -58,6 +59,10 @@ type AtRest = Vec<(u8, u8, u32)>;
 
 /// Where the clock of a drive can stand when a scenario begins, in parts of 32 of a millisecond: cycles, ramps and events go by it.
 const PHASES: std::ops::Range<u64> = 1..32;
+
+/// How long a drive behind an adapter may be silent that was asked for something, and in which steps it is waited for.
+const SILENCE: Span = Span::from_millis(2_500);
+const STEP: Span = Span::from_millis(50);
 
 /// How many times the tolerance of times is waited for a frame that is missing.
 const STILL_COMES: u64 = 5;
@@ -294,10 +299,21 @@ impl Player {
             Gone::Unanswered(error) => self.unanswered(&error),
             Gone::Skipped(skip) => Outcome::skipped(skip),
             Gone::Played(outcome, [drives, models]) => {
+                let unlike = unlike(&drives, &models);
+                // What differs at rest does so in each attempt: it is judged where a conversation asks for it.
+                let asks = match own.name.starts_with(CONVERSATION) {
+                    true => own.asks_for(),
+                    false => BTreeSet::new(),
+                };
+                let (asked, mut explained_so): (Vec<_>, Vec<_>) =
+                    unlike.iter().partition(|own| asks.contains(&own.1));
+                explained_so.extend(explained(&asked, &drives));
                 let told = Told {
                     talk: std::mem::take(&mut link.noted.exchange),
                     way,
-                    unlike: unlike(&drives, &models),
+                    explained: explained_so,
+                    unlike,
+                    follows: own.by_frames,
                 };
                 let exact = way.tolerance == Span::ZERO;
                 let shown = match exact && !own.by_frames {
@@ -367,11 +383,21 @@ impl Player {
                 Verdict::Failed => link.time_tolerance() * STILL_COMES,
                 _ => Span::ZERO,
             };
+            // So is all of it, where the drive has been silent since it was asked last.
             let end = link.now() + under_way;
+            let silent_until = match outcome.verdict {
+                Verdict::Failed => end.max(link.now() + SILENCE),
+                _ => end,
+            };
+            let mut heard = link.noted.exchange.answers_last();
             loop {
-                link.wait(end);
-                while link.receive(0).is_some() {}
-                if link.now() >= end || link.trouble().is_some() {
+                let now = link.now();
+                link.wait(end.max(now + STEP).min(silent_until));
+                while link.receive(0).is_some() {
+                    heard = true;
+                }
+                let until = if heard { end } else { silent_until };
+                if link.now() >= until || link.trouble().is_some() {
                     break;
                 }
             }

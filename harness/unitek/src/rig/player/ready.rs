@@ -25,7 +25,16 @@ impl Player {
     pub(super) fn learn(&mut self, link: &mut Observed<'_>) -> Result<(), Error> {
         let mut drives = match self.known.take() {
             Some(drives) => drives,
-            None => self.axes.iter().copied().map(Known::new).collect(),
+            None => {
+                let again = self.axes.iter().map(|axis| {
+                    let partly = self.partly.iter().find(|own| own.axis == *axis);
+                    Known {
+                        first: partly.map(|own| own.first.clone()).unwrap_or_default(),
+                        ..Known::new(*axis)
+                    }
+                });
+                again.collect()
+            }
         };
         let learnt = drives
             .iter_mut()

@@ -9,6 +9,7 @@ use harness_bench::scenario::run::outcome::Mismatch;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
+use harness_proto::unitek::words::status;
 use std::collections::BTreeSet;
 
 /// Why a line that was not met accuses nothing.
@@ -189,6 +190,41 @@ fn right_but_late(outcome: Outcome, verdict: Verdict) -> Outcome {
     }
 }
 
+/// Registers that show whether a drive is ready, and those that show whether it runs, each with the bits for it that are 1 where it is, and
+/// those that are 0 (ex 8, ex 11, App 7, dump).
+const READY: [(u8, u32, u32); 3] = [(0xE2, 1, 0), (0xD8, 1 << 10, 0), (0xEF, 0, 0)];
+const RUNS: [(u8, u32, u32); 4] = [
+    (0xE3, 1, 0),
+    (0x40, status::ENABLED, 0),
+    (0xD8, 1 << 11, 0),
+    (0xF2, 0, 1),
+];
+
+/// The scale of the speed, and whether it counts as standing: both follow from other registers alone.
+const FROM_OTHERS: [u8; 2] = [0xCE, 0xF5];
+
+/// The registers among those that read differently at rest which right drives read so: one that an input which no register shows keeps from
+/// being ready or from running says so in all of them.
+pub(super) fn explained(unlike: &[(u8, u8)], drives: &AtRest) -> Vec<(u8, u8)> {
+    let agree = |node: u8, all: &[(u8, u32, u32)]| {
+        let shown = all.iter().filter_map(|(register, one, zero)| {
+            let read = drives
+                .iter()
+                .find(|own| (own.0, own.1) == (node, *register));
+            let read = read.filter(|_| one | zero != 0)?.2;
+            Some(read & one != 0 || zero & !read != 0)
+        });
+        let shown: BTreeSet<_> = shown.collect();
+        shown.len() < 2
+    };
+    let explained = |(node, register): &(u8, u8)| {
+        let of = |all: &[(u8, u32, u32)]| all.iter().any(|own| own.0 == *register);
+        let other = |all: &[_]| !of(all) || agree(*node, all);
+        !FROM_OTHERS.contains(register) && other(&READY) && other(&RUNS)
+    };
+    unlike.iter().copied().filter(explained).collect()
+}
+
 /// The registers in which drives and their models read differently at rest, by number and register.
 pub(super) fn unlike(drives: &AtRest, models: &AtRest) -> Vec<(u8, u8)> {
     let mask = |(node, register, bits): &(u8, u8, u32)| {
@@ -201,4 +237,43 @@ pub(super) fn unlike(drives: &AtRest, models: &AtRest) -> Vec<(u8, u8)> {
         .map(|(node, register, _)| (*node, *register))
         .collect();
     places.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ex 8, ex 11, App 7: STATUS, O_GO, LOGICMAP_IO and the brake say the same of a drive that an unknown input keeps from running; one
+    /// of them alone says it of none.
+    #[test]
+    fn an_input_that_no_register_shows_explains_all_of_them_or_none() {
+        let locked = [
+            (0x40, 0x0100),
+            (0xD8, 0x0430),
+            (0xE2, 1),
+            (0xE3, 0),
+            (0xF2, 1),
+        ];
+        let drives = |own: &[(u8, u32)]| -> AtRest {
+            own.iter()
+                .map(|(register, bits)| (1, *register, *bits))
+                .collect()
+        };
+        let unlike = [0x40, 0xD8, 0xE3, 0xF2].map(|register| (1, register));
+        assert_eq!(explained(&unlike, &drives(&locked)), unlike);
+        let alone = [
+            (0x40, 0x0101),
+            (0xD8, 0x0430),
+            (0xE2, 1),
+            (0xE3, 1),
+            (0xF2, 0),
+        ];
+        assert_eq!(explained(&[(1, 0xD8)], &drives(&alone)), []);
+        // Other drives, and other registers.
+        assert_eq!(
+            explained(&[(2, 0xD8), (1, 0x8F)], &drives(&alone)),
+            [(2, 0xD8), (1, 0x8F)]
+        );
+        assert_eq!(explained(&[(1, 0xCE)], &drives(&locked)), []);
+    }
 }

@@ -4,6 +4,7 @@ use super::super::Axis;
 use super::super::known::Known;
 use super::super::observed::Exchange;
 use super::Player;
+use super::counted::counted;
 use crate::judge::World;
 use crate::language::written;
 use crate::simulate::DriveSetup;
@@ -11,15 +12,16 @@ use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, j
 use harness_bench::rig::segment::observed::LinkTimes;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::frame::{READ, STOP};
 use harness_proto::unitek::properties::{Dlc4, Properties};
-use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS_NOT_READY, status};
-use harness_proto::unitek::{Register, Reply, Request};
+use harness_proto::unitek::words::{ERROR_TIME_OUT, ERRORS_NOT_READY, MODE_EVENT, status};
+use harness_proto::unitek::{Access, REGISTERS, Register, Reply, Request};
 use harness_sim::segment::Station as _;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// How far ahead of its time a frame may leave: an adapter takes frames before the bus is free.
-const AHEAD: Span = Span::from_millis(3);
+pub(super) const AHEAD: Span = Span::from_millis(3);
 
 /// The most steps of all worlds of a conversation; and of those of a deviation, of which there are many.
 const STEPS: usize = 200_000;
@@ -32,7 +34,7 @@ const USUALLY: Span = Span::from_millis(3);
 const WORSE: u64 = 3;
 
 /// The most frames of an attempt that an adapter may lose.
-const MOST_LOST: usize = 3;
+pub(super) const MOST_LOST: usize = 3;
 
 /// FW-VERSION.
 const FIRMWARE: u8 = 0x1B;
@@ -40,8 +42,8 @@ const FIRMWARE: u8 = 0x1B;
 /// The bits of an identifier (UNITEK 3.1).
 const MOST_IDENTIFIER: u32 = 0x7FF;
 
-/// Registers that are compared only where they held at first what a model holds: the scale of the speed and the tolerance.
-const READ_AT_FIRST: [u8; 2] = [0xCE, 0xF4];
+/// A register that is compared without a position command only where it held at first what a model holds: the tolerance.
+const READ_AT_FIRST: u8 = 0xF4;
 
 /// Bits of D8 that show inputs, and the inputs one by one (UNITEK 4).
 const INPUT_BITS: u32 = 0x003F;
@@ -54,6 +56,10 @@ pub(super) struct Told {
     pub(super) way: LinkTimes,
     /// Registers that read something else at rest than those of the model, by drive.
     pub(super) unlike: Vec<(u8, u8)>,
+    /// Those of them which a right drive may read so.
+    pub(super) explained: Vec<(u8, u8)>,
+    /// Whether moves to positions are followed.
+    pub(super) follows: bool,
 }
 
 impl Told {
@@ -123,37 +129,46 @@ impl Player {
     fn shown_by(&self, known: &Known, told: &Told) -> Shown {
         let unlike = self.unlike(known, told);
         let talk = &told.talk;
-        let came = match self.came_from(known, talk) {
+        let (came, changed) = match self.came_from(known, talk) {
             Ok(came) => came,
             Err(why) => return Shown::Unknown(why),
         };
+        if let Some(shown) = counted(talk, &came, (known.axis, told.way.tolerance)) {
+            return shown;
+        }
         let judged = |properties, late: Span, (overtakes, complete), most_lost| {
             let talk = Dialogue {
-                overtakes,
+                overtakes: overtakes && says_by_itself(talk),
                 complete,
                 most_lost,
                 ..conversation(talk, &came, late)
             };
-            let world = self.world(known, properties, &unlike);
+            let world = self.world((known, properties), &unlike, told);
+            let world = match changed {
+                true => world.disturbed(),
+                false => world,
+            };
             judge_alive(vec![world], &talk, &|| self.beats.beat())
         };
         for (late, overtakes) in told.lateness() {
             match judged(known.properties, late, (overtakes, true), 0) {
+                Judged::Right if changed => return Shown::Unknown(CHANGED_INPUTS),
                 Judged::Right => return Shown::Complete,
                 Judged::TooMany => return Shown::Unknown(TOO_MANY),
                 Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
                 Judged::Wrong(..) => {}
             }
         }
-        let right = self.world(known, known.properties, &unlike);
+        let right = self.world((known, known.properties), &unlike, told);
         let others = known.candidates().into_iter().map(|own| own.1);
         let others = others.filter(|own| {
-            let other = self.world(known, *own, &unlike);
+            let other = self.world((known, *own), &unlike, told);
             !say_the_same(&right, &other, told)
         });
         let mut wrong = None;
         for properties in std::iter::once(known.properties).chain(others) {
             match judged(properties, told.slowest(), (true, false), 0) {
+                Judged::Right if changed => return Shown::Unknown(CHANGED_INPUTS),
                 Judged::Right => return Shown::Right,
                 Judged::TooMany => return Shown::Unknown(TOO_MANY),
                 Judged::Unknown => return Shown::Unknown(NOT_FORETOLD),
@@ -189,7 +204,8 @@ impl Player {
         shown: &Told,
         wrong: bool,
     ) -> Option<bool> {
-        let mut came = self.came_from(known, &shown.talk).ok()?;
+        let came = self.came_from(known, &shown.talk).ok()?;
+        let (mut came, _) = Some(came).filter(|own| !own.1)?;
         // A frame that began before the first request had left belongs to what was before; stamps of adapters are not that exact.
         if let (Some((first, _)), Span::ZERO) = (shown.talk.sent.first(), shown.way.tolerance) {
             let least = |own: &Frame| self.rate.time_of(own.bits_to_acknowledge());
@@ -209,7 +225,7 @@ impl Player {
                     drive.sent(Instant::START);
                 }
             }
-            World::new(drive, self.unlike(known, shown), false)
+            follows(World::new(drive, self.unlike(known, shown), false), shown)
         };
         let deviant = world(setup);
         let right = world(&known.model(known.properties));
@@ -218,7 +234,7 @@ impl Player {
         }
         for (late, overtakes) in shown.lateness() {
             let talk = Dialogue {
-                overtakes,
+                overtakes: overtakes && says_by_itself(&shown.talk),
                 most_steps: STEPS_OF_A_NAME,
                 ..conversation(&shown.talk, &came, late)
             };
@@ -231,9 +247,11 @@ impl Player {
         Some(false)
     }
 
-    /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model.
+    /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model,
+    /// which a right drive may.
     fn unlike(&self, known: &Known, told: &Told) -> Arc<BTreeSet<u8>> {
-        let own = told.unlike.iter().filter(|own| own.0 == known.axis.node);
+        let own = told.explained.iter();
+        let own = own.filter(|own| own.0 == known.axis.node);
         let model = known.model(known.properties);
         let model = model.drive(self.rate, Instant::START);
         let differs = |register: &u8| {
@@ -241,25 +259,35 @@ impl Player {
             let mask = Register::of(*register).mask();
             read.is_some_and(|own| (own ^ model.drive().register(*register)) & mask != 0)
         };
-        let first = READ_AT_FIRST.into_iter().filter(differs);
-        Arc::new(own.map(|own| own.1).chain(first).collect())
+        let first = Some(READ_AT_FIRST).filter(differs);
+        // One that was called may still work.
+        let other = |own: &u8| known.cells.get(own) != known.first.get(own);
+        let called = REGISTERS.iter().filter(|own| own.access == Access::FN);
+        let called = called.map(|own| own.number).filter(other);
+        Arc::new(own.map(|own| own.1).chain(first).chain(called).collect())
     }
 
-    fn world(&self, known: &Known, properties: Properties, unlike: &Arc<BTreeSet<u8>>) -> World {
+    fn world(
+        &self,
+        (known, properties): (&Known, Properties),
+        unlike: &Arc<BTreeSet<u8>>,
+        told: &Told,
+    ) -> World {
         let drive = known.model(properties).drive(self.rate, Instant::START);
-        let homing = known.settled.contains("homing-time");
-        World::new(drive, Arc::clone(unlike), homing)
+        // The conversations whose moves are followed ask for nothing while homing may end.
+        let homing = known.settled.contains("homing-time") || told.follows;
+        follows(World::new(drive, Arc::clone(unlike), homing), told)
     }
 
-    /// What came from a drive.
+    /// What came from a drive, and whether something beside the bus has changed it.
     ///
     /// # Errors
-    /// Why that is not known, or that something beside the bus has changed the drive.
+    /// Why that is not known.
     fn came_from(
         &self,
         known: &Known,
         talk: &Exchange,
-    ) -> Result<Vec<(Instant, Instant, Frame)>, &'static str> {
+    ) -> Result<(Vec<(Instant, Instant, Frame)>, bool), &'static str> {
         let axis = known.axis;
         let [receives, sends] = identifiers(axis, talk);
         let others = self.axes.iter().filter(|own| **own != axis);
@@ -267,7 +295,7 @@ impl Player {
             .flat_map(|own| identifiers(*own, talk).concat())
             .any(|own| receives.contains(&own) || sends.contains(&own));
         let stands = known.cells.get(&0xF5).is_none_or(|own| own & 1 == 1);
-        let timed_out = known.cell(0x8F) & ERROR_TIME_OUT != 0;
+        let timed_out = known.cell(0x8F) & ERROR_TIME_OUT != 0 && !known.has_timed_out();
         if shared {
             return Err(OTHER_IDENTIFIERS);
         }
@@ -292,10 +320,25 @@ impl Player {
                 register => INPUTS.contains(&register) && differs(&own) & 1 != 0,
             })
         });
-        match changed {
-            true => Err(CHANGED_INPUTS),
-            false => Ok(came),
-        }
+        Ok((came, changed))
+    }
+}
+
+/// Whether a drive may send something that no request asks for: a cycle (5.2) or an event (ex 10). Nothing else overtakes a reply.
+fn says_by_itself(talk: &Exchange) -> bool {
+    let mut sent = talk.sent.iter().map(|own| own.1.data());
+    sent.any(|data| match *data {
+        [READ, _, interval, ..] => !matches!(interval, 0 | STOP),
+        [0x51, low, ..] => u16::from(low) & MODE_EVENT != 0,
+        _ => false,
+    })
+}
+
+/// A drive whose moves to positions are followed, where they are.
+fn follows(world: World, told: &Told) -> World {
+    match told.follows {
+        true => world.following(),
+        false => world,
     }
 }
 
