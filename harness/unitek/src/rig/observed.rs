@@ -80,6 +80,12 @@ impl Exchange {
         came >= sent
     }
 
+    /// How long behind its stamp the last frame was read: the others of an adapter that stood still are still to come.
+    pub(super) fn last_late(&self) -> Span {
+        let last = self.came.last();
+        last.map_or(Span::ZERO, |(at, read, _)| read.since(*at))
+    }
+
     /// A time of the link.
     fn at(&self, at: Instant) -> Option<Instant> {
         self.behind.map(|behind| at + behind)

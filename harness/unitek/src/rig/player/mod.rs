@@ -379,8 +379,10 @@ impl Player {
         let outcome = run(excused.as_ref().unwrap_or(&own.plan), link);
         if link.time_tolerance() > Span::ZERO {
             // What is missing may still be under way.
+            let stalls = link.noted.exchange.last_late() > link.time_tolerance();
             let under_way = match outcome.verdict {
                 Verdict::Failed => link.time_tolerance() * STILL_COMES,
+                _ if stalls => link.time_tolerance() * STILL_COMES,
                 _ => Span::ZERO,
             };
             // So is all of it, where the drive has been silent since it was asked last.
