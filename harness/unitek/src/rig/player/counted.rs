@@ -6,7 +6,7 @@
 
 use super::super::Axis;
 use super::super::observed::Exchange;
-use super::worlds::{AHEAD, MOST_LOST, Shown};
+use super::worlds::{AHEAD, Came, MOST_LOST, Shown};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Dlc4;
@@ -24,8 +24,6 @@ const DRIFT: u64 = 50;
 /// MODE, and the commands of speed and torque.
 const MODE: u8 = 0x51;
 const COMMANDS: [u8; 2] = [0x31, 0x90];
-
-type Came = (Instant, Instant, Frame);
 
 /// A cycle in a conversation.
 struct Cycle {
