@@ -1,6 +1,6 @@
 //! The verdict of an attempt in which a line was not met, or right drives would have sent something else.
 
-use super::worlds::Shown;
+use super::worlds::{STOOD_STILL, Shown};
 use super::{AtRest, Other, Own, PHASES, Player};
 use crate::judge::World;
 use harness_bench::scenario::problem::TextSpan;
@@ -86,7 +86,9 @@ impl Player {
                 Some(why) => inconclusive(outcome, why),
             },
             (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
-            (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || excused.is_some() => {
+            (Verdict::Passed, Shown::Unknown(why))
+                if own.by_frames || excused.is_some() || why == STOOD_STILL =>
+            {
                 inconclusive(outcome, not_to_its_end(why))
             }
             _ => outcome.judged_by(&own.plan),

@@ -33,6 +33,9 @@ const USUALLY: Span = Span::from_millis(3);
 /// How much later than the slowest one that was measured a frame may be.
 const WORSE: u64 = 3;
 
+/// From this time without a reply on something has stood still, and the attempt accuses no drive.
+const STANDSTILL: Span = Span::from_millis(250);
+
 /// The most frames of an attempt that an adapter may lose.
 pub(super) const MOST_LOST: usize = 3;
 
@@ -68,6 +71,11 @@ pub(super) struct Told {
 impl Told {
     fn measured(&self) -> Span {
         self.way.late.max(self.way.longest)
+    }
+
+    /// Whether an adapter, the computer or a simulated drive has stood still: what came then may be of any time since.
+    fn stood_still(&self) -> bool {
+        self.way.tolerance > Span::ZERO && self.measured() >= STANDSTILL
     }
 
     /// How late a frame may be, and whether replies may be overtaken: few worlds explain most conversations, and the most are tried last. In
@@ -107,6 +115,8 @@ const CHANGED_INPUTS: &str = "an input has changed, or what an input is blamed f
 const NOT_FORETOLD: &str = "what a right drive does here does not follow from what is known of it";
 pub(super) const BY_LINES: &str = "time is virtual, and its lines compare it";
 const TOO_MANY: &str = "it has more worlds than are kept";
+pub(super) const STOOD_STILL: &str =
+    "a reply took a quarter of a second or more: an adapter, the computer or the drive stood still";
 
 impl Shown {
     /// What several drives come to.
@@ -125,8 +135,11 @@ impl Player {
     /// Whether right drives could have sent what came.
     pub(super) fn shown(&self, told: &Told) -> Shown {
         let each = self.known().iter().map(|known| self.shown_by(known, told));
-        each.reduce(Shown::and)
-            .unwrap_or(Shown::Unknown(NOT_AT_REST))
+        let shown = each.reduce(Shown::and);
+        match shown.unwrap_or(Shown::Unknown(NOT_AT_REST)) {
+            Shown::Wrong(_) if told.stood_still() => Shown::Unknown(STOOD_STILL),
+            shown => shown,
+        }
     }
 
     fn shown_by(&self, known: &Known, told: &Told) -> Shown {
