@@ -11,7 +11,7 @@ use harness_bench::link::{
 };
 use harness_bench::medium::{Heard, Medium, Out, Pieces};
 use harness_bench::port::{LastWords, Switch, Wire};
-use harness_bench::rig::segment::ON_PORT;
+use harness_bench::rig::playing::ON_PORT;
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::profibus::fdl::{BROADCAST, LAST_ADDRESS};

@@ -29,7 +29,7 @@ use crate::command::rig_failure;
 use crate::command::rig_name::RigName;
 use crate::command::sim::SimArguments;
 use crate::rig::buses::RigBuses;
-use crate::rig::segment::{SegmentJudge, SegmentRun};
+use crate::rig::playing::{RecordJudge, RigRun};
 use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
@@ -122,7 +122,7 @@ fn no_rigs(rig: &Rig) -> String {
 ///
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
-pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError> {
+pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn RigRun>, SessionError> {
     match commands_of(rig) {
         Some(commands) => (commands.run)(rig, options),
         None => Err(SessionError::Drives {
@@ -136,7 +136,7 @@ pub(crate) fn run_on(rig: &Rig, options: &UseOptions) -> Result<Box<dyn SegmentR
 ///
 /// # Errors
 /// The rig's file describes no drives, in a sentence.
-pub(crate) fn judge_of(rig: &Rig, qualifies: bool) -> Result<Box<dyn SegmentJudge>, String> {
+pub(crate) fn judge_of(rig: &Rig, qualifies: bool) -> Result<Box<dyn RecordJudge>, String> {
     match commands_of(rig) {
         Some(commands) => (commands.judge)(rig, qualifies),
         None => Err(no_rigs(rig)),

@@ -18,7 +18,7 @@ use crate::evidence::{
 use crate::library::Entry;
 use crate::link::Capability;
 use crate::report::pages::Head;
-use crate::rig::segment::{QualificationKeeper, QualificationStopped, SegmentRun};
+use crate::rig::playing::{QualificationKeeper, QualificationStopped, RigRun};
 use crate::rig::{Keeper, PlayedScenario, Rig, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Why};
 use crate::scenario::source::Source;
@@ -199,7 +199,7 @@ pub(crate) fn reports(
 }
 
 fn all(
-    (rig, run): (&Rig, &mut dyn SegmentRun),
+    (rig, run): (&Rig, &mut dyn RigRun),
     entries: &[Entry],
     job: &PlayOrder,
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
@@ -255,7 +255,7 @@ pub(super) fn worse(scenarios: Exit, all: Exit) -> Exit {
 
 /// Plays the selected scenarios one after another and reports each. Returns the exit code of their verdicts.
 fn selected(
-    (rig, run): (&Rig, &mut dyn SegmentRun),
+    (rig, run): (&Rig, &mut dyn RigRun),
     entries: &[Entry],
     job: &PlayOrder,
     (mut folder, mut page): (Option<&mut Folder>, Option<&mut Page>),
@@ -337,7 +337,7 @@ fn keep(
 
 /// Plays what a qualification plays behind the selected scenarios, and writes what all of it comes to.
 fn qualify(
-    (rig, run): (&Rig, &mut dyn SegmentRun),
+    (rig, run): (&Rig, &mut dyn RigRun),
     job: &PlayOrder,
     folder: Option<&mut Folder>,
     output: &mut Output,

@@ -6,7 +6,7 @@ use super::record::RecordLine;
 use crate::library::Entry;
 use crate::link::{LinkEvent, LinkFault, Moment, PlacedFault, Recording, link_name};
 use crate::rig::Attempt;
-use crate::rig::segment::{RecordedAttempt, SegmentJudge};
+use crate::rig::playing::{RecordJudge, RecordedAttempt};
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
@@ -72,7 +72,7 @@ pub(super) struct Again {
 pub(super) fn again(
     recorded: &Recorded,
     text: &str,
-    judge: &mut dyn SegmentJudge,
+    judge: &mut dyn RecordJudge,
 ) -> Result<Again, String> {
     let source = Source {
         name: recorded.name.clone(),

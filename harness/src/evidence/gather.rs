@@ -11,7 +11,7 @@ use super::verify::{Judged, scenarios};
 use crate::counted::counted;
 use crate::partition::Partition;
 use crate::report::pages::ShownScenario;
-use crate::rig::segment::{QualificationRecord, Qualified, RecordedPart, SegmentJudge};
+use crate::rig::playing::{QualificationRecord, Qualified, RecordJudge, RecordedPart};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub(super) struct Gathering<'g> {
     pub(super) missing: Vec<String>,
     parts: Vec<JudgedPart<'g>>,
     /// What judges the parts of a qualification together.
-    judge: Option<Box<dyn SegmentJudge>>,
+    judge: Option<Box<dyn RecordJudge>>,
 }
 
 /// A part whose attempts were judged again.

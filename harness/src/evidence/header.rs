@@ -8,8 +8,8 @@ use crate::buses::{SimulatedLink, bus_of, is_bare, judge_of};
 use crate::capture::Carries;
 use crate::link::Capability;
 use crate::rig::Rig;
+use crate::rig::playing::RecordedBench;
 use crate::rig::rings::rings;
-use crate::rig::segment::OnSegment;
 use crate::scenario::run::sizes;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
@@ -100,7 +100,7 @@ pub(super) fn header(
     }
     let of_rings = bus_of(rig).carries == Carries::Link;
     let expected = match own_rings {
-        true => OnSegment {
+        true => RecordedBench {
             rate: Rate::default().bits_per_second(),
             drives: rig.ring_size(),
             tolerance: Span::ZERO,

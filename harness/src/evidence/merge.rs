@@ -22,7 +22,7 @@ use super::verify::{Opened, Verified, verify};
 use crate::partition::Partition;
 use crate::regular;
 use crate::report::pages::{Head, run};
-use crate::rig::segment::Qualified;
+use crate::rig::playing::Qualified;
 use crate::scenario::run::DENIED;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;

@@ -4,7 +4,7 @@ use super::files::{DEVIATIONS, PROFILE, read_text};
 use super::record::RecordLine;
 use super::selection;
 use super::verify::{Judged, Opened};
-use crate::rig::segment::{QualificationRecord, Qualified, RecordedCase, SegmentJudge};
+use crate::rig::playing::{QualificationRecord, Qualified, RecordJudge, RecordedCase};
 use crate::rig::{Attempt, PlayedScenario};
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
@@ -18,7 +18,7 @@ pub(super) type QualifiedAgain = Result<Vec<Qualified>, String>;
 pub(super) fn again(
     opened: &Opened,
     judged: &[Judged],
-    judge: &mut dyn SegmentJudge,
+    judge: &mut dyn RecordJudge,
 ) -> QualifiedAgain {
     let header = &opened.header;
     let record = QualificationRecord::Run {

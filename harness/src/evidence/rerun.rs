@@ -6,7 +6,7 @@ use super::record::RecordLine;
 use super::verify::{Opened, text_of};
 use crate::buses::run_on;
 use crate::link::{LinkEvent, Sink};
-use crate::rig::segment::SegmentRun;
+use crate::rig::playing::RigRun;
 use crate::rig::{Attempt, Keeper, PlayedScenario, UseOptions};
 use crate::scenario::run::Outcome;
 use std::path::Path;
@@ -60,7 +60,7 @@ pub(super) fn rerun(
 
 /// Plays one scenario again and compares it with its lines.
 fn scenario(
-    run: &mut dyn SegmentRun,
+    run: &mut dyn RigRun,
     path: &Path,
     opened: &Opened,
     lines: &[RecordLine],

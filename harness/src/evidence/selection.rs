@@ -3,7 +3,7 @@
 use super::files::sum;
 use super::record::RecordLine;
 use super::verify::Opened;
-use crate::rig::segment::SegmentJudge;
+use crate::rig::playing::RecordJudge;
 
 /// How the scenarios of a record compare with those that were to be played.
 #[derive(Debug, Default)]
@@ -90,7 +90,7 @@ struct Qualifying {
     always: bool,
 }
 
-fn qualifying(judge: &dyn SegmentJudge) -> Vec<Qualifying> {
+fn qualifying(judge: &dyn RecordJudge) -> Vec<Qualifying> {
     let all = judge.conversations().into_iter();
     let listed = all.map(|own| Qualifying {
         sum: sum(own.source.text.as_bytes()),

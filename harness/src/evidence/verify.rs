@@ -22,7 +22,7 @@ use super::signature::{self, Signer};
 use crate::buses::{RIG_BUSES, judge_of};
 use crate::counted::counted;
 use crate::regular;
-use crate::rig::segment::SegmentJudge;
+use crate::rig::playing::RecordJudge;
 use crate::rig::{Rig, parse_beside};
 use crate::scenario::run::DENIED;
 use crate::scenario::source::Source;
@@ -243,7 +243,7 @@ impl Opened {
     }
 
     /// What judges attempts on a rig; `None` where each scenario had a bench of its own.
-    pub(super) fn judge(&self) -> Result<Option<Box<dyn SegmentJudge>>, EvidenceError> {
+    pub(super) fn judge(&self) -> Result<Option<Box<dyn RecordJudge>>, EvidenceError> {
         if self.header.own_rings {
             return Ok(None);
         }
@@ -256,7 +256,7 @@ impl Opened {
     /// Judges every attempt on a rig again.
     pub(super) fn judged_by(
         &self,
-        judge: &mut dyn SegmentJudge,
+        judge: &mut dyn RecordJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Vec<Judged> {
         self.judged_each(scenario, |recorded, text| again(recorded, text, judge))

@@ -110,7 +110,7 @@ pub(crate) fn safe_state<L: Line>(
     let mut reports: Vec<_> = axes.iter().map(|axis| report(axis, Span::ZERO)).collect();
     // An adapter may have stood still. All other drives are safe before one is waited for.
     for (axis, own) in axes.iter().zip(&mut reports) {
-        if own.end == End::Silent {
+        if matches!(own.end, End::Silent | End::Elsewhere) {
             *own = report(axis, REAL);
         }
     }

@@ -7,15 +7,15 @@ use super::fuzz::FuzzCommands;
 use super::held::HeldBench;
 use super::output::Output;
 use super::rig_failure::exit_of;
-use crate::rig::segment::{SegmentJudge, SegmentRun};
+use crate::rig::playing::{RecordJudge, RigRun};
 use crate::rig::{Rig, SessionError, UseOptions};
 use std::rc::Rc;
 
 /// Takes a rig to play scenarios on it.
-type OpenRun = fn(&Rig, &UseOptions) -> Result<Box<dyn SegmentRun>, SessionError>;
+type OpenRun = fn(&Rig, &UseOptions) -> Result<Box<dyn RigRun>, SessionError>;
 
 /// Judges what was played on a rig again, in a qualification or in a run.
-type OpenJudge = fn(&Rig, bool) -> Result<Box<dyn SegmentJudge>, String>;
+type OpenJudge = fn(&Rig, bool) -> Result<Box<dyn RecordJudge>, String>;
 
 /// Takes a rig for a session.
 type OpenSession = fn(&Rig, &UseOptions, &mut Output) -> Result<Box<dyn HeldBench>, Failure>;

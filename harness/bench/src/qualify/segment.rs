@@ -4,8 +4,8 @@
 
 use crate::counted::counted;
 use crate::rig::Rig;
+use crate::rig::playing::Qualified;
 use crate::rig::profile::{Profile, ProfileLines};
-use crate::rig::segment::Qualified;
 use crate::scenario::verdict::Verdict;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -2,8 +2,8 @@
 
 use super::left::NotPutBack;
 use super::lock::{PortLock, PortLockError};
+use super::playing::observed::Beats;
 use super::port_file::Port;
-use super::segment::observed::Beats;
 use super::taken::{Taken, take};
 use super::watchdog::{Watchdog, watch_over};
 use super::{Alarm, End, Ends, Rig, SessionError, UseOptions, file, standing};

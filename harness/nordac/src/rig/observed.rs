@@ -3,7 +3,7 @@
 use super::known::{ADDRESS, WIPES};
 use harness_bench::counted::counted;
 use harness_bench::medium::{Heard, Medium, Out};
-use harness_bench::rig::segment::observed::{LinkNotes, ReceivedSum};
+use harness_bench::rig::playing::observed::{LinkNotes, ReceivedSum};
 use harness_bench::trouble::Trouble;
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::{DEFAULT_ADDRESS, Image, Pkw, PpoType, Task};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 const MOST_KEPT: usize = 1_000_000;
 
 /// A link to inverters, observed.
-pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'l, TelegramNotes>;
+pub(super) type Observed<'l> = harness_bench::rig::playing::observed::Observed<'l, TelegramNotes>;
 
 /// A parameter that may have been written: station, number and IND.
 pub(super) type Written = (u8, u16, u16);
@@ -323,7 +323,7 @@ impl LinkNotes for TelegramNotes {
 mod tests {
     use super::{Came, TelegramNotes, WHOLE};
     use harness_bench::medium::{Heard, Medium};
-    use harness_bench::rig::segment::observed::LinkNotes;
+    use harness_bench::rig::playing::observed::LinkNotes;
     use harness_proto::line::Received;
     use harness_proto::profibus::BusRate;
     use harness_proto::time::{Instant, Span};

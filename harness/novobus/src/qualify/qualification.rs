@@ -17,7 +17,7 @@ use crate::rig::OnRings;
 use crate::rig::Run;
 use crate::twin::{Exactness, SILENCED, Twin};
 use harness_bench::link::{Link as _, Octets as _};
-use harness_bench::rig::segment::Qualified;
+use harness_bench::rig::playing::Qualified;
 use harness_bench::rig::{Attempt, PlayedScenario, Profile, Rig};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::verdict::Verdict;

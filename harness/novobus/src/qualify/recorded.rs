@@ -8,7 +8,7 @@ use crate::language::syntax::Header;
 use crate::rig::run::twin;
 use crate::twin::Twin;
 use harness_bench::evidence::files::sum;
-use harness_bench::rig::segment::{Qualified, RecordedCase, RecordedPart};
+use harness_bench::rig::playing::{Qualified, RecordedCase, RecordedPart};
 use harness_bench::rig::{PlayedScenario, Rig};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::Why;

@@ -15,11 +15,11 @@ use crate::qualify::{
 use crate::rig::sim::RigOfRings as _;
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_bench::link::{Capability, Line as _, LinkEvent, Replay, Trouble};
-use harness_bench::rig::rings::rings;
-use harness_bench::rig::segment::{
-    OnSegment, QualificationRecord, Qualified, QualifyingScenario, RecordedAttempt,
-    RepeatedVerdict, SegmentJudge,
+use harness_bench::rig::playing::{
+    QualificationRecord, Qualified, QualifyingScenario, RecordJudge, RecordedAttempt,
+    RecordedBench, RepeatedVerdict,
 };
+use harness_bench::rig::rings::rings;
 use harness_bench::rig::{Attempt, Rig, SessionError};
 use harness_bench::scenario::parse;
 use harness_bench::scenario::run::{DENIED, Outcome, Skip, Why};
@@ -113,12 +113,12 @@ impl RingJudge {
     }
 }
 
-impl SegmentJudge for RingJudge {
-    fn adopt(&mut self, capabilities: &[String]) -> OnSegment {
+impl RecordJudge for RingJudge {
+    fn adopt(&mut self, capabilities: &[String]) -> RecordedBench {
         (self.capabilities, self.limits) = possible(capabilities, &self.rig);
         self.exactness.line_errors = self.capabilities.contains(&Capability::LineErrors);
         self.way.anew = self.limits.reset && self.limits.motion;
-        OnSegment {
+        RecordedBench {
             rate: self.rate.bits_per_second(),
             drives: self.rig.ring_size(),
             tolerance: self.exactness.tolerance,

@@ -10,8 +10,8 @@ use crate::twin::Twin;
 use harness_bench::bus_name::BusName;
 use harness_bench::counted::counted;
 use harness_bench::link::{Line as _, Octets as _, Trouble};
-use harness_bench::rig::segment::{
-    OnSegment, QualificationKeeper, QualificationStopped, Qualified, SegmentRun,
+use harness_bench::rig::playing::{
+    QualificationKeeper, QualificationStopped, Qualified, RecordedBench, RigRun,
 };
 use harness_bench::rig::{End, Keeper, PlayedScenario, Rig, SessionError, UseOptions};
 use harness_bench::scenario::parse;
@@ -54,13 +54,13 @@ impl RingRun {
     }
 }
 
-impl SegmentRun for RingRun {
-    fn segment(&mut self) -> OnSegment {
+impl RigRun for RingRun {
+    fn segment(&mut self) -> RecordedBench {
         let way = self.run.way();
         let byte_time = self.run.session().link().byte_time();
         let mut rates = Rate::ALL.into_iter();
         let rate = rates.find(|rate| rate.byte_time() == byte_time);
-        OnSegment {
+        RecordedBench {
             rate: rate.unwrap_or_default().bits_per_second(),
             drives: way.rings.first().map_or(0, |ring| ring.drives()),
             tolerance: self.run.exactness().tolerance,

@@ -30,6 +30,9 @@ const SILENCE: Span = Span::from_millis(2_500);
 /// What a drive is asked for while it is silent, and how long the line is left alone behind each request.
 const ALIVE: (u8, Span) = (0x40, Span::from_millis(50));
 
+/// How long replies are waited for that belong to requests from the time of a silence.
+const SETTLES: Span = Span::from_millis(300);
+
 /// The registers of a speed and of a torque command.
 const COMMANDS: [u8; 2] = [0x31, 0x90];
 
@@ -276,7 +279,11 @@ impl<'l> Driver<'l> {
         while self.now() < until {
             match self.run_once(axis, Job::Read { register })? {
                 Outcome::NoReply { .. } => self.run(pause)?,
-                _ => return self.run_once(axis, job),
+                _ => {
+                    // It answers everything that it was asked meanwhile.
+                    self.run(SETTLES)?;
+                    return self.run_once(axis, job);
+                }
             }
         }
         // It is not waited for again.

@@ -2,12 +2,13 @@
 
 use harness_bench::counted::counted;
 use harness_bench::medium::{Heard, Medium, Out};
-use harness_bench::rig::segment::observed::{LinkNotes, ReceivedSum};
+use harness_bench::rig::playing::observed::{LinkNotes, ReceivedSum};
 use harness_proto::can::{self, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Request;
+use harness_proto::unitek::frame::READ;
 use harness_proto::unitek::properties::Dlc4;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The most frames of an attempt that are kept.
 const MOST_KEPT: usize = 100_000;
@@ -16,7 +17,7 @@ const MOST_KEPT: usize = 100_000;
 const LONGEST_FRAME: Span = Span::from_micros(1_500);
 
 /// A link to drives, observed.
-pub(super) type Observed<'l> = harness_bench::rig::segment::observed::Observed<'l, FrameNotes>;
+pub(super) type Observed<'l> = harness_bench::rig::playing::observed::Observed<'l, FrameNotes>;
 
 /// A drive, by the identifier that it had before the first frame.
 type Addressed = u16;
@@ -84,6 +85,34 @@ impl Exchange {
     pub(super) fn last_late(&self) -> Span {
         let last = self.came.last();
         last.map_or(Span::ZERO, |(at, read, _)| read.since(*at))
+    }
+
+    /// The longest time for which nothing came of a register that comes by itself, more often before or afterwards: something stood still.
+    pub(super) fn longest_break(&self) -> Span {
+        let mut streams: BTreeMap<_, Vec<Instant>> = BTreeMap::new();
+        for (at, _, frame) in &self.came {
+            let register = frame.data().first().copied();
+            let stream = streams.entry((frame.id(), register)).or_default();
+            stream.push(*at);
+        }
+        let asked = |register, from, until| {
+            let mut sent = self.sent.iter();
+            sent.any(|(at, frame)| {
+                let read = frame.data().first() == Some(&READ);
+                (from..until).contains(at) && read && frame.data().get(1).copied() == register
+            })
+        };
+        let breaks = streams.iter().flat_map(|((_, register), times)| {
+            let gap = |place: usize| Some(times.get(place + 1)?.since(*times.get(place)?));
+            (0..times.len()).filter_map(move |place| {
+                let own = gap(place)?;
+                let near = [place.checked_sub(1).and_then(gap), gap(place + 1)];
+                let often = near.into_iter().flatten().any(|other| other * 2 <= own);
+                let by_itself = || !asked(*register, times[place], times[place + 1]);
+                (often && by_itself()).then_some(own)
+            })
+        });
+        breaks.max().unwrap_or_default()
     }
 
     /// A time of the link.
@@ -196,5 +225,39 @@ impl LinkNotes for FrameNotes {
             *begun = frames.len();
         }
         self.asked = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of 30 (N-ACTUAL) at these times in ms, and requests for it.
+    fn longest(came: &[u64], asked: &[u64]) -> Span {
+        let at = |millis: &u64| Instant::START + Span::from_millis(*millis);
+        let frame = |text: &str| text.parse::<Frame>().expect("a frame");
+        let came = came
+            .iter()
+            .map(|own| (at(own), at(own), frame("181#300000")));
+        let sent = asked.iter().map(|own| (at(own), frame("201#3D3000")));
+        let talk = Exchange {
+            came: came.collect(),
+            sent: sent.collect(),
+            ..Exchange::default()
+        };
+        talk.longest_break()
+    }
+
+    /// A cycle in which a pause stands, one that has ended before a request, and requests that are far apart (UNITEK 5.2).
+    #[test]
+    fn a_break_is_one_of_frames_that_come_by_themselves() {
+        assert_eq!(
+            longest(&[10, 20, 30, 330, 331], &[]),
+            Span::from_millis(300)
+        );
+        assert_eq!(longest(&[10, 310, 320], &[]), Span::from_millis(300));
+        assert_eq!(longest(&[10, 20, 30, 40], &[]), Span::ZERO);
+        assert_eq!(longest(&[10, 20, 30, 331], &[330]), Span::ZERO);
+        assert_eq!(longest(&[10, 311, 611], &[9, 310, 610]), Span::ZERO);
     }
 }

@@ -7,7 +7,7 @@ use harness_bench::qualify::segment::{
     Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
 };
 use harness_bench::rig::Rig;
-use harness_bench::rig::segment::Qualified;
+use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};

@@ -12,11 +12,11 @@ use harness_bench::link::frames::SLACK;
 use harness_bench::link::{Link, LinkEvent, Replay};
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;
+use harness_bench::rig::playing::observed::Beats;
+use harness_bench::rig::playing::run::PortPlayer;
+use harness_bench::rig::playing::{Qualified, RecordedBench};
 use harness_bench::rig::port_file::Port;
 use harness_bench::rig::port_session::patience;
-use harness_bench::rig::segment::observed::Beats;
-use harness_bench::rig::segment::run::PortPlayer;
-use harness_bench::rig::segment::{OnSegment, Qualified};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{Outcome, Skip};
 use harness_bench::scenario::source::Source;
@@ -70,11 +70,11 @@ impl PortPlayer for Player {
         self.left = left;
     }
 
-    fn segment(rig: &Rig, allow_motion: bool) -> OnSegment {
+    fn segment(rig: &Rig, allow_motion: bool) -> RecordedBench {
         let limits = limits(rig, allow_motion);
         let rate = rig.port().map_or(0, |port| rate(port).bits_per_second());
         let permitted = (limits.motion, limits.eeprom);
-        OnSegment::of(rig, (rate, SLACK), &Bench::CAPABILITIES, permitted)
+        RecordedBench::of(rig, (rate, SLACK), &Bench::CAPABILITIES, permitted)
     }
 
     fn read(source: &Source) -> Result<Own, Box<Problems>> {

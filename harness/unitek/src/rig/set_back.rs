@@ -10,7 +10,7 @@ use crate::safe_state::last_words;
 use harness_bench::medium::{Out, Pieces};
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;
-use harness_bench::rig::segment::observed::LinkNotes as _;
+use harness_bench::rig::playing::observed::LinkNotes as _;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::Data;

@@ -31,7 +31,7 @@ use harness_bench::guard::Guarded;
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Replay};
 use harness_bench::medium::Medium;
 use harness_bench::rig::left::NotPutBack;
-use harness_bench::rig::segment::observed::{Beats, LinkTimes};
+use harness_bench::rig::playing::observed::{Beats, LinkTimes};
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::plan::{Plan, plan};
 use harness_bench::scenario::problem::Problems;

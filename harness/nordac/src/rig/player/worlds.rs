@@ -8,7 +8,7 @@ use crate::rig::known::Known;
 use crate::rig::observed::{Agreement, Turn, WHOLE};
 use crate::rig::settle::{Assumed, search};
 use crate::simulate::SlaveSetup;
-use harness_bench::rig::segment::observed::Beats;
+use harness_bench::rig::playing::observed::Beats;
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::nordac::properties::Description;

@@ -11,7 +11,7 @@ use crate::qualify::{Qualification, QualificationFacts, QualifiedBench};
 use crate::twin::Twin;
 use harness_bench::explore::{Bounds, Progress, Watcher};
 use harness_bench::rig::PlayedScenario;
-use harness_bench::rig::segment::Qualified;
+use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::verdict::Verdict;
 

@@ -34,7 +34,7 @@ use crate::simulate::{self, Bench};
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use harness_bench::medium::Medium;
 use harness_bench::rig::left::NotPutBack;
-use harness_bench::rig::segment::observed::{Beats, LinkTimes};
+use harness_bench::rig::playing::observed::{Beats, LinkTimes};
 use harness_bench::scenario::expression::Scope;
 use harness_bench::scenario::run::{Outcome, Skip, Unlock, Why, lacks, run};
 use harness_bench::scenario::syntax::Scenario;

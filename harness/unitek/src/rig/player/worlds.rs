@@ -9,7 +9,7 @@ use crate::judge::World;
 use crate::language::written;
 use crate::simulate::DriveSetup;
 use harness_bench::qualify::worlds::{Dialogue, Judged, RightDrive as _, Timed, judge_alive};
-use harness_bench::rig::segment::observed::LinkTimes;
+use harness_bench::rig::playing::observed::LinkTimes;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{READ, STOP};
@@ -33,7 +33,7 @@ const USUALLY: Span = Span::from_millis(3);
 /// How much later than the slowest one that was measured a frame may be.
 const WORSE: u64 = 3;
 
-/// From this time without a reply on something has stood still, and the attempt accuses no drive.
+/// From this time without a reply, or without frames of a cycle, on something has stood still, and the attempt accuses no drive.
 const STANDSTILL: Span = Span::from_millis(250);
 
 /// The most frames of an attempt that an adapter may lose.
@@ -75,7 +75,8 @@ impl Told {
 
     /// Whether an adapter, the computer or a simulated drive has stood still: what came then may be of any time since.
     fn stood_still(&self) -> bool {
-        self.way.tolerance > Span::ZERO && self.measured() >= STANDSTILL
+        let silent = self.measured().max(self.talk.longest_break());
+        self.way.tolerance > Span::ZERO && silent >= STANDSTILL
     }
 
     /// How late a frame may be, and whether replies may be overtaken: few worlds explain most conversations, and the most are tried last. In
@@ -115,8 +116,7 @@ const CHANGED_INPUTS: &str = "an input has changed, or what an input is blamed f
 const NOT_FORETOLD: &str = "what a right drive does here does not follow from what is known of it";
 pub(super) const BY_LINES: &str = "time is virtual, and its lines compare it";
 const TOO_MANY: &str = "it has more worlds than are kept";
-pub(super) const STOOD_STILL: &str =
-    "a reply took a quarter of a second or more: an adapter, the computer or the drive stood still";
+pub(super) const STOOD_STILL: &str = "nothing came for a quarter of a second or more: an adapter, the computer or the drive stood still";
 
 impl Shown {
     /// What several drives come to.

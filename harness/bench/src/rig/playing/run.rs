@@ -2,8 +2,8 @@
 
 use super::observed::Beats;
 use super::{
-    OnSegment, QualificationKeeper, QualificationRecord, QualificationStopped, Qualified,
-    QualifyingScenario, RecordedAttempt, RepeatedVerdict, SegmentJudge, SegmentRun,
+    QualificationKeeper, QualificationRecord, QualificationStopped, Qualified, QualifyingScenario,
+    RecordJudge, RecordedAttempt, RecordedBench, RepeatedVerdict, RigRun,
 };
 use crate::bus_name::BusName;
 use crate::guard::Safe;
@@ -45,7 +45,7 @@ pub trait PortPlayer: Sized {
     fn tells(&mut self, left: NotPutBack);
 
     /// What a record says of a rig on which motors may turn or not.
-    fn segment(rig: &Rig, allow_motion: bool) -> OnSegment;
+    fn segment(rig: &Rig, allow_motion: bool) -> RecordedBench;
 
     /// Reads a scenario.
     ///
@@ -257,8 +257,8 @@ impl<P: PortPlayer> PortRun<P> {
     }
 }
 
-impl<P: PortPlayer> SegmentRun for PortRun<P> {
-    fn segment(&mut self) -> OnSegment {
+impl<P: PortPlayer> RigRun for PortRun<P> {
+    fn segment(&mut self) -> RecordedBench {
         P::segment(self.session.rig(), self.options.allow_motion)
     }
 
@@ -363,7 +363,7 @@ pub struct PortJudge<P: PortPlayer> {
 }
 
 impl<P: PortPlayer> PortJudge<P> {
-    /// Of a qualification or of a run in which motors may turn, as far as the rig's file permits it; see [`SegmentJudge::adopt`].
+    /// Of a qualification or of a run in which motors may turn, as far as the rig's file permits it; see [`RecordJudge::adopt`].
     pub fn new(rig: &Rig, qualifies: bool) -> Self {
         Self {
             allow_motion: true,
@@ -434,10 +434,10 @@ impl<P: PortPlayer> PortJudge<P> {
     }
 }
 
-impl<P: PortPlayer> SegmentJudge for PortJudge<P> {
-    fn adopt(&mut self, capabilities: &[String]) -> OnSegment {
+impl<P: PortPlayer> RecordJudge for PortJudge<P> {
+    fn adopt(&mut self, capabilities: &[String]) -> RecordedBench {
         let [moving, still] = [true, false].map(|motion| P::segment(&self.rig, motion));
-        let named = |own: &OnSegment| {
+        let named = |own: &RecordedBench| {
             let own = own.capabilities.iter().map(|own| own.name());
             own.eq(capabilities.iter().map(String::as_str))
         };

@@ -17,7 +17,7 @@ pub const ON_PORT: [Capability; 3] = [Capability::Memory, Capability::Motion, Ca
 
 /// What the first line of a record says of such a rig.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct OnSegment {
+pub struct RecordedBench {
     /// Bits a second.
     pub rate: u32,
     /// How many drives the rig has.
@@ -30,7 +30,7 @@ pub struct OnSegment {
     pub anew: bool,
 }
 
-impl OnSegment {
+impl RecordedBench {
     /// What it says of a rig: its `rate` in bits a second, how exact its times are behind a port, what a simulated link can do, and whether
     /// motors may turn and EEPROMs be written.
     pub fn of(
@@ -115,9 +115,9 @@ pub trait QualificationKeeper {
 }
 
 /// A rig in use, on which scenarios of its bus are played.
-pub trait SegmentRun {
+pub trait RigRun {
     /// What a record begins with.
-    fn segment(&mut self) -> OnSegment;
+    fn segment(&mut self) -> RecordedBench;
 
     /// Why scenarios are not played that need line errors, in sentences; see [`UseOptions::tries_line_errors`].
     ///
@@ -256,9 +256,9 @@ pub enum QualificationRecord<'r> {
 }
 
 /// Judges the attempts of a record again, in their order: what one of them found out about the drives counts for those behind it.
-pub trait SegmentJudge {
+pub trait RecordJudge {
     /// Takes the capabilities in the first line of a record, and returns what that line must say. They tell whether motors could turn.
-    fn adopt(&mut self, capabilities: &[String]) -> OnSegment;
+    fn adopt(&mut self, capabilities: &[String]) -> RecordedBench;
 
     /// Whether attempts on simulated drives are played again one by one. Where drives are not restarted for each attempt, the whole run is.
     fn plays_again(&self) -> bool {
