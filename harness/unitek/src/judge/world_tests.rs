@@ -106,20 +106,16 @@ fn no_right_drive_is_accused_however_late_its_frames_are() {
     assert!(right > 100, "{right} judged");
 }
 
-/// Deviations that lie in inputs, in a position, in a register without a meaning, or in what these scenarios do not ask for.
-const NOT_FOUND: [&str; 13] = [
+/// Deviations that lie in inputs, in a register without a meaning, or in what these scenarios do not ask for.
+const NOT_FOUND: [&str; 9] = [
     "writes-without-sign",
     "interval-one-more",
     "lock-ends-cycles",
     "mask-is-fixed",
     "homing-by-any-value",
-    "preset-moves",
     "no-eeprom",
     "eeprom-levels-swapped",
     "limit-switches-swapped",
-    "always-in-tolerance",
-    "position-of-16-bits",
-    "scale-is-not-c8",
     "unassigned-reads-zero",
 ];
 

@@ -178,6 +178,7 @@ impl Player {
         let right = self.world((known, known.properties), &unlike, told);
         let others = known.candidates().into_iter().map(|own| own.1);
         let others = others.filter(|own| {
+            self.beats.beat();
             let other = self.world((known, *own), &unlike, told);
             !say_the_same(&right, &other, told)
         });
@@ -220,6 +221,7 @@ impl Player {
         shown: &Told,
         wrong: bool,
     ) -> Option<bool> {
+        self.beats.beat();
         let came = self.came_from(known, &shown.talk).ok()?;
         let (mut came, _) = Some(came).filter(|own| !own.1)?;
         // A frame that began before the first request had left belongs to what was before; stamps of adapters are not that exact.
