@@ -87,8 +87,9 @@ impl Exchange {
         last.map_or(Span::ZERO, |(at, read, _)| read.since(*at))
     }
 
-    /// The longest time for which nothing came of a register that comes by itself, more often before or afterwards: something stood still.
-    pub(super) fn longest_break(&self) -> Span {
+    /// The longest time for which something stood still: nothing came of a register that comes by itself, more often before or afterwards, or
+    /// a frame was read behind its stamp.
+    pub(super) fn longest_standstill(&self) -> Span {
         let mut streams: BTreeMap<_, Vec<Instant>> = BTreeMap::new();
         for (at, _, frame) in &self.came {
             let register = frame.data().first().copied();
@@ -112,7 +113,8 @@ impl Exchange {
                 (often && by_itself()).then_some(own)
             })
         });
-        breaks.max().unwrap_or_default()
+        let held_up = self.came.iter().map(|(at, read, _)| read.since(*at));
+        breaks.chain(held_up).max().unwrap_or_default()
     }
 
     /// A time of the link.
@@ -232,10 +234,16 @@ impl LinkNotes for FrameNotes {
 mod tests {
     use super::*;
 
+    fn at(millis: &u64) -> Instant {
+        Instant::START + Span::from_millis(*millis)
+    }
+
+    fn frame(text: &str) -> Frame {
+        text.parse().expect("a frame")
+    }
+
     /// Frames of 30 (N-ACTUAL) at these times in ms, and requests for it.
     fn longest(came: &[u64], asked: &[u64]) -> Span {
-        let at = |millis: &u64| Instant::START + Span::from_millis(*millis);
-        let frame = |text: &str| text.parse::<Frame>().expect("a frame");
         let came = came
             .iter()
             .map(|own| (at(own), at(own), frame("181#300000")));
@@ -245,7 +253,7 @@ mod tests {
             sent: sent.collect(),
             ..Exchange::default()
         };
-        talk.longest_break()
+        talk.longest_standstill()
     }
 
     /// A cycle in which a pause stands, one that has ended before a request, and requests that are far apart (UNITEK 5.2).
@@ -259,5 +267,10 @@ mod tests {
         assert_eq!(longest(&[10, 20, 30, 40], &[]), Span::ZERO);
         assert_eq!(longest(&[10, 20, 30, 331], &[330]), Span::ZERO);
         assert_eq!(longest(&[10, 311, 611], &[9, 310, 610]), Span::ZERO);
+        let late = Exchange {
+            came: vec![(at(&10), at(&400), frame("181#300000"))],
+            ..Exchange::default()
+        };
+        assert_eq!(late.longest_standstill(), Span::from_millis(390));
     }
 }

@@ -75,7 +75,7 @@ impl Told {
 
     /// Whether an adapter, the computer or a simulated drive has stood still: what came then may be of any time since.
     fn stood_still(&self) -> bool {
-        let silent = self.measured().max(self.talk.longest_break());
+        let silent = self.measured().max(self.talk.longest_standstill());
         self.way.tolerance > Span::ZERO && silent >= STANDSTILL
     }
 
