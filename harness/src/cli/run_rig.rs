@@ -18,7 +18,7 @@ use crate::evidence::{
 use crate::library::Entry;
 use crate::link::Capability;
 use crate::report::pages::Head;
-use crate::rig::playing::{QualificationKeeper, QualificationStopped, RigRun};
+use crate::rig::playing::{Play, QualificationKeeper, QualificationStopped, RigRun};
 use crate::rig::{Keeper, PlayedScenario, Rig, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Why};
 use crate::scenario::source::Source;
@@ -315,7 +315,7 @@ fn selected(
 fn keep(
     entry: &Entry,
     folder: Option<&mut Folder>,
-    play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
+    play: &mut Play<'_>,
 ) -> Result<(String, PlayedScenario), EarlyEnd> {
     let Some(folder) = folder else {
         return Ok((entry.short_name().to_owned(), play(None)?));
@@ -408,7 +408,7 @@ impl QualificationKeeper for QualificationShell<'_> {
     fn play(
         &mut self,
         source: &Source,
-        play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
+        play: &mut Play<'_>,
     ) -> Result<PlayedScenario, QualificationStopped> {
         let entry = self.entry(source)?;
         let done = keep(&entry, self.folder.as_deref_mut(), play);

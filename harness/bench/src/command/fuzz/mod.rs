@@ -41,8 +41,11 @@ pub struct FuzzCommands {
     /// `fuzz power`, where the bus has it.
     pub power: Option<Power>,
     /// The page of a run, made from its folder; `None` for a bus whose runs have no page.
-    pub page: Option<fn(&Path) -> Result<String, ExploreError>>,
+    pub page: Option<Page>,
 }
+
+/// Makes the page of the run in a folder.
+type Page = fn(&Path) -> Result<String, ExploreError>;
 
 /// Counts the cases that it takes to find each deviation.
 type Power = fn(&PowerArguments, &'static RigBuses, &mut Output) -> std::io::Result<Exit>;

@@ -72,6 +72,9 @@ pub struct Qualified {
     pub verdict: Verdict,
 }
 
+/// Plays a scenario into what keeps it.
+pub type Play<'p> = dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError> + 'p;
+
 /// A qualification was ended by what keeps its scenarios.
 #[derive(Clone, Copy, Debug)]
 pub struct QualificationStopped;
@@ -88,7 +91,7 @@ pub trait QualificationKeeper {
     fn play(
         &mut self,
         source: &Source,
-        play: &mut dyn FnMut(Option<&mut dyn Keeper>) -> Result<PlayedScenario, SessionError>,
+        play: &mut Play<'_>,
     ) -> Result<PlayedScenario, QualificationStopped>;
 
     /// Shows the outcome of a scenario.
