@@ -4,6 +4,7 @@ use crate::command::drive::DriveCommand;
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
+use crate::command::port_bench::PortBench;
 use crate::guard::{Guarded, Safe};
 use crate::link::{Line, Link, Trouble};
 use crate::medium::Medium;
@@ -129,7 +130,7 @@ pub trait HeldDrives: PortDrives {
     /// # Errors
     /// [`Failure`].
     fn perform(
-        session: &mut PortSession<Self>,
+        bench: PortBench<'_, Self>,
         command: &DriveCommand,
         output: &mut Output,
     ) -> Result<Exit, Failure>;
@@ -177,7 +178,7 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
     }
 
     fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
-        D::perform(self.session(), &command, output)
+        D::perform(PortBench::Held(self.session()), &command, output)
     }
 
     fn pass(&mut self, time: Span) -> Result<(), Failure> {

@@ -4,9 +4,12 @@ use super::drive::DriveCommand;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::fuzz::FuzzCommands;
-use super::held::HeldBench;
+use super::held::{HeldBench, HeldDrives, HeldPort};
 use super::output::Output;
+use super::port_bench::PortBench;
 use super::rig_failure::exit_of;
+use crate::explore::line::LineRig;
+use crate::rig::playing::run::{PortJudge, PortRun};
 use crate::rig::playing::{RecordJudge, RigRun};
 use crate::rig::{Rig, SessionError, UseOptions};
 use std::rc::Rc;
@@ -32,9 +35,34 @@ pub struct RigCommands {
     pub command: RunCommand,
     pub hold: OpenSession,
     /// Runs `rig check`, as text or for tools.
-    pub check: fn(&Rig, &UseOptions, bool, &mut Output) -> Result<Exit, Failure>,
+    pub check: Check,
     /// Explores its drives.
     pub fuzz: FuzzCommands,
+}
+
+/// Runs `rig check`.
+type Check = fn(&Rig, &UseOptions, bool, &mut Output) -> Result<Exit, Failure>;
+
+impl RigCommands {
+    /// Those of a bus behind `[port.1]`.
+    pub const fn of_port<D: HeldDrives, B: LineRig>(check: Check) -> Self {
+        Self {
+            // Of a file of its own the drives are set up, or the limits are to be tried.
+            is_bare: |rig| rig.origin.starts_with("sim:"),
+            run: |rig, options| Ok(Box::new(PortRun::<D::Player>::open(rig, options)?)),
+            judge: |rig, qualifies| Ok(Box::new(PortJudge::<D::Player>::new(rig, qualifies))),
+            command: |rig, command, output| match rig {
+                Some(rig) => D::perform(PortBench::Rig(&rig), &command, output),
+                None => Err(Failure::refused("--rig names no bench of this bus")),
+            },
+            hold: |rig, options, _| {
+                let held = HeldPort::<D>::open(rig, options).map_err(unusable)?;
+                Ok(Box::new(held))
+            },
+            check,
+            fuzz: FuzzCommands::of_line::<B>(),
+        }
+    }
 }
 
 /// A rig that cannot be used, as the failure of a command.

@@ -21,13 +21,8 @@ pub(crate) use session::{Inverters, OfNordac, Session};
 
 use super::language::Nordac;
 use super::simulate::Setup;
-use harness_bench::command::failure::Failure;
-use harness_bench::command::fuzz::FuzzCommands;
-use harness_bench::command::held::HeldPort;
-use harness_bench::command::port_bench::PortBench;
-use harness_bench::command::rig_commands::{RigCommands, unusable};
+use harness_bench::command::rig_commands::RigCommands;
 use harness_bench::rig::buses::PortRow;
-use harness_bench::rig::playing::run::{PortJudge, PortRun};
 use harness_bench::rig::port_file::{Node, Port, PortBus};
 use harness_bench::scenario::parse::header::{Part, header_lines, read};
 use harness_bench::scenario::plan::plan as settle;
@@ -74,23 +69,8 @@ pub(crate) const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub(crate) const COMMANDS: RigCommands = RigCommands {
-    // Of a file of its own the drives are set up, or the limits are to be tried.
-    is_bare: |rig| rig.origin.starts_with("sim:"),
-    run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
-    judge: |rig, qualifies| Ok(Box::new(PortJudge::<Player>::new(rig, qualifies))),
-    command: |rig, command, output| match rig {
-        Some(rig) => super::cli::drive(PortBench::Rig(&rig), &command, output),
-        None => Err(Failure::refused("--rig names no bench of this bus")),
-    },
-    hold: |rig, options, _| {
-        Ok(Box::new(
-            HeldPort::<Inverters>::open(rig, options).map_err(unusable)?,
-        ))
-    },
-    check: super::cli::check,
-    fuzz: FuzzCommands::of_line::<Nordac>(),
-};
+pub(crate) const COMMANDS: RigCommands =
+    RigCommands::of_port::<Inverters, Nordac>(super::cli::check);
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
 fn simulated(drives: u8) -> (String, String) {

@@ -18,11 +18,11 @@ impl HeldDrives for UnitekDrives {
     type Player = Player;
 
     fn perform(
-        session: &mut PortSession<Self>,
+        bench: PortBench<'_, Self>,
         command: &DriveCommand,
         output: &mut Output,
     ) -> Result<Exit, Failure> {
-        super::drive(PortBench::Held(session), command, output)
+        super::drive(bench, command, output)
     }
 
     fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure> {

@@ -21,13 +21,8 @@ pub(crate) use set_back::HeldBefore;
 use super::language::Unitek;
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use harness_bench::command::failure::Failure;
-use harness_bench::command::fuzz::FuzzCommands;
-use harness_bench::command::held::HeldPort;
-use harness_bench::command::port_bench::PortBench;
-use harness_bench::command::rig_commands::{RigCommands, unusable};
+use harness_bench::command::rig_commands::RigCommands;
 use harness_bench::rig::buses::PortRow;
-use harness_bench::rig::playing::run::{PortJudge, PortRun};
 use harness_bench::rig::port_file::{CONFIRMATION, Node, Port, PortBus};
 use harness_bench::scenario::parse::header::header_lines;
 use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
@@ -62,23 +57,8 @@ pub(crate) const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub(crate) const COMMANDS: RigCommands = RigCommands {
-    // Of a file of its own the drives are set up, or the limits are to be tried.
-    is_bare: |rig| rig.origin.starts_with("sim:"),
-    run: |rig, options| Ok(Box::new(PortRun::<Player>::open(rig, options)?)),
-    judge: |rig, qualifies| Ok(Box::new(PortJudge::<Player>::new(rig, qualifies))),
-    command: |rig, command, output| match rig {
-        Some(rig) => super::cli::drive(PortBench::Rig(&rig), &command, output),
-        None => Err(Failure::refused("--rig names no bench of this bus")),
-    },
-    hold: |rig, options, _| {
-        Ok(Box::new(
-            HeldPort::<UnitekDrives>::open(rig, options).map_err(unusable)?,
-        ))
-    },
-    check: super::cli::check,
-    fuzz: FuzzCommands::of_line::<Unitek>(),
-};
+pub(crate) const COMMANDS: RigCommands =
+    RigCommands::of_port::<UnitekDrives, Unitek>(super::cli::check);
 
 fn simulated(drives: u8) -> (String, String) {
     let nodes = (1..=drives).map(|node| format!("{{ node = {node} }}"));
