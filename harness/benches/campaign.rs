@@ -1,13 +1,14 @@
 //! How long a case of a campaign takes: a ring is disturbed, read, repaired and compared.
 //!
-//! `cases` plays each case on a copy of the ring, from the start. `ring` is the baseline: the same ring is copied and carries the same
-//! bytes, without a check. `shared` plays the same cases as a campaign does: they share what they have in common.
+//! `shared` plays cases as a campaign does: they share what they have in common. `alone` is the baseline: the scenario of each case, on a ring
+//! of its own.
 
 use divan::counter::ItemsCount;
-use harness::buses::novobus::campaign::find::find;
-use harness::buses::novobus::campaign::{Campaign, CaseFaults};
-use harness::buses::novobus::simulate::bench;
-use harness::link::Octets;
+use harness::buses::novobus::BUS;
+use harness::campaign::Campaign;
+use harness::library::Entry;
+use harness::scenario::run::AtMismatch;
+use harness::scenario::source::Source;
 use std::path::Path;
 
 const CAMPAIGNS: [&str; 3] = [
@@ -19,60 +20,43 @@ const CAMPAIGNS: [&str; 3] = [
 /// Step between the cases that are played, so that links and bytes of all kinds are among them.
 const STRIDE: usize = 97;
 
+/// How many are played.
+const CASES: usize = 32;
+
 fn main() {
     divan::main();
 }
 
-fn load(name: &str) -> (Campaign, Vec<CaseFaults>) {
-    let campaign = find(Path::new(name)).expect("a built-in campaign");
-    let cases = campaign.cases.iter().step_by(STRIDE).take(32);
-    let cases = cases.copied().collect();
-    (campaign, cases)
-}
-
-#[divan::bench(args = CAMPAIGNS)]
-fn cases(bencher: divan::Bencher<'_, '_>, name: &str) {
-    let (campaign, cases) = load(name);
-    bencher
-        .counter(ItemsCount::new(cases.len()))
-        .bench_local(|| {
-            let classes = cases.iter().map(|case| campaign.play(case));
-            classes.filter(Result::is_ok).count()
-        });
+fn load(name: &str) -> Box<dyn Campaign> {
+    let found = (BUS.campaign)(Path::new(name)).expect("a built-in campaign");
+    let mut campaign = found.expect("a campaign");
+    campaign.keep(&|place| place.is_multiple_of(STRIDE) && place / STRIDE < CASES);
+    campaign
 }
 
 #[divan::bench(args = CAMPAIGNS)]
 fn shared(bencher: divan::Bencher<'_, '_>, name: &str) {
-    let (campaign, cases) = load(name);
+    let campaign = load(name);
     bencher
-        .counter(ItemsCount::new(cases.len()))
-        .bench_local(|| {
-            let mut player = campaign.player();
-            let classes = cases.iter().map(|case| player.play(case));
-            classes.filter(Result::is_ok).count()
-        });
+        .counter(ItemsCount::new(campaign.cases()))
+        .bench_local(|| campaign.run(1, &|_| {}).map(|played| played.cases()));
 }
 
 #[divan::bench(args = CAMPAIGNS[..2].iter())]
-fn ring(bencher: divan::Bencher<'_, '_>, name: &str) {
-    let (campaign, cases) = load(name);
-    let mut start = bench(&campaign.entry.plan);
-    start.stop_recording();
-    let said: Vec<Vec<u8>> = cases
-        .iter()
-        .map(|case| {
-            let (_, said) = campaign.play(case).expect("a class");
-            said.into_iter().flat_map(|said| said.bytes).collect()
-        })
-        .collect();
+fn alone(bencher: divan::Bencher<'_, '_>, name: &str) {
+    let campaign = load(name);
+    let entries = campaign.names().into_iter().map(|case| {
+        let text = campaign.scenario(&case).expect("a case");
+        let source = Source::from_bytes(case, text.into_bytes()).expect("a text");
+        Entry::new(source, None).expect("a scenario")
+    });
+    let entries: Vec<_> = entries.collect();
     bencher
-        .counter(ItemsCount::new(cases.len()))
+        .counter(ItemsCount::new(entries.len()))
         .bench_local(|| {
-            for bytes in &said {
-                let mut link = start.clone();
-                let end = link.send_octets(0, bytes);
-                link.run_until(end);
-                while link.receive_octet(0).is_some() {}
+            for entry in &entries {
+                let mut link = entry.settled.simulate();
+                entry.settled.play(&mut *link, AtMismatch::GoOn);
             }
         });
 }

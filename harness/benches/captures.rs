@@ -2,12 +2,11 @@
 //! the same bytes and copies them; and the picture of the 100-axis run (ND21 9.7).
 
 use divan::counter::ItemsCount;
-use harness::buses::novobus::report::csv;
-use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
-use harness::buses::novobus::report::vcd;
-use harness::buses::novobus::report::vcd::Signals;
+use harness::buses::novobus::BUS;
 use harness::capture::read;
 use harness::report::pcapng;
+use harness::report::vcd::Signals;
+use harness::shown::{FileForm, RowPlacing, ShownRun};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
 use harness_sim::record::LineByte;
@@ -45,6 +44,19 @@ fn million() -> Vec<Trace> {
         channels: links.collect(),
         ..Trace::empty(3)
     }]
+}
+
+fn written(traces: &[Trace], form: FileForm) -> Vec<u8> {
+    let run = ShownRun {
+        title: "100 axes",
+        traces,
+        records: &[],
+        rate: Rate::Baud38400,
+    };
+    let mut out = Vec::new();
+    let done = BUS.report.write(&run, form, &mut out);
+    done.expect("a Vec takes everything");
+    out
 }
 
 /// The baseline: the same bytes, copied as they are.
@@ -92,18 +104,16 @@ fn vcd_written(bencher: divan::Bencher<'_, '_>, vectors: bool) {
     } else {
         Signals::Lines
     };
-    bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
-        let mut out = Vec::new();
-        vcd::write(&traces, Rate::Baud38400, signals, &mut out).expect("a Vec takes everything");
-        out
-    });
+    let form = FileForm::Vcd(signals);
+    bencher
+        .counter(ItemsCount::new(BYTES))
+        .bench_local(|| written(&traces, form.clone()));
 }
 
 /// The levels of the lines, decoded.
 #[divan::bench(sample_count = 5)]
 fn vcd_read(bencher: divan::Bencher<'_, '_>) {
-    let mut file = Vec::new();
-    vcd::write(&million(), Rate::Baud38400, Signals::Lines, &mut file).expect("a Vec");
+    let file = written(&million(), FileForm::Vcd(Signals::Lines));
     bencher
         .counter(ItemsCount::new(BYTES))
         .bench_local(|| read(&file, None).expect("a capture"));
@@ -111,8 +121,7 @@ fn vcd_read(bencher: divan::Bencher<'_, '_>) {
 
 #[divan::bench(sample_count = 5)]
 fn csv_read(bencher: divan::Bencher<'_, '_>) {
-    let mut file = Vec::new();
-    csv::write(&million(), &mut file).expect("a Vec");
+    let file = written(&million(), FileForm::Csv);
     bencher
         .counter(ItemsCount::new(BYTES))
         .bench_local(|| read(&file, None).expect("a capture"));
@@ -121,40 +130,32 @@ fn csv_read(bencher: divan::Bencher<'_, '_>) {
 #[divan::bench(sample_count = 10)]
 fn csv_written(bencher: divan::Bencher<'_, '_>) {
     let traces = million();
-    bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
-        let mut out = Vec::new();
-        csv::write(&traces, &mut out).expect("a Vec takes everything");
-        out
-    });
+    bencher
+        .counter(ItemsCount::new(BYTES))
+        .bench_local(|| written(&traces, FileForm::Csv));
 }
 
 /// The picture of the 100-axis parity error and its check sequence, 7777 bytes on 101 links.
 #[divan::bench(args = ["index", "time"])]
 fn picture(bencher: divan::Bencher<'_, '_>, scale: &str) {
     let traces = hundred();
-    let options = SvgOptions {
-        title: "100 axes",
-        id: "ring",
-        scale: if scale == "time" {
-            RowPlacing::Time
-        } else {
-            RowPlacing::Index
-        },
-        rate: Rate::Baud38400,
-        rows: None,
+    let placing = match scale {
+        "time" => RowPlacing::Time,
+        _ => RowPlacing::Index,
     };
-    bencher.bench_local(|| svg(&traces, &options));
+    let form = FileForm::Svg(placing, None);
+    bencher.bench_local(|| written(&traces, form.clone()));
 }
 
 fn hundred() -> Vec<Trace> {
     use harness::library::Entry;
-    use harness::link::Link;
+    use harness::scenario::run::AtMismatch;
     use harness::scenario::source::Source;
     let text = include_str!("../../corpora/scenarios/novobus/9.8-check-sequence.scn");
     let source = Source::from_bytes("9.8".to_owned(), text.into()).expect("a text");
     let entry = Entry::new(source, None).expect("a scenario");
-    let plan = entry.plan.expect("novobus");
-    let mut link = harness::buses::novobus::simulate::simulated(&plan);
-    harness::scenario::run::run(&plan, &mut link);
+    let plan = &entry.settled;
+    let mut link = plan.simulate();
+    plan.play(&mut *link, AtMismatch::Stop);
     vec![link.trace(0)]
 }

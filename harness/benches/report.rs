@@ -1,13 +1,12 @@
 //! How long the page of a 100-axis run takes (the parity error of ND21 9.7 and the check sequence of 9.8), beside a baseline that
-//! only reads what every byte is; and how long a browser takes to open it, beside an empty page.
+//! only writes what every byte is, as CSV; and how long a browser takes to open it, beside an empty page.
 
-use harness::buses::novobus::report::walk::Reader;
-use harness::buses::novobus::simulate::simulated;
+use harness::buses::novobus::BUS;
 use harness::library::Entry;
-use harness::link::Link;
-use harness::report::pages::{Head, ScenarioView, run, section};
-use harness::scenario::run::{AtMismatch, Outcome, play};
+use harness::scenario::run::{AtMismatch, Outcome};
 use harness::scenario::source::Source;
+use harness::shown::{FileForm, ShownRun};
+use harness::shown::{Head, ScenarioView, run, section};
 use harness_sim::record::Trace;
 use std::process::Command;
 
@@ -30,9 +29,9 @@ fn played() -> Vec<(Entry, Outcome, Vec<Trace>)> {
     let all = TEXTS.map(|(name, text)| {
         let source = Source::from_bytes(name.to_owned(), text.into()).expect("a text");
         let entry = Entry::new(source, None).expect("a scenario");
-        let plan = entry.plan.as_ref().expect("novobus");
-        let mut link = simulated(plan);
-        let outcome = play(plan, &mut link, AtMismatch::Stop);
+        let plan = &entry.settled;
+        let mut link = plan.simulate();
+        let outcome = plan.play(&mut *link, AtMismatch::Stop);
         let traces = vec![link.trace(0)];
         (entry, outcome, traces)
     });
@@ -53,7 +52,7 @@ fn page_of(all: &[(Entry, Outcome, Vec<Trace>)]) -> String {
                 text: &entry.source.text,
                 outcome,
                 traces,
-                report: None,
+                report: BUS.report,
                 rate: harness_proto::line::Rate::default(),
                 again: "",
             };
@@ -105,21 +104,20 @@ fn empty_page_opened(bencher: divan::Bencher<'_, '_>) {
     open(bencher, "<!doctype html><title>nothing</title>");
 }
 
-/// The baseline: what every byte is, and nothing written.
+/// The baseline: what every byte is, as rows of text.
 #[divan::bench]
 fn bytes_read(bencher: divan::Bencher<'_, '_>) {
     let all = played();
     bencher.bench_local(|| {
-        let traces = all.iter().flat_map(|(.., traces)| traces);
-        let links = traces.flat_map(|trace| trace.channels.iter().zip(Reader::all(trace)));
-        links
-            .map(|(link, mut reader)| {
-                let known = link
-                    .octets()
-                    .iter()
-                    .filter(|byte| reader.see(byte).meaning.drive.is_some());
-                known.count()
-            })
-            .sum::<usize>()
+        for (.., traces) in &all {
+            let run = ShownRun {
+                title: "",
+                traces,
+                records: &[],
+                rate: harness_proto::line::Rate::default(),
+            };
+            let written = BUS.report.write(&run, FileForm::Csv, &mut std::io::sink());
+            written.expect("a sink takes everything");
+        }
     });
 }

@@ -18,15 +18,12 @@
 #[expect(dead_code, reason = "only tests write a rig file of it")]
 mod ring;
 
-use harness::buses::novobus::language::plan::Plan;
-use harness::buses::novobus::rig::{Run, Session};
-use harness::buses::novobus::simulate;
+use harness::buses::novobus::BUS;
 use harness::buses::parse_rig as parse;
 use harness::library::Entry;
-use harness::link::{Line, Link, Octets};
 use harness::port::PortAddress;
 use harness::rig::{Rig, UseOptions};
-use harness::scenario::run::{AtMismatch, play};
+use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;
 use harness_sim::record::LineByte;
@@ -229,13 +226,13 @@ fn main() {
                 text: case.text.clone().into(),
             };
             let entry = Entry::new(source, Some(drives)).expect("a scenario");
-            let plan = entry.plan.as_ref().expect("a plan");
-            let mut link = simulate::bench(plan);
-            let virtual_time = play(plan, &mut link, AtMismatch::Stop);
+            let mut link = entry.settled.simulate();
+            let virtual_time = entry.settled.play(&mut *link, AtMismatch::Stop);
             assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
             let wire = virtual_time.took.as_millis_f64() / 1e3;
-            let chunks = chunks(&link.trace(0), link.byte_time());
-            let (all, turns) = in_turns(address(&for_bare), &chunks, &rig(&for_bench), plan);
+            let chunks = chunks(&link.trace(0), entry.rate().byte_time());
+            let (all, turns) =
+                in_turns(address(&for_bare), &chunks, &rig(&for_bench), &entry.source);
             let added = |clock: f64| 100.0 * (clock / wire - 1.0);
             let own = |than: fn(&Turn) -> f64| {
                 100.0 * middle(&all, |turn| turn.bench.clock - than(turn)) / wire
@@ -282,18 +279,18 @@ fn rig(served: &Served) -> Rig {
 
 /// The conversation by the bare program, asleep and awake, and on a rig in use, again and again: its own time, and what it cost of a processor.
 /// The second value says how many turns it took.
-fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<Turn>, usize) {
+fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, source: &Source) -> (Vec<Turn>, usize) {
     let mut stream = TcpStream::connect(address).expect("a server");
     stream.set_nodelay(true).expect("no delay");
-    let mut session = Session::open(rig, &UseOptions::default()).expect("a rig in use");
-    let mut run = Run::new(&mut session).expect("a model");
+    let commands = BUS.rigs.as_ref().expect("rigs of rings");
+    let mut run = (commands.run)(rig, &UseOptions::default()).expect("a rig in use");
     let calm = |turn: &&(f64, _)| turn.0 < DISTURBED;
     let mut turn = || {
         let before = taken_away();
         let asleep = bare(&mut stream, chunks, false);
         let awake = bare(&mut stream, chunks, true);
         let bench = Took::of(|| {
-            let played = run.play(plan, None).expect("a healthy rig");
+            let played = run.play(source, None).expect("a healthy rig");
             assert!(played.outcome.finding.is_none(), "{:?}", played.outcome);
             Some(played.outcome.took.as_millis_f64() / 1e3)
         });
@@ -317,7 +314,7 @@ fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<Tur
     all.sort_by(|one, other| one.0.total_cmp(&other.0));
     all.truncate(TIMES);
     let all = all.into_iter().map(|(_, turn)| turn).collect();
-    assert_eq!(session.link().trouble(), None);
-    let _end = session.close();
+    assert_eq!(run.trouble(), None);
+    let _end = run.close(false);
     (all, turns)
 }

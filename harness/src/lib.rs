@@ -31,16 +31,16 @@
 //! and may change with every version; `ARCHITECTURE.md` describes them, and `cargo doc --document-private-items` shows them.
 #![forbid(unsafe_code)]
 
-#[doc(inline)]
-pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
 pub use harness_bench::{
     bus, bus_name, campaign, capture, explore, file, frames, guard, html, link, listen, manual,
-    medium, partition, port, qualify, regular, rig, scenario, serve, signals, top, traffic,
-    trouble, web,
+    medium, partition, port, qualify, regular, rig, scenario, serve, shown, signals, top, trouble,
+    web,
 };
 use harness_proto::counted;
+#[doc(inline)]
+pub use harness_proto::nd21::State;
 #[doc(inline)]
 pub use scenario::verdict::Verdict;
 

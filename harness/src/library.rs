@@ -1,16 +1,15 @@
 //! A scenario of any bus, read and settled.
 
-use crate::bus_name::BusName;
+use crate::bus::Bus;
 use crate::buses::named;
-use crate::buses::novobus::language::plan::Plan;
-use crate::buses::novobus::language::read::RingScenario;
 use crate::scenario::files;
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
-use crate::scenario::settled::Settled;
+use crate::scenario::settled::{BenchSize, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::ScenarioHead;
-use crate::traffic::SegmentReport;
+use crate::shown::SegmentReport;
+use harness_proto::line::Rate;
 use std::sync::Arc;
 
 /// A scenario, read and settled, and not yet played.
@@ -22,10 +21,10 @@ pub struct Entry {
     pub source: Source,
     /// What it says in the words of every bus.
     pub scenario: ScenarioHead,
-    /// The same settled for a bench of a given size; `None` for another bus.
-    pub plan: Option<Plan>,
-    /// The same of another bus; `None` for [`BusName::DEFAULT`], and for a bus that is not built.
-    pub other: Option<Arc<dyn Settled>>,
+    /// The same, settled for a bench of one size.
+    pub settled: Arc<dyn Settled>,
+    /// How what it carries is shown.
+    pub report: &'static dyn SegmentReport,
 }
 
 impl Entry {
@@ -34,24 +33,27 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
-        let bus = parse::bus(&source);
-        if bus != BusName::DEFAULT {
-            let found = (named(bus).settle)(&source, size)?;
-            return Ok(Self::of_other(source, found));
-        }
-        Ok(RingScenario::new(source, size)?.into())
+        Self::read(source, size.map_or(BenchSize::Own, BenchSize::Of))
     }
 
-    /// A scenario of another bus than [`BusName::DEFAULT`], read and settled.
-    pub(crate) fn of_other(source: Source, found: (ScenarioHead, Arc<dyn Settled>)) -> Self {
-        let (scenario, other) = found;
-        Self {
+    fn read(source: Source, size: BenchSize) -> Result<Self, Box<Problems>> {
+        Self::of(named(parse::bus(&source)), source, size)
+    }
+
+    /// The same with the words of this bus.
+    pub(crate) fn of(
+        bus: &'static Bus,
+        source: Source,
+        size: BenchSize,
+    ) -> Result<Self, Box<Problems>> {
+        let (scenario, settled) = (bus.settle)(&source, size)?;
+        Ok(Self {
             name: source.name.clone(),
             source,
             scenario,
-            plan: None,
-            other: Some(other),
-        }
+            settled,
+            report: bus.report,
+        })
     }
 
     /// Reads and settles a scenario, for a ring of this many drives where it is for several sizes and that is one of them.
@@ -59,10 +61,7 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
-        if parse::bus(&source) != BusName::DEFAULT {
-            return Self::new(source, None);
-        }
-        Ok(RingScenario::fitting(source, drives)?.into())
+        Self::read(source, drives.map_or(BenchSize::Own, BenchSize::Fitting))
     }
 
     /// The name without folders and ending.
@@ -71,23 +70,17 @@ impl Entry {
         files::last(&self.name)
     }
 
-    /// The scenario settled, of whichever bus; `None` for a bus that is not built.
-    #[must_use]
-    pub fn settled(&self) -> Option<&dyn Settled> {
-        let own = self.plan.as_ref().map(|plan| plan as &dyn Settled);
-        own.or(self.other.as_deref())
-    }
-
-    /// How what it carries is shown; `None` for a ring.
-    #[must_use]
-    pub fn report(&self) -> Option<&'static dyn SegmentReport> {
-        self.settled()?.report()
-    }
-
-    /// How many drives its bench has, as `3+1`; empty for a bus that is not built yet.
+    /// How many drives its bench has, as `3+1`.
     #[must_use]
     pub fn drives(&self) -> String {
-        self.settled().map_or(String::new(), Settled::size)
+        self.settled.size()
+    }
+
+    /// The rate of its line, where it is that of a ring.
+    #[must_use]
+    pub fn rate(&self) -> Rate {
+        let rings = self.settled.rings();
+        rings.map(|own| own.rate).unwrap_or_default()
     }
 
     /// Whether the text occurs in the name, the title or a source.
@@ -106,21 +99,10 @@ impl Entry {
     }
 }
 
-impl From<RingScenario> for Entry {
-    fn from(own: RingScenario) -> Self {
-        Self {
-            name: own.source.name.clone(),
-            source: own.source,
-            scenario: own.scenario.head(),
-            plan: Some(own.plan),
-            other: None,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bus_name::BusName;
     use crate::scenario::files::sources;
 
     /// `run --ring N` reads every scenario for the size where it allows it: none may be wrong at an end of its range.
@@ -132,13 +114,13 @@ mod tests {
             if parse::bus(&source) != BusName::DEFAULT {
                 continue;
             }
-            let read = RingScenario::new(source, None).expect("a scenario");
-            let own = &read.scenario.header.rings[0];
-            for size in [own.smallest, own.largest] {
+            let read = Entry::new(source, None).expect("a scenario");
+            let (smallest, largest) = read.settled.rings().expect("rings").sizes[0];
+            for size in [smallest, largest] {
                 if let Err(problems) = Entry::new(read.source.clone(), Some(size)) {
                     wrong.push(format!("{name} on a ring of {size}: {problems}"));
                 }
-                ends += usize::from(own.smallest != own.largest);
+                ends += usize::from(smallest != largest);
             }
         }
         assert_eq!(wrong, [""; 0]);

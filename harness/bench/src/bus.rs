@@ -1,9 +1,9 @@
 //! What the program asks of a bus. The crate of a bus exports one [`Bus`].
 
 use crate::bus_name::BusName;
-use crate::campaign::line::LineCampaign;
+use crate::campaign::{Campaign, CampaignError};
 use crate::capture::live::LiveText;
-use crate::capture::{Carries, JudgedFrames, RecordedPlace};
+use crate::capture::{Capture, Carries, JudgeOptions, JudgedCapture, RecordedPlace};
 use crate::command::args::CellsArguments;
 use crate::command::deviations::DeviationRow;
 use crate::command::exit::Exit;
@@ -11,17 +11,17 @@ use crate::command::failure::Failure;
 use crate::command::output::Output;
 use crate::command::rig_commands::RigCommands;
 use crate::command::sim::SimArguments;
+use crate::embed::Embedding;
+use crate::link::Capability;
 use crate::manual::Manual;
-use crate::rig::buses::{PortRow, RigBuses};
+use crate::rig::buses::{PortRow, RigBuses, RingRow};
 use crate::scenario::problem::Problems;
-use crate::scenario::settled::Settled;
+use crate::scenario::settled::{BenchSize, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::ScenarioHead;
 use crate::serve::{ServeEnd, ServeError};
-use crate::traffic::SegmentReport;
-use harness_proto::time::Span;
+use crate::shown::SegmentReport;
 use harness_sim::fuzz::{FuzzTarget, Noting};
-use harness_sim::record::Trace;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,14 +31,8 @@ pub type Found = Result<(ScenarioHead, Arc<dyn Settled>), Problems>;
 /// How serving ended.
 pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
 
-/// A campaign that was found and read; or what is wrong with it, with file, place and remedy.
-pub(crate) type ReadCampaign = Result<Box<dyn LineCampaign>, String>;
-
-/// Makes a scenario of traces, with this title and the drives' header.
-type Replayed = fn(&[Trace], &str, Option<&Source>) -> Result<String, String>;
-
-/// Judges traces by the drives' header: the drives that are named, or all; times may be off by as much.
-type JudgedCapture = fn(&[Trace], Option<&Source>, (&[u8], Span)) -> Result<JudgedFrames, String>;
+/// A campaign that was found and read; or what is wrong with it.
+pub(crate) type ReadCampaign = Result<Box<dyn Campaign>, CampaignError>;
 
 /// A bus.
 pub struct Bus {
@@ -48,8 +42,10 @@ pub struct Bus {
     pub carries: Carries,
     /// The built-in scenario that shows it at work.
     pub example: &'static str,
-    /// Reads and settles a scenario, for a ring of that many drives where the number is given.
-    pub settle: fn(&Source, Option<u8>) -> Found,
+    /// Reads and settles a scenario.
+    pub settle: fn(&Source, BenchSize) -> Found,
+    /// Writes what a scenario says and reads it again, in tests: a panic, if that is another scenario.
+    pub comes_back: fn(&Source) -> Result<(), Problems>,
     /// The names of what its drives hold, for completions.
     pub cell_names: fn() -> Vec<String>,
     /// Lists what its drives hold.
@@ -60,12 +56,28 @@ pub struct Bus {
     pub dissector: fn() -> String,
     /// Serves simulated drives.
     pub sim: fn(&SimArguments, &'static RigBuses, &mut Output) -> Served,
+    /// What a simulated bench of its own can do.
+    pub simulates: &'static [Capability],
     /// Text of what a place of a capture carries, while it arrives; with the number of drives where it is known.
     pub live: fn(&RecordedPlace, Option<u8>) -> Box<dyn LiveText>,
+    /// How what it carries is shown.
+    pub report: &'static dyn SegmentReport,
+    /// Judges a capture; or what is missing, in a sentence.
+    pub judged: fn(&Capture, &JudgeOptions<'_>) -> Result<JudgedCapture, String>,
+    /// A scenario that replays a capture; or what is missing.
+    pub replayed: fn(&Capture, &JudgeOptions<'_>) -> Result<String, String>,
     /// Targets whose inputs are bytes or frames of the bus, and what their inputs reach.
     pub fuzz: (&'static [FuzzTarget], &'static [Noting]),
     /// What the commands ask of its rigs; `None` for a bus that has none.
     pub rigs: Option<RigCommands>,
+    /// The names of the built-in campaigns, in order.
+    pub campaigns: fn() -> Vec<String>,
+    /// Reads a campaign: a file that names the bus, or a built-in one by its name. `None` where it is neither.
+    pub campaign: fn(&Path) -> Option<ReadCampaign>,
+    /// What it lends to other programs in Rust; `None` where this is not built.
+    pub embedding: Option<Embedding>,
+    /// What the files of rigs ask of its rings; `None` where stations share one line.
+    pub rings: Option<RingRow>,
     /// What it has where its stations share one line; `None` for rings.
     pub shared: Option<SharedLine>,
 }
@@ -74,15 +86,6 @@ pub struct Bus {
 pub struct SharedLine {
     /// What the files of rigs ask.
     pub port: &'static PortRow,
-    pub report: &'static dyn SegmentReport,
     /// The file that describes this many drives to other tools.
     pub description: fn(u16) -> String,
-    /// A scenario that replays a capture; or what is missing, in a sentence.
-    pub replayed: Replayed,
-    /// Judges a capture; or what is missing.
-    pub judged: JudgedCapture,
-    /// The names of the built-in campaigns, in order.
-    pub campaigns: fn() -> Vec<String>,
-    /// Reads a campaign: a file that names the bus, or a built-in one by its name. `None` where it is neither.
-    pub campaign: fn(&Path) -> Option<ReadCampaign>,
 }

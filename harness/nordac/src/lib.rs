@@ -29,9 +29,11 @@ mod value;
 
 use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::line::LineCampaign;
-use harness_bench::capture::Carries;
+use harness_bench::campaign::{Campaign, CampaignError};
+use harness_bench::capture::{Carries, judged_frames, replayed_frames};
+use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
+use harness_bench::shown::SegmentReport as _;
 use harness_sim::nordac::fuzz;
 
 /// The GSD file: the unit master file of the manual.
@@ -44,24 +46,32 @@ pub static BUS: Bus = Bus {
     carries: Carries::Line,
     example: "nordac-3.3-start-up",
     settle: settled::settle::<language::Nordac>,
+    comes_back: comes_back::<language::Nordac>,
     cell_names: || cli::cells::names().collect(),
     cells: cli::cells::cells,
     deviations: deviations::rows,
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
+    simulates: &simulate::Bench::CAPABILITIES,
     live: |_, _| Box::<report::live::TelegramText>::default(),
+    report: &report::TelegramReport,
+    judged: |capture, options| {
+        let pieces = report::TelegramReport.counted(&capture.traces);
+        judged_frames(capture::judged, pieces, (capture, options))
+    },
+    replayed: |capture, options| replayed_frames(capture::scenario, (capture, options)),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
     rigs: Some(rig::COMMANDS),
+    campaigns: campaign::names,
+    campaign: |name| {
+        let found = campaign::find(name)?.map(|own| -> Box<dyn Campaign> { Box::new(own) });
+        Some(found.map_err(CampaignError::Said))
+    },
+    embedding: None,
+    rings: None,
     shared: Some(SharedLine {
         port: &rig::PORT,
-        report: &report::TelegramReport,
         description: |_| GSD.to_owned(),
-        replayed: capture::scenario,
-        judged: capture::judged,
-        campaigns: campaign::names,
-        campaign: |name| {
-            Some(campaign::find(name)?.map(|own| -> Box<dyn LineCampaign> { Box::new(own) }))
-        },
     }),
 };
 

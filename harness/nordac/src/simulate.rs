@@ -112,7 +112,7 @@ pub(crate) struct Bench {
 
 impl Bench {
     /// What a simulated bench can do.
-    pub(super) const CAPABILITIES: [Capability; 9] = [
+    pub(crate) const CAPABILITIES: [Capability; 9] = [
         Capability::Interposer,
         Capability::Tap,
         Capability::Memory,

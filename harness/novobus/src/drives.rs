@@ -16,7 +16,7 @@ use harness_proto::nd21::units;
 const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
 
 /// The default header of a simulated bench of one ring or two.
-pub fn released_header(sizes: &[u8]) -> Source {
+pub(crate) fn released_header(sizes: &[u8]) -> Source {
     let second = RELEASED.replace("0..last", "2:0..last");
     let text = match sizes {
         [_, _] => format!("{RELEASED}{second}"),
@@ -33,7 +33,10 @@ pub fn released_header(sizes: &[u8]) -> Source {
 ///
 /// # Errors
 /// The header has mistakes.
-pub fn simulated(source: &Source, sizes: Option<&[u8]>) -> Result<(Plan, SimulatedLink), Problems> {
+pub(crate) fn simulated(
+    source: &Source,
+    sizes: Option<&[u8]>,
+) -> Result<(Plan, SimulatedLink), Problems> {
     let mut scenario = parse_setup(source, sizes.unwrap_or(&[3]))?;
     for (range, size) in scenario
         .header
@@ -56,7 +59,7 @@ pub fn simulated(source: &Source, sizes: Option<&[u8]>) -> Result<(Plan, Simulat
 ///
 /// # Errors
 /// The drive does not answer.
-pub fn units_of(
+pub(crate) fn units_of(
     plan: &Plan,
     bus: &OpenRings<'_>,
     axis: Axis,

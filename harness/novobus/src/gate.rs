@@ -267,7 +267,7 @@ impl Gate for RingGate {
 }
 
 /// A guarded link of rings, in doubt until it was [synchronised](GuardsRings::synchronise). What the limits deny is no capability of it.
-pub fn guard_rings<L: Link>(inner: L, limits: Limits) -> Guarded<L> {
+pub(crate) fn guard_rings<L: Link>(inner: L, limits: Limits) -> Guarded<L> {
     // A link has one ring or two; a ring that it does not have has no drives.
     let size = |ring: usize| RingSize::new(inner.drives(ring).into()).ok();
     let gates = (0..2)
@@ -286,7 +286,7 @@ pub fn guard_rings<L: Link>(inner: L, limits: Limits) -> Guarded<L> {
 }
 
 /// A line behind the gates of rings.
-pub trait GuardsRings {
+pub(crate) trait GuardsRings {
     /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
     /// it commands pass, as far as they are allowed.
     fn synchronise(&mut self);
@@ -294,7 +294,6 @@ pub trait GuardsRings {
     /// What it allows; nothing without a ring.
     fn limits(&self) -> Limits;
 
-    /// The rings.
     fn sizes(&self) -> Vec<RingSize>;
 
     /// What may have changed in drives since the last call.

@@ -20,7 +20,7 @@ use std::collections::VecDeque;
 
 /// One or two simulated rings.
 #[derive(Clone, Debug)]
-pub struct SimulatedLink {
+pub(crate) struct SimulatedLink {
     bench: Bench,
     rate: Rate,
     /// When the conversation began, on the bench's clock.
@@ -42,7 +42,7 @@ const DARK: OutputLevels = OutputLevels {
 
 impl SimulatedLink {
     /// What a simulated link can do: everything.
-    pub const CAPABILITIES: [Capability; 10] = [
+    pub(crate) const CAPABILITIES: [Capability; 10] = [
         Capability::Interposer,
         Capability::Tap,
         Capability::Memory,
@@ -57,7 +57,7 @@ impl SimulatedLink {
 
     /// A link to the rings of a bench.
     #[must_use]
-    pub fn new(bench: Bench) -> Self {
+    pub(crate) fn new(bench: Bench) -> Self {
         let rate = bench.rings().first().map_or(Rate::default(), Ring::rate);
         Self {
             bench,
@@ -69,12 +69,12 @@ impl SimulatedLink {
 
     /// Keeps no record of what the links carry from now on: for a driver, which may be at work for hours.
     /// Received bytes are received all the same, there is no trace of them.
-    pub fn stop_recording(&mut self) {
+    pub(crate) fn stop_recording(&mut self) {
         self.record(false);
     }
 
     /// Makes room for this number of bytes on every link of a ring.
-    pub fn reserve(&mut self, ring: usize, bytes: usize) {
+    pub(crate) fn reserve(&mut self, ring: usize, bytes: usize) {
         if let Some(ring) = self.bench.ring_mut(ring) {
             ring.reserve(bytes);
         }
@@ -83,7 +83,7 @@ impl SimulatedLink {
     /// Adds a [witness](harness_sim::novobus::witness) to every drive, before anything is sent. Returns false if a drive is not a whole ND21
     /// and has no witness.
     #[must_use]
-    pub fn witness(&mut self) -> bool {
+    pub(crate) fn witness(&mut self) -> bool {
         let byte_time = self.rate.byte_time();
         let mut all = true;
         self.each_drive(|drive| all &= drive.witness(byte_time));
@@ -130,7 +130,7 @@ impl SimulatedLink {
 
     /// A drive, past its bus.
     #[must_use]
-    pub fn drive(&self, ring: usize, drive: u8) -> Option<&Drive> {
+    pub(crate) fn drive(&self, ring: usize, drive: u8) -> Option<&Drive> {
         self.ring(ring)?.drive(drive)
     }
 
@@ -144,21 +144,21 @@ impl SimulatedLink {
     }
 
     /// Listens on a link from now on, counted from the master's outgoing one: [`Self::fetch`] gives what arrives there.
-    pub fn tap(&mut self, ring: usize, link: usize) {
+    pub(crate) fn tap(&mut self, ring: usize, link: usize) {
         if let Some(ring) = self.bench.ring_mut(ring) {
             ring.record_link(link);
         }
     }
 
     /// Cuts a link open: bytes of the drive in front must be fetched, and the drive behind receives the bytes that are fed.
-    pub fn open(&mut self, ring: usize, link: usize) {
+    pub(crate) fn open(&mut self, ring: usize, link: usize) {
         if let Some(ring) = self.bench.ring_mut(ring) {
             ring.open_link(link);
         }
     }
 
     /// What has arrived at a tap, or at an open link's near side, since the last call.
-    pub fn fetch(&mut self, ring: usize, link: usize) -> Vec<Received> {
+    pub(crate) fn fetch(&mut self, ring: usize, link: usize) -> Vec<Received> {
         let Some(ring) = self.bench.ring_mut(ring) else {
             return Vec::new();
         };
@@ -200,7 +200,7 @@ impl SimulatedLink {
     }
 
     /// Feeds a byte to the drive behind an open link and returns when the line will have carried it.
-    pub fn feed(&mut self, ring: usize, link: usize, byte: Received) -> Instant {
+    pub(crate) fn feed(&mut self, ring: usize, link: usize, byte: Received) -> Instant {
         let now = self.bench.now();
         let ring = self.bench.ring_mut(ring);
         let at = ring.map_or(now, |ring| ring.feed_link(link, byte));
@@ -216,7 +216,7 @@ impl SimulatedLink {
 
     /// When the byte on the last link of a ring reaches the master; one that is not yet there needs a byte time at least.
     #[must_use]
-    pub fn next_home(&self, ring: usize) -> Option<Instant> {
+    pub(crate) fn next_home(&self, ring: usize) -> Option<Instant> {
         let next = self.ring(ring)?.next_home()?;
         Some(self.since_origin(next))
     }
@@ -246,12 +246,12 @@ impl SimulatedLink {
     /// When something happens next on a ring or by a fault that waits for its time; `None` where nothing ever
     /// will unless the master sends. What drives do behind their bus is not counted: they turn all the time.
     #[must_use]
-    pub fn next_event(&self) -> Option<Instant> {
+    pub(crate) fn next_event(&self) -> Option<Instant> {
         self.next_on_bench().map(|at| self.since_origin(at))
     }
 
     /// Lets everything happen up to and including `until`: the same as many waits, at less cost.
-    pub fn run_until(&mut self, until: Instant) {
+    pub(crate) fn run_until(&mut self, until: Instant) {
         let until = self.on_bench(until);
         while self.bench.now() < until {
             let fault = self.scheduled.front().map(|(at, ..)| *at);
@@ -471,7 +471,7 @@ impl Link for SimulatedLink {
 }
 
 /// What only a simulated ring shows: its drives beside the bus.
-pub trait BesideTheBus {
+pub(crate) trait BesideTheBus {
     /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
     fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
 

@@ -16,7 +16,7 @@ use harness_sim::novobus::ring::Ring;
 
 /// A link to simulated rings, their drives set up as the plan says.
 #[must_use]
-pub fn simulated(plan: &Plan) -> SimulatedLink {
+pub(crate) fn simulated(plan: &Plan) -> SimulatedLink {
     let mut rings = plan
         .rings
         .iter()
@@ -32,7 +32,7 @@ pub fn simulated(plan: &Plan) -> SimulatedLink {
 
 /// The same with everything done that the header lets happen from outside the bus.
 #[must_use]
-pub fn bench(plan: &Plan) -> SimulatedLink {
+pub(crate) fn bench(plan: &Plan) -> SimulatedLink {
     let mut link = simulated(plan);
     for (ring, drives, influence) in plan.influences() {
         influence.act(&mut link, ring, drives);

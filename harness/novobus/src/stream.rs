@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Default time tolerance of a rig.
-pub const TOLERANCE: Span = Span::from_millis(5);
+pub(crate) const TOLERANCE: Span = Span::from_millis(5);
 
 /// The bytes under way in a ring: each comes back when it has passed all drives.
 #[derive(Debug)]
@@ -78,7 +78,7 @@ impl Accounting for RoundTrip {
 
 /// One or two rings over streams.
 #[derive(Debug)]
-pub struct StreamLink {
+pub(crate) struct StreamLink {
     pump: Pump<RoundTrip>,
     rate: Rate,
     capabilities: Vec<Capability>,
@@ -88,7 +88,7 @@ impl StreamLink {
     /// Creates a link over one wire per ring, each with its number of drives; there are one or two rings. When `interrupt` is set, the
     /// link stops sending with [`Trouble::Interrupted`].
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         wires: Vec<(Wire, u8)>,
         inner: Vec<InnerLink>,
         rate: Rate,
@@ -123,7 +123,6 @@ impl StreamLink {
         }
     }
 
-    /// Sets the time tolerance.
     pub(crate) fn set_time_tolerance(&mut self, tolerance: Span) {
         self.pump.tolerance = tolerance;
     }

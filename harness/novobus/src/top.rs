@@ -1,7 +1,8 @@
 //! How drives of rings, and what a ring carries, are shown by the live view.
 
-use crate::driver::{Axis, State};
+use crate::driver::Axis;
 use harness_bench::top::{HeadLine, TopColumn, TopForm, TopRow};
+use harness_proto::nd21::State;
 use harness_proto::nd21::bits::set_in;
 use harness_proto::nd21::errors::display_digits;
 use harness_proto::nd21::ram;
@@ -9,7 +10,7 @@ use harness_proto::novobus::master::Counters;
 use harness_proto::time::Span;
 
 /// The table of drives. The units are those of the drive's cells (ND21 14.5), the states those of 11.8.
-pub static FORM: TopForm = TopForm {
+pub(crate) static FORM: TopForm = TopForm {
     drive: "drive",
     columns: &[
         TopColumn::numbers("drive", 5),
@@ -26,8 +27,7 @@ pub static FORM: TopForm = TopForm {
 
 /// What a drive showed last.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DriveReading {
-    /// Which.
+pub(crate) struct DriveReading {
     pub axis: Axis,
     /// Its mode and error (ND21 11.8, 14.4).
     pub state: State,
@@ -41,7 +41,7 @@ pub struct DriveReading {
 
 /// What a ring carried since the reading began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RingReading {
+pub(crate) struct RingReading {
     /// What its master has done.
     pub counters: Counters,
     /// Bytes a second.
@@ -57,7 +57,7 @@ pub struct RingReading {
 impl RingReading {
     /// The figures between two moments.
     #[must_use]
-    pub fn between(before: &Counters, now: &Counters, span: Span) -> Self {
+    pub(crate) fn between(before: &Counters, now: &Counters, span: Span) -> Self {
         let nanos = u128::from(span.as_nanos().max(1));
         let rate = |before: u64, now: u64| {
             let count = u128::from(now.saturating_sub(before));
@@ -76,7 +76,7 @@ impl RingReading {
 
     /// The lines above the table.
     #[must_use]
-    pub fn lines(&self) -> Vec<HeadLine> {
+    pub(crate) fn lines(&self) -> Vec<HeadLine> {
         let own = &self.counters;
         vec![
             HeadLine::plain(format!(
@@ -101,7 +101,7 @@ impl RingReading {
 impl DriveReading {
     /// Its row in the table.
     #[must_use]
-    pub fn row(&self) -> TopRow {
+    pub(crate) fn row(&self) -> TopRow {
         let state = &self.state;
         let mode = state.mode();
         // The display shows the code in the error mode only (11.8).

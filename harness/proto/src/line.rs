@@ -138,6 +138,17 @@ pub struct Received {
     pub error: Option<LineError>,
 }
 
+impl fmt::Display for Received {
+    /// `88`, or `12 (parity)`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:02X}", self.byte)?;
+        match self.error {
+            Some(error) => write!(f, " ({error})"),
+            None => Ok(()),
+        }
+    }
+}
+
 impl Received {
     /// A byte that arrived whole.
     #[must_use]

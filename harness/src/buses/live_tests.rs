@@ -1,11 +1,11 @@
 //! What a capture shows while it goes on, in the words of each bus.
 
-use super::novobus::capture::judge::judge;
-use super::novobus::capture::scenario::JudgeOptions;
-use super::{carrier, carrying};
+use super::carrier;
 use crate::capture::live::{LiveLine, seconds};
 use crate::capture::senders::TelegramCutter;
-use crate::capture::{Capture, Carries, LiveRecorder, Piece, RecordedPlace, Tape, read};
+use crate::capture::{
+    Capture, Carries, JudgeOptions, LiveRecorder, Piece, RecordedPlace, Tape, read,
+};
 use crate::library::Entry;
 use crate::medium::Medium;
 use crate::scenario::files::sources;
@@ -34,7 +34,7 @@ fn traces_of(source: Source) -> Vec<Trace> {
     let text: String = lines.collect();
     let source = Source::from_bytes(source.name, text.into_bytes()).expect("a text");
     let entry = Entry::new(source, None).expect("no mistakes");
-    let plan = entry.settled().expect("a plan");
+    let plan = &entry.settled;
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     (0..plan.ports()).map(|port| link.trace(port)).collect()
@@ -218,17 +218,14 @@ fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
 const MOST_PIECES: usize = 20_000;
 
 fn verdict(capture: &Capture) -> Option<Verdict> {
+    let carries = Carries::of(&capture.traces);
     let options = JudgeOptions {
         title: "begun in mid-conversation",
-        setup: None,
-        tolerance: Span::from_millis(10),
+        tolerance: (carries == Carries::Link).then_some(Span::from_millis(10)),
+        ..JudgeOptions::default()
     };
-    match carrying(Carries::of(&capture.traces)) {
-        None => judge(capture, &options).ok().map(|own| own.verdict),
-        Some(line) => (line.judged)(&capture.traces, None, (&[], Span::ZERO))
-            .ok()
-            .map(|own| own.verdict),
-    }
+    let judged = (carrier(carries).judged)(capture, &options).ok();
+    judged.map(|own| own.verdict)
 }
 
 /// No right drive is blamed in a capture that begins at any of `cuts` places; returns how many captures passed.

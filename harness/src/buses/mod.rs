@@ -10,11 +10,6 @@ pub use harness_nordac as nordac;
 pub use harness_novobus as novobus;
 pub use harness_unitek as unitek;
 
-pub use novobus::language::{plan, syntax};
-pub use novobus::link::SimulatedLink;
-
-pub(crate) use novobus::driver;
-
 use crate::bus::{Bus, SharedLine};
 use crate::bus_name::BusName;
 use crate::capture::Carries;
@@ -34,7 +29,7 @@ use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::serve::{ServeEnd, ServeError};
-use crate::traffic::SegmentReport;
+use crate::shown::SegmentReport;
 use harness_sim::record::Trace;
 use std::path::Path;
 use std::rc::Rc;
@@ -45,11 +40,6 @@ pub static BUSES: [&Bus; 3] = [&novobus::BUS, &unitek::BUS, &nordac::BUS];
 /// The bus of this name.
 pub fn named(name: BusName) -> &'static Bus {
     BUSES[name as usize]
-}
-
-/// The buses whose stations share one line.
-pub(crate) fn shared_lines() -> impl Iterator<Item = &'static SharedLine> {
-    BUSES.iter().filter_map(|bus| bus.shared.as_ref())
 }
 
 /// The bus whose channels carry this.
@@ -70,7 +60,7 @@ pub(crate) fn bus_of(rig: &Rig) -> &'static Bus {
 
 /// The buses, as the files of rigs know them.
 pub static RIG_BUSES: RigBuses = RigBuses {
-    rings: novobus::rig::RINGS,
+    rings: novobus::BUS.rings.expect("rings"),
     ports: [line(&unitek::BUS).port, line(&nordac::BUS).port],
 };
 
@@ -143,14 +133,9 @@ pub(crate) fn judge_of(rig: &Rig, qualifies: bool) -> Result<Box<dyn RecordJudge
     }
 }
 
-/// How traces of a shared line are shown; `None` for a ring.
-pub(crate) fn report_of(traces: &[Trace]) -> Option<&'static dyn SegmentReport> {
-    Some(carrying(Carries::of(traces))?.report)
-}
-
-/// What these are traces of.
-pub(crate) fn carried(traces: &[Trace]) -> &'static str {
-    report_of(traces).map_or("bytes of a ring", SegmentReport::carries)
+/// How traces are shown.
+pub(crate) fn report_of(traces: &[Trace]) -> &'static dyn SegmentReport {
+    carrier(Carries::of(traces)).report
 }
 
 /// Runs a command on drives, in the words of the bus of its bench.

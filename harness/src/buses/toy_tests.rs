@@ -4,10 +4,11 @@ use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::report::finding::explain;
 use crate::report::page::page;
-use crate::report::pages::{Head, ScenarioView, run, section};
 use crate::scenario::run::{AtMismatch, Outcome};
+use crate::scenario::settled::BenchSize;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use crate::shown::{Head, ScenarioView, run, section};
 use harness_sim::record::Trace;
 use harness_toy::BUS;
 
@@ -23,8 +24,7 @@ fn source(text: &str) -> Source {
 /// Plays it as `run` does.
 fn played(text: &str) -> (Entry, Outcome, Vec<Trace>) {
     let source = source(&format!("{HEADER}{text}"));
-    let found = (BUS.settle)(&source, None).expect("a scenario");
-    let entry = Entry::of_other(source, found);
+    let entry = Entry::of(&BUS, source, BenchSize::Own).expect("a scenario");
     let played = play_entry(&entry, AtMismatch::GoOn);
     (entry, played.outcome, played.traces)
 }
@@ -39,7 +39,7 @@ fn html((entry, outcome, traces): &(Entry, Outcome, Vec<Trace>)) -> String {
         text: &entry.source.text,
         outcome,
         traces,
-        report: entry.report(),
+        report: entry.report,
         rate: harness_proto::line::Rate::default(),
         again: "",
     };
@@ -104,7 +104,7 @@ fn what_no_line_asks_for_is_a_failure() {
 fn its_mistakes_have_their_places_and_suggestions() {
     let mistake = |steps: &str| {
         let source = source(&format!("{HEADER}valve 1\n\n{steps}\n"));
-        let found = (BUS.settle)(&source, None).expect_err("a mistake");
+        let found = (BUS.settle)(&source, BenchSize::Own).expect_err("a mistake");
         let first = found.all()[0].clone();
         let place = source.text[first.span.start..first.span.end].to_owned();
         (place, first.help.unwrap_or_default())

@@ -1,22 +1,20 @@
 //! `drivebench campaign`.
 
 use super::args::CampaignArguments;
-use crate::buses::novobus::campaign::class::CaseClass;
-use crate::buses::novobus::campaign::find::{FindCampaignError, find, names};
-use crate::buses::novobus::campaign::part::{CampaignCounts, CountsFile, WholeCampaign};
-use crate::buses::novobus::campaign::replay::scenario;
-use crate::buses::novobus::campaign::report::{json, line as case_line, table};
-use crate::buses::novobus::campaign::{Campaign, CaseFaults, Contradiction, PlayedCampaign};
-use crate::buses::shared_lines;
-use crate::campaign::line::{self, LineCampaign, PlayedLine};
+use crate::buses::BUSES;
+use crate::campaign::counts::{CampaignCounts, CountsFile, WholeCampaign};
+use crate::campaign::{Campaign, CampaignError, CaseFailure, PlayedCampaign, class_of, page};
 use crate::command::args::TableFormat;
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::page::{save, writable, write};
 use crate::command::progress::progress_bar;
-use crate::partition::Partition;
+use crate::scenario::problem::nearest;
 use clap::ValueEnum;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// A campaign of any bus.
+type AnyCampaign = Box<dyn Campaign>;
 
 /// Plays campaigns.
 pub(crate) fn campaign(
@@ -28,7 +26,7 @@ pub(crate) fn campaign(
         Err(exit) => return Ok(exit),
     };
     if let Some(name) = &arguments.case {
-        return replay(name, &found.on_rings, &found.on_lines, output);
+        return replay(name, &found, output);
     }
     for path in arguments.html.iter().chain(&arguments.output) {
         if writable(path, output).is_err() {
@@ -38,32 +36,25 @@ pub(crate) fn campaign(
     if arguments.pairs {
         return pairs(&found, arguments, output);
     }
-    let wholes = found.divide(arguments.partition);
-    let all = match play_rings(&found.on_rings, arguments, output)? {
+    let wholes = found.iter_mut();
+    let wholes = wholes.map(|own| WholeCampaign::of(&mut **own, arguments.partition));
+    let wholes: Vec<_> = wholes.collect();
+    let all = match play(&found, arguments, output)? {
         Ok(all) => all,
-        Err(contradiction) => {
-            output.complain(&contradiction.to_string());
+        Err(defect) => {
+            output.complain(&defect);
             return Ok(Exit::RigError);
         }
     };
-    let mut listed = json(&all, arguments.only.and_then(ClassName::of_rings));
-    let played = play_lines(&found.on_lines, arguments, &mut listed, output)?;
-    if arguments.format == TableFormat::Json {
-        output.result(&format!("{listed}\n"))?;
-    }
     if let Some(path) = &arguments.html
-        && !write(path, &campaigns_page(&all, &played), output)
+        && !write(path, &page(&all), output)
     {
         return Ok(Exit::RigError);
     }
     let differs = all.iter().any(|own| !own.differs().is_empty());
-    let differs = differs || played.iter().any(|own| !own.differs().is_empty());
-    Ok(keep(
-        wholes.counts(&all, &played),
-        differs,
-        arguments,
-        output,
-    ))
+    let counts = wholes.into_iter().zip(&all);
+    let counts = counts.map(|(whole, own)| whole.counts(&**own)).collect();
+    Ok(keep(counts, differs, arguments, output))
 }
 
 /// Writes counts where they are asked for; says how it ended.
@@ -96,157 +87,125 @@ fn keep(
     }
 }
 
-/// The campaigns that were found.
-#[derive(Default)]
-struct FoundCampaigns {
-    on_rings: Vec<Campaign>,
-    on_lines: Vec<Box<dyn LineCampaign>>,
-}
-
-/// What each of them is as a whole.
-struct Wholes {
-    of_rings: Vec<WholeCampaign>,
-    of_lines: Vec<WholeCampaign>,
-}
-
-impl FoundCampaigns {
-    /// Keeps the cases of the part, if one is given.
-    fn divide(&mut self, part: Option<Partition>) -> Wholes {
-        let of_rings = self.on_rings.iter_mut();
-        let of_lines = self.on_lines.iter_mut();
-        Wholes {
-            of_rings: of_rings
-                .map(|own| WholeCampaign::of_rings(own, part))
-                .collect(),
-            of_lines: of_lines
-                .map(|own| WholeCampaign::of_line(&mut **own, part))
-                .collect(),
-        }
-    }
-}
-
-impl Wholes {
-    fn counts(self, all: &[PlayedCampaign], played: &[PlayedLine]) -> Vec<CampaignCounts> {
-        let of_rings = self.of_rings.into_iter().zip(all);
-        let of_lines = self.of_lines.into_iter().zip(played);
-        of_rings
-            .map(|(whole, own)| whole.counts(own))
-            .chain(of_lines.map(|(whole, own)| whole.counts_of_line(own)))
-            .collect()
-    }
+/// The names of the built-in campaigns: of rings, then all others.
+pub(super) fn names() -> Vec<String> {
+    let [of_rings, others @ ..] = &BUSES;
+    let mut names: Vec<_> = others.iter().flat_map(|bus| (bus.campaigns)()).collect();
+    names.sort_unstable();
+    [(of_rings.campaigns)(), names].concat()
 }
 
 /// Finds the named campaigns, or all built-in ones. The exit code where one cannot be played, which has been reported.
-fn find_all(named: &[PathBuf], output: &mut Output) -> Result<FoundCampaigns, Exit> {
-    let built_in = || {
-        let on_lines = shared_lines().flat_map(|line| (line.campaigns)());
-        let mut on_lines: Vec<_> = on_lines.collect();
-        on_lines.sort_unstable();
-        let on_lines = on_lines.into_iter().map(PathBuf::from);
-        names()
-            .into_iter()
-            .map(PathBuf::from)
-            .chain(on_lines)
-            .collect()
-    };
+fn find_all(named: &[PathBuf], output: &mut Output) -> Result<Vec<AnyCampaign>, Exit> {
     let wanted: Vec<PathBuf> = match named {
-        [] => built_in(),
+        [] => names().into_iter().map(PathBuf::from).collect(),
         named => named.to_vec(),
     };
-    let mut found = FoundCampaigns::default();
-    for name in &wanted {
-        match shared_lines().find_map(|line| (line.campaign)(name)) {
-            Some(Ok(campaign)) => {
-                found.on_lines.push(campaign);
-                continue;
-            }
-            Some(Err(error)) => {
-                output.complain(&error);
-                return Err(Exit::Usage);
-            }
-            None => {}
-        }
-        match find(name) {
-            Ok(campaign) => found.on_rings.push(campaign),
-            Err(error) => {
-                complain(&error, output);
-                return Err(Exit::Usage);
-            }
-        }
-    }
-    Ok(found)
+    wanted.iter().map(|name| find(name, output)).collect()
 }
 
-/// Plays campaigns on rings, and shows them.
-fn play_rings(
-    campaigns: &[Campaign],
+fn find(name: &Path, output: &mut Output) -> Result<AnyCampaign, Exit> {
+    // A file that names no bus is one of rings.
+    let found = BUSES.iter().rev().find_map(|bus| (bus.campaign)(name));
+    match found {
+        Some(Ok(campaign)) => return Ok(campaign),
+        Some(Err(CampaignError::Said(why))) => output.complain(&why),
+        Some(Err(CampaignError::Mistakes(problems))) => output.mistakes(&problems),
+        None => {
+            let (wanted, known) = (name.display().to_string(), names());
+            let bare = wanted.strip_suffix(".toml").unwrap_or(&wanted);
+            let words: Vec<_> = known.iter().map(String::as_str).collect();
+            let near = nearest(bare, &words).map(|near| format!("did you mean `{near}`? "));
+            output.complain(&format!(
+                "failed to find {wanted}: neither a file nor a built-in campaign; {}there are {}",
+                near.unwrap_or_default(),
+                words.join(", ")
+            ));
+        }
+    }
+    Err(Exit::Usage)
+}
+
+/// Plays campaigns, and shows them; or says which case is a defect of the bench.
+fn play(
+    campaigns: &[AnyCampaign],
     arguments: &CampaignArguments,
     output: &mut Output,
-) -> std::io::Result<Result<Vec<PlayedCampaign>, Contradiction>> {
+) -> std::io::Result<Result<Vec<Box<dyn PlayedCampaign>>, String>> {
     let threads = arguments.threads.unwrap_or_else(cores);
-    let mut all = Vec::new();
+    let (mut all, mut listed) = (Vec::new(), Vec::new());
     for campaign in campaigns {
-        let bar = progress_bar(campaign.cases.len(), output.progress);
-        bar.set_message(campaign.name.clone());
-        let finished = campaign.run(threads, &|done| bar.inc(done));
+        let bar = progress_bar(campaign.cases(), output.progress);
+        bar.set_message(campaign.name().to_owned());
+        let played = campaign.run(threads, &|done| bar.inc(done));
         bar.finish_and_clear();
-        let finished = match finished {
-            Ok(finished) => finished,
-            Err(contradiction) => return Ok(Err(contradiction)),
+        let played = match played {
+            Ok(played) => played,
+            Err(defect) => return Ok(Err(defect)),
         };
-        if arguments.format == TableFormat::Table {
-            output.result(&shown(&finished, arguments.only))?;
+        // A class that a campaign does not have leaves it out.
+        let only = arguments.only.map(|own| class_of(&*played, &own.name()));
+        match (arguments.format, only) {
+            (_, Some(None)) => {}
+            (TableFormat::Table, None) => output.result(&(played.table() + "\n"))?,
+            (TableFormat::Table, Some(Some(class))) => output.result(&played.lines(class))?,
+            (TableFormat::Json, class) => listed.push(played.json(class.flatten())),
         }
-        all.push(finished);
+        all.push(played);
+    }
+    if arguments.format == TableFormat::Json {
+        let all = serde_json::json!({ "schema": 1, "campaigns": listed });
+        output.result(&format!("{all}\n"))?;
     }
     Ok(Ok(all))
 }
 
 /// Counts the pairs of cases of campaigns of single faults, and shows them.
 fn pairs(
-    found: &FoundCampaigns,
+    found: &[AnyCampaign],
     arguments: &CampaignArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    if let Some(other) = found.on_lines.first() {
-        let name = other.name();
-        output.complain(&format!(
-            "--pairs counts faults of rings; {name} has no ring"
-        ));
-        return Ok(Exit::Usage);
-    }
-    let threads = arguments.threads.unwrap_or_else(cores);
-    let mut counted = Vec::new();
-    for campaign in &found.on_rings {
-        match campaign.pairs(arguments.sample.is_some()) {
-            Ok(all) => counted.push(match (arguments.sample, arguments.partition) {
+    let mut wanted = Vec::new();
+    for campaign in found {
+        let Some(pairs) = campaign.pairs() else {
+            let name = campaign.name();
+            output.complain(&format!(
+                "--pairs counts faults of rings; {name} has no ring"
+            ));
+            return Ok(Exit::Usage);
+        };
+        let count = match pairs.all(arguments.sample.is_some()) {
+            Ok(all) => match (arguments.sample, arguments.partition) {
                 (Some(sample), _) => sample.min(all),
-                (None, Some(part)) => campaign.pairs_of_part(part),
+                (None, Some(part)) => pairs.of_part(part),
                 (None, None) => all,
-            }),
+            },
             Err(error) => {
-                output.complain(&error.to_string());
+                output.complain(&error);
                 return Ok(Exit::Usage);
             }
-        }
+        };
+        wanted.push((campaign, pairs, count));
     }
+    let threads = arguments.threads.unwrap_or_else(cores);
     let (mut listed, mut counts) = (Vec::new(), Vec::new());
-    for (campaign, cases) in found.on_rings.iter().zip(counted) {
+    for (campaign, pairs, count) in wanted {
         let bar = progress_bar(
-            usize::try_from(cases).unwrap_or(usize::MAX),
+            usize::try_from(count).unwrap_or(usize::MAX),
             output.progress,
         );
-        bar.set_message(campaign.name.clone());
+        bar.set_message(campaign.name().to_owned());
         let progress = |done| bar.inc(done);
         let played = match arguments.sample {
-            None => campaign.count_pairs(arguments.partition, threads, &progress),
-            Some(sample) => campaign.sample_pairs(sample, arguments.seed, threads, &progress),
+            None => pairs.count(arguments.partition, threads, &progress),
+            Some(sample) => pairs.sample((sample, arguments.seed), threads, &progress),
         };
         bar.finish_and_clear();
         let played = match played {
             Ok(played) => played,
             Err(error) => {
-                output.complain(&error.to_string());
+                output.complain(&error);
                 return Ok(Exit::RigError);
             }
         };
@@ -254,7 +213,7 @@ fn pairs(
             TableFormat::Json => listed.push(played.json()),
             TableFormat::Table => output.result(&(played.table() + "\n"))?,
         }
-        counts.push(WholeCampaign::of_pairs(campaign).counts_of_pairs(&played));
+        counts.push(WholeCampaign::of_pairs(&**campaign).counts_of_pairs(&played));
     }
     if arguments.format == TableFormat::Json {
         let all = serde_json::json!({ "schema": 1, "pairs": listed });
@@ -263,107 +222,26 @@ fn pairs(
     Ok(keep(counts, false, arguments, output))
 }
 
-fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {
-    let sections = (all.len() + 1..).zip(on_lines);
-    let sections = sections.map(|(number, own)| line::section(number, own));
-    crate::buses::novobus::campaign::campaigns(all, sections.collect())
-}
-
-/// Plays campaigns on shared lines, and shows them.
-fn play_lines(
-    campaigns: &[Box<dyn LineCampaign>],
-    arguments: &CampaignArguments,
-    listed: &mut serde_json::Value,
-    output: &mut Output,
-) -> std::io::Result<Vec<PlayedLine>> {
-    let mut all = Vec::new();
-    for campaign in campaigns {
-        let bar = progress_bar(campaign.cases(), output.progress);
-        bar.set_message(campaign.name().to_owned());
-        let played = campaign.run(&|done| bar.inc(done));
-        bar.finish_and_clear();
-        let only = arguments.only.map(|own| played.class(&own.name()));
-        match (arguments.format, only) {
-            (TableFormat::Table, None) => output.result(&(line::table(&played) + "\n"))?,
-            (TableFormat::Table, Some(class)) => {
-                let shown = class.map(|class| line::only(&played, class));
-                output.result(&shown.unwrap_or_default())?;
-            }
-            (_, class) => {
-                // A class that this campaign does not have leaves it out.
-                let wanted = class != Some(None);
-                if let Some(list) = listed["campaigns"].as_array_mut().filter(|_| wanted) {
-                    list.push(line::json(&played, class.flatten()));
-                }
-            }
-        }
-        all.push(played);
-    }
-    Ok(all)
-}
-
 /// How many threads there is room for.
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-fn shown(finished: &PlayedCampaign, only: Option<ClassName>) -> String {
-    let only = match only.map(ClassName::of_rings) {
-        None => return table(finished) + "\n",
-        Some(only) => only,
-    };
-    let outcomes = finished.outcomes.iter();
-    let wanted = outcomes.filter(|outcome| Some(outcome.class) == only);
-    wanted
-        .map(|outcome| case_line(outcome, finished.drives))
-        .collect()
-}
-
-fn complain(error: &FindCampaignError, output: &mut Output) {
-    match error {
-        FindCampaignError::Mistakes(problems) => output.mistakes(problems),
-        error => output.complain(&error.to_string()),
-    }
-}
-
 /// Prints the scenario of one case.
-fn replay(
-    name: &str,
-    campaigns: &[Campaign],
-    on_lines: &[Box<dyn LineCampaign>],
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    let campaign = match (campaigns, on_lines) {
-        ([campaign], []) => campaign,
-        ([], [campaign]) => {
-            return match campaign.scenario(name) {
-                Ok(text) => output.result(&text).map(|()| Exit::Passed),
-                Err(wrong) => {
-                    output.complain(&wrong);
-                    Ok(Exit::Usage)
-                }
-            };
-        }
-        _ => {
-            let why = "--case needs exactly one campaign; name the one that the case belongs to";
-            output.complain(why);
-            return Ok(Exit::Usage);
-        }
+fn replay(name: &str, campaigns: &[AnyCampaign], output: &mut Output) -> std::io::Result<Exit> {
+    let [campaign] = campaigns else {
+        let why = "--case needs exactly one campaign; name the one that the case belongs to";
+        output.complain(why);
+        return Ok(Exit::Usage);
     };
-    let case = match CaseFaults::from_name(name, campaign.shape.drives) {
-        Ok(case) => case,
-        Err(wrong) => {
+    match campaign.scenario(name) {
+        Ok(text) => output.result(&text).map(|()| Exit::Passed),
+        Err(CaseFailure::Unknown(wrong)) => {
             output.complain(&wrong);
-            return Ok(Exit::Usage);
+            Ok(Exit::Usage)
         }
-    };
-    match scenario(campaign, &case) {
-        Ok(text) => {
-            output.result(&text)?;
-            Ok(Exit::Passed)
-        }
-        Err(contradiction) => {
-            output.complain(&contradiction.to_string());
+        Err(CaseFailure::Defect(defect)) => {
+            output.complain(&defect);
             Ok(Exit::RigError)
         }
     }
@@ -411,19 +289,5 @@ impl ClassName {
         value
             .map(|own| own.get_name().to_owned())
             .unwrap_or_default()
-    }
-
-    /// The class of campaigns on rings; `None` for one of frames.
-    const fn of_rings(self) -> Option<CaseClass> {
-        Some(match self {
-            Self::Harmless => CaseClass::Harmless,
-            Self::Located => CaseClass::Located,
-            Self::Recovered => CaseClass::Recovered,
-            Self::Mislocated => CaseClass::Mislocated,
-            Self::NotRecovered => CaseClass::NotRecovered,
-            Self::Corrupted => CaseClass::Corrupted,
-            Self::SilentCorruption => CaseClass::SilentCorruption,
-            _ => return None,
-        })
     }
 }

@@ -6,7 +6,6 @@ use crate::command::output::Output;
 use crate::counted::counted;
 use crate::library::Entry;
 use crate::scenario::files::sources;
-use crate::scenario::settled::Settled;
 
 /// Reads scenarios and plays nothing.
 pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -26,8 +25,7 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
         let name = source.name.clone();
         match Entry::new(source, arguments.ring) {
             Ok(entry) => {
-                let settled = entry.settled();
-                let needs = settled.map_or(&[][..], Settled::needs).iter();
+                let needs = entry.settled.needs().iter();
                 let needs: Vec<_> = needs.map(|need| need.name()).collect();
                 let needs = match needs.is_empty() {
                     true => String::new(),

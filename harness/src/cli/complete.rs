@@ -3,7 +3,6 @@
 
 use super::args::Shell;
 use super::help::command;
-use crate::buses::novobus::campaign::find as campaigns;
 use crate::buses::{self, BUSES, find_rig_in};
 use crate::command::exit::Exit;
 use crate::command::output::Output;
@@ -136,7 +135,7 @@ fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
     Fitting {
         words: match name {
             "SCENARIO" => files::names(),
-            "CAMPAIGN" => campaigns::names().into_iter().map(str::to_owned).collect(),
+            "CAMPAIGN" => super::campaign::names(),
             "RIG" => {
                 let rigs = find::all(&find::folder()).into_iter();
                 let rigs = rigs.map(|(name, _)| name);

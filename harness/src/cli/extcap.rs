@@ -23,7 +23,6 @@ use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
 use crate::signals;
 use clap::{Args, Subcommand};
-use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 use std::fs::File;
@@ -261,8 +260,8 @@ fn simulated(interface: &str, arguments: &ExtcapArguments) -> Result<Tape, Strin
             simulated_interface(entry.scenario.bus)
         ));
     }
-    let rate = entry.plan.as_ref().map_or(Rate::default(), |own| own.rate);
-    Ok(Tape::of(&play_entry(&entry, AtMismatch::GoOn).traces, rate))
+    let played = play_entry(&entry, AtMismatch::GoOn);
+    Ok(Tape::of(&played.traces, entry.rate()))
 }
 
 /// The number of drives of a simulated ring.

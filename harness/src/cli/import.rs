@@ -1,37 +1,27 @@
 //! `drivebench import`, `diff`, `dissector`, `dbc` and `gsd`: captures that are read, and what helps to read them elsewhere.
 
 use super::args::{DiffArguments, ImportArguments, ReadingArguments, UartChoice};
-use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::bus::SharedLine;
+use super::trace::{fits_bus, fits_output, show};
 use crate::bus_name::BusName;
-use crate::buses::novobus::capture::diff::{ComparedRun, diff as compare};
-use crate::buses::novobus::capture::judge::{Judged, judge};
-use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
-use crate::buses::{carried, carrying, named, report_of};
-use crate::capture::frame_diff::frame_diff;
+use crate::buses::{carrier, carrying, named, report_of};
 use crate::capture::{
-    Capture, CaptureError, Carries, Imported, JudgedFrames, ReadSettings, is_capture, read_files,
+    Capture, CaptureError, Carries, Imported, JudgeOptions, JudgedCapture, ReadSettings,
+    is_capture, read_files,
 };
 use crate::command::exit::Exit;
 use crate::command::output::Output;
 use crate::command::play::play_entry;
-use crate::counted::counted;
 use crate::library::Entry;
 use crate::regular;
-use crate::report::pcapng::name as link_label;
 use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
-use harness_proto::time::{Instant, Span};
-use harness_sim::record::LineByte;
-use std::fmt::Write as _;
+use crate::shown::ShownRun;
+use harness_proto::time::Span;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// How far times may be off where a log has none.
-const NO_TIMES: Span = Span::from_millis(86_400_000);
 
 /// Prints the dissector.
 pub(crate) fn dissector(bus: BusName, output: &mut Output) -> std::io::Result<Exit> {
@@ -60,11 +50,11 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         return Ok(Exit::Usage);
     };
     let title = title(path);
+    let bus = carrier(Carries::of(&capture.traces));
     if let Some(format) = arguments.format {
         let shown = ShownRun {
             title: &title,
             traces: &capture.traces,
-            report: report_of(&capture.traces),
             rate: capture.rate,
             records: &[],
         };
@@ -73,7 +63,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         {
             return Ok(Exit::Usage);
         }
-        let written = show(&shown, format, &arguments.showing, output)?;
+        let written = show((bus.report, &shown), format, &arguments.showing, output)?;
         return Ok(if written {
             Exit::Passed
         } else {
@@ -90,71 +80,48 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     if is_silent(capture) && !arguments.scenario {
         return nothing(&title, output);
     }
-    if let Some(line) = carrying(Carries::of(&capture.traces)) {
-        let setup = setup.as_ref();
-        return of_shared_line(line, (&imported, &title, setup), arguments, output);
-    }
-    if !arguments.judge.is_empty() {
-        output.complain("`--judge` names slaves or drives of a line that they share; of a ring all drives are judged");
-        return Ok(Exit::Usage);
-    }
     let options = JudgeOptions {
         title: &title,
         setup: setup.as_ref(),
-        tolerance: span(arguments.tolerance),
+        tolerance: arguments.tolerance.map(span),
+        stations: &arguments.judge,
     };
-    if arguments.scenario {
-        return as_scenario(capture, &options, arguments, output);
-    }
-    let judged = match judge(capture, &options) {
-        Ok(judged) => Judged {
-            verdict: settled(judged.verdict, &imported, output),
-            ..judged
-        },
-        Err(error) => {
-            output.complain(&format!("{}: {error}", path.display()));
-            return Ok(Exit::Usage);
-        }
-    };
-    let line = format!(
-        "{} {title}: {} on {} in {}\n",
-        output.verdict(judged.verdict).trim_end_matches(' '),
-        counted(capture.bytes(), "byte"),
-        counted(
-            capture
-                .traces
-                .iter()
-                .map(|t| t.channels.len())
-                .sum::<usize>(),
-            "link"
-        ),
-        capture.end(),
-    );
-    output.result(&line)?;
-    output.say(&damaged(capture));
-    output.say(&details(&judged));
-    Ok(Exit::of(&[judged.verdict], false))
+    let done =
+        match arguments.scenario {
+            true => (bus.replayed)(capture, &options)
+                .map(|text| write_scenario(&text, arguments, output)),
+            false => (bus.judged)(capture, &options)
+                .map(|judged| tell(&judged, (&imported, &title), output)),
+        };
+    done.unwrap_or_else(|error| {
+        output.complain(&format!("{}: {error}", path.display()));
+        Ok(Exit::Usage)
+    })
 }
 
-/// Where bytes arrived damaged: it is a cable or a sender, and no drive that receives them.
-fn damaged(capture: &Capture) -> String {
-    let mut text = String::new();
-    for (ring, trace) in capture.traces.iter().enumerate() {
-        for link in &trace.channels {
-            let bad = |own: &&LineByte| own.error.is_some() || own.received.is_none();
-            let count = link.octets().iter().filter(bad).count();
-            if count > 0 {
-                // Writing to a String cannot fail.
-                let _infallible = writeln!(
-                    text,
-                    "  note: {} damaged over {}: by the cable there, or by the sender in front of it",
-                    counted(count, "byte"),
-                    link_label(ring, link)
-                );
-            }
-        }
+/// Reports what came of judging a capture, of which a part may be missing.
+fn tell(
+    judged: &JudgedCapture,
+    (imported, title): (&Imported, &str),
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let (verdict, why) = imported.settle(judged.verdict);
+    if let Some(why) = why {
+        output.say(&format!("  note: {why}\n"));
     }
-    text
+    output.result(&format!(
+        "{} {title}: {}\n",
+        output.verdict(verdict).trim_end_matches(' '),
+        judged.about
+    ))?;
+    for line in &judged.differences {
+        output.result(&format!("  {line}\n"))?;
+    }
+    for remark in &judged.remarks {
+        output.say(&format!("  note: {remark}\n"));
+    }
+    output.say(&judged.shown);
+    Ok(Exit::of(&[verdict], false))
 }
 
 /// A capture in which nothing was carried.
@@ -166,92 +133,6 @@ fn nothing(title: &str, output: &mut Output) -> std::io::Result<Exit> {
         shown.trim_end_matches(' ')
     ))?;
     Ok(Exit::of(&[verdict], false))
-}
-
-/// A verdict on a capture of which a part may be missing; says why it is another one.
-fn settled(verdict: Verdict, imported: &Imported, output: &mut Output) -> Verdict {
-    let (verdict, why) = imported.settle(verdict);
-    if let Some(why) = why {
-        output.say(&format!("  note: {why}\n"));
-    }
-    verdict
-}
-
-/// Reports what came of judging a shared line.
-fn told(
-    judged: &JudgedFrames,
-    ((count, what), end): ((usize, &str), Instant),
-    title: &str,
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    output.result(&format!(
-        "{} {title}: {} in {}, {} of {} compared\n",
-        output.verdict(judged.verdict).trim_end_matches(' '),
-        counted(count, what),
-        end,
-        judged.compared,
-        counted(judged.replies, "reply"),
-    ))?;
-    for line in &judged.differences {
-        output.result(&format!("  {line}\n"))?;
-    }
-    for remark in &judged.remarks {
-        output.say(&format!("  note: {remark}\n"));
-    }
-    Ok(Exit::of(&[judged.verdict], false))
-}
-
-/// Judges what a shared line carried, or makes a scenario of it.
-fn of_shared_line(
-    line: &SharedLine,
-    (imported, title, setup): (&Imported, &str, Option<&Source>),
-    arguments: &ImportArguments,
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    let (path, capture) = (title, &imported.capture);
-    if !arguments.scenario {
-        // Times of a log are those of the bus unless the user says how far they are off; a log without times has an order alone.
-        let tolerance = match (capture.timed, arguments.tolerance) {
-            (false, _) => NO_TIMES,
-            (true, None) => Span::ZERO,
-            (true, given) => span(given),
-        };
-        return match (line.judged)(&capture.traces, setup, (&arguments.judge, tolerance)) {
-            Ok(judged) => {
-                let verdict = settled(judged.verdict, imported, output);
-                let judged = JudgedFrames { verdict, ..judged };
-                told(
-                    &judged,
-                    (line.report.counted(&capture.traces), capture.end()),
-                    title,
-                    output,
-                )
-            }
-            Err(error) => {
-                output.complain(&format!("{path}: {error}"));
-                Ok(Exit::Usage)
-            }
-        };
-    }
-    if arguments.tolerance.is_some() {
-        output.complain(
-            "--tolerance changes nothing in a scenario of frames or telegrams: each is sent at its own time; leave it out",
-        );
-        return Ok(Exit::Usage);
-    }
-    if !capture.timed {
-        output.complain(&format!(
-            "{path}: a scenario sends at the times of the log, and it has none; log with times, as `candump -L` does"
-        ));
-        return Ok(Exit::Usage);
-    }
-    match (line.replayed)(&capture.traces, title, setup) {
-        Ok(text) => write_scenario(&text, arguments, output),
-        Err(error) => {
-            output.complain(&format!("{path}: {error}"));
-            Ok(Exit::Usage)
-        }
-    }
 }
 
 /// Reads the files of a capture, and says what was found and not read in them.
@@ -286,22 +167,6 @@ fn read(paths: &[PathBuf], reading: &ReadingArguments, output: &mut Output) -> O
     }
 }
 
-fn as_scenario(
-    capture: &Capture,
-    options: &JudgeOptions<'_>,
-    arguments: &ImportArguments,
-    output: &mut Output,
-) -> std::io::Result<Exit> {
-    let text = match scenario(capture, options) {
-        Ok(text) => text,
-        Err(error) => {
-            output.complain(&format!("{}: {error}", options.title));
-            return Ok(Exit::Usage);
-        }
-    };
-    write_scenario(&text, arguments, output)
-}
-
 fn write_scenario(
     text: &str,
     arguments: &ImportArguments,
@@ -322,47 +187,6 @@ fn write_scenario(
     }
 }
 
-/// What there is to say about a judgement, for people.
-fn details(judged: &Judged) -> String {
-    let mut text = String::new();
-    if judged.adopted > 0 {
-        // Writing to a String cannot fail.
-        let _infallible = writeln!(
-            text,
-            "  note: {} taken to hold the first value that the drives reported",
-            counted(judged.adopted, "cell")
-        );
-    }
-    if judged.unforeseen > 0 {
-        let _infallible = writeln!(
-            text,
-            "  note: {} not compared: data that changes by itself, and its checking bytes",
-            counted(judged.unforeseen, "byte")
-        );
-    }
-    for remark in &judged.remarks {
-        let _infallible = writeln!(text, "  note: {remark}");
-    }
-    if let Some((ring, drive)) = judged.located {
-        let ring = if ring == 0 { "" } else { " of ring 2" };
-        let _infallible = writeln!(
-            text,
-            "  note: the ring spells out drive {drive}{ring}: it saw a fault first"
-        );
-    }
-    if judged.verdict != Verdict::Passed || judged.links.differ > 0 {
-        let shown = judged.links.show("capture", "model");
-        let right = match judged.verdict {
-            Verdict::Passed => {
-                "what the master received is right; what a link between drives carried is not that of the model:\n"
-            }
-            _ => "",
-        };
-        let _infallible = write!(text, "\n{right}{shown}");
-    }
-    text
-}
-
 /// Compares two captures or runs.
 pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::Result<Exit> {
     let left = side(&arguments.left, arguments, output);
@@ -375,46 +199,23 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         return Ok(Exit::Incomplete);
     }
     let names = [title(&arguments.left), title(&arguments.right)];
-    let traces = [&left.traces[..], &right.traces[..]];
-    let shown = [&names[0][..], &names[1]];
-    let [one, other] = traces.map(carried);
-    if one != other {
+    let [one, other] = [&left, &right].map(|own| report_of(&own.traces));
+    if one.carries() != other.carries() {
         output.complain(&format!(
-            "one side has {one} and the other {other}; two of one kind expected"
+            "one side has {} and the other {}; two of one kind expected",
+            one.carries(),
+            other.carries()
         ));
         return Ok(Exit::Usage);
     }
-    let tolerance = span(arguments.tolerance);
-    let compared = report_of(traces[0]).and_then(|own| own.difference(traces, tolerance, shown));
-    if let Some((same, text)) = compared {
-        output.result(&text)?;
-        return Ok(if same { Exit::Passed } else { Exit::Failed });
-    }
-    if Carries::of(&left.traces) == Carries::Frames {
-        let summary = frame_diff(&left, &right, span(arguments.tolerance));
-        output.result(&summary.show([&names[0], &names[1]]))?;
-        return Ok(match summary.same() {
-            true => Exit::Passed,
-            false => Exit::Failed,
-        });
-    }
-    let summary = compare(
-        ComparedRun {
-            name: &names[0],
-            capture: &left,
-        },
-        ComparedRun {
-            name: &names[1],
-            capture: &right,
-        },
-        span(arguments.tolerance),
-    );
-    output.result(&summary.show(&names[0], &names[1]).to_string())?;
-    Ok(if summary.same() {
-        Exit::Passed
-    } else {
-        Exit::Failed
-    })
+    let tolerance = JudgeOptions {
+        tolerance: arguments.tolerance.map(span),
+        ..JudgeOptions::default()
+    };
+    let shown = [&names[0][..], &names[1]];
+    let (same, text) = one.difference([&left, &right], tolerance.tolerance(), shown);
+    output.result(&text)?;
+    Ok(if same { Exit::Passed } else { Exit::Failed })
 }
 
 /// Whether nothing was carried.
@@ -447,9 +248,8 @@ fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<C
             return None;
         }
     };
-    let rate = entry.plan.as_ref().map(|plan| plan.rate);
     Some(Capture {
-        rate: rate.unwrap_or_default(),
+        rate: entry.rate(),
         traces: play_entry(&entry, AtMismatch::GoOn).traces,
         listened: None,
         timed: true,
@@ -462,8 +262,6 @@ fn title(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-fn span(tolerance: Option<Duration>) -> Span {
-    // Times of a capture are cut off to nanoseconds.
-    let nanos = tolerance.map_or(2, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
-    Span::from_nanos(nanos)
+fn span(tolerance: Duration) -> Span {
+    Span::from_nanos(u64::try_from(tolerance.as_nanos()).unwrap_or(u64::MAX))
 }

@@ -1,7 +1,7 @@
 //! `drivebench merge` of files: the counts of parts of campaigns.
 
 use super::merge::MergeArguments;
-use crate::buses::novobus::campaign::part::{CampaignCounts, CountsError, MergedCounts, merge};
+use crate::campaign::counts::{CampaignCounts, CountsError, MergedCounts, merge};
 use crate::campaign::share::share;
 use crate::command::exit::Exit;
 use crate::command::output::Output;

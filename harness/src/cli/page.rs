@@ -3,8 +3,8 @@
 use crate::command::output::Output;
 use crate::command::page::{NotWritable, writable, write};
 use crate::library::Entry;
-use crate::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use crate::scenario::run::Outcome;
+use crate::shown::{Head, ScenarioView, ShownScenario, run, section};
 use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 
@@ -41,11 +41,6 @@ impl Page {
             .iter()
             .map(|s| s.text.clone())
             .collect();
-        let rate = entry
-            .plan
-            .as_ref()
-            .map(|plan| plan.rate)
-            .unwrap_or_default();
         let name = entry.name.as_str();
         let played = ScenarioView {
             name: entry.short_name(),
@@ -55,8 +50,8 @@ impl Page {
             text: &entry.source.text,
             outcome,
             traces,
-            report: entry.report(),
-            rate,
+            report: entry.report,
+            rate: entry.rate(),
             again: &format!("drivebench trace {}", word(name)),
         };
         self.shown.push(section(self.shown.len() + 1, &played));

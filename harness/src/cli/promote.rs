@@ -5,6 +5,7 @@ use crate::buses::fuzz_of;
 use crate::command::exit::Exit;
 use crate::command::fuzz::promote::PromoteArguments;
 use crate::command::output::Output;
+use crate::command::play::{PlayedOnce, play_entry};
 use crate::explore::{ExploreError, bus_of};
 use crate::library::Entry;
 use crate::report::page::page;
@@ -30,12 +31,7 @@ pub fn played(name: &str, text: &str) -> Result<(Verdict, String, String), Explo
         text: text.to_owned().into(),
     };
     let entry = Entry::new(source, None)?;
-    let Some(plan) = entry.settled() else {
-        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
-    };
-    let mut link = plan.simulate();
-    let outcome = plan.play(&mut *link, AtMismatch::Stop);
-    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
+    let PlayedOnce { outcome, traces } = play_entry(&entry, AtMismatch::Stop);
     let page = page(&entry, &outcome, &traces);
     let why = outcome.finding.map(|finding| finding.message);
     Ok((outcome.verdict, why.unwrap_or_default(), page))

@@ -4,7 +4,6 @@ use super::args::{RunArguments, Selection};
 use super::junit::Cases;
 use super::run_rig::{PlayOrder, reports, state_size, work};
 use super::tally::{EarlierVerdicts, Tally};
-use crate::buses::novobus::report::plot::plot;
 use crate::buses::{bus_of, find_any_rig, is_bare};
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
@@ -17,12 +16,13 @@ use crate::evidence::{AboutRun, Earlier, EvidenceError, Folder, SplitRun, too_la
 use crate::library::Entry;
 use crate::link::Recording;
 use crate::report::finding::explain;
-use crate::report::pages::Head;
+use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::files::{LibraryError, is_named, sources};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::source::Source;
+use crate::shown::Head;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -305,7 +305,7 @@ fn other_sizes(entries: &[Entry], asked: Option<u8>) -> String {
     let Some(asked) = asked else {
         return String::new();
     };
-    let drives = |entry: &Entry| Some(entry.plan.as_ref()?.rings.first()?.drives());
+    let drives = |entry: &Entry| entry.settled.rings()?.drives.first().copied();
     let other = entries.iter().filter(|entry| drives(entry) != Some(asked));
     match other.count() {
         0 => String::new(),
@@ -335,10 +335,10 @@ fn keep(
         });
     };
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
-    let played = match (too_large, entry.settled()) {
-        (Some(why), _) => not_played(why),
-        (None, None) => play_entry(entry, AtMismatch::Stop),
-        (None, Some(plan)) => {
+    let plan = &entry.settled;
+    let played = match too_large {
+        Some(why) => not_played(why),
+        None => {
             kept.begins(1);
             let mut link = plan.simulate();
             let played = {

@@ -3,7 +3,6 @@
 use super::junit::Cases;
 use super::run::{details, drives, line};
 use super::tally::{EarlierVerdicts, Tally};
-use crate::buses::novobus::report::plot::plot;
 use crate::buses::run_on;
 use crate::cli::page::Page;
 use crate::command::exit::Exit;
@@ -17,11 +16,12 @@ use crate::evidence::{
 };
 use crate::library::Entry;
 use crate::link::Capability;
-use crate::report::pages::Head;
+use crate::report::plot::plot;
 use crate::rig::playing::{Play, QualificationKeeper, QualificationStopped, RigRun};
 use crate::rig::{Keeper, PlayedScenario, Rig, SessionError, UseOptions};
 use crate::scenario::run::{Outcome, Why};
 use crate::scenario::source::Source;
+use crate::shown::Head;
 use crate::signals::interrupt_flag;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -85,10 +85,7 @@ pub(crate) fn work(
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let needs = |entry: &Entry| {
-        let settled = entry.settled();
-        settled.is_some_and(|plan| plan.needs().contains(&Capability::LineErrors))
-    };
+    let needs = |entry: &Entry| entry.settled.needs().contains(&Capability::LineErrors);
     let options = UseOptions {
         purpose: job.purpose.to_owned(),
         wait: job.wait,

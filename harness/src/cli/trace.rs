@@ -2,32 +2,22 @@
 
 use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
 use super::run::details;
-use crate::buses::novobus::report::plot::plots;
-use crate::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
-use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
-use crate::buses::novobus::report::vcd::{self, Signals};
-use crate::buses::novobus::report::{csv, json};
 use crate::capture::Carries;
-use crate::capture::runs::bits_per_second;
 use crate::command::exit::Exit;
 use crate::command::output::{Output, unless_closed};
 use crate::command::page::writable;
 use crate::command::play::play_entry;
 use crate::library::Entry;
 use crate::regular;
-use crate::report::pcapng;
+use crate::report::plot::plots;
+use crate::report::vcd::Signals;
 use crate::scenario::files::sources;
-use crate::scenario::run::{AtMismatch, CellRecord};
+use crate::scenario::run::AtMismatch;
 use crate::scenario::verdict::Verdict;
-use crate::traffic::{SegmentReport, SharedForm};
+use crate::shown::{FileForm, RowPlacing, SegmentReport, ShownRun, TablePart};
 use clap::ValueEnum as _;
-use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 use std::io::{BufWriter, Write};
-use std::ops::Range;
-
-/// Lines about damaged bytes shown below a table.
-const WIRES: usize = 20;
 
 /// Plays a scenario and prints every byte.
 pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -62,15 +52,10 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     let shown = ShownRun {
         title: &entry.scenario.title,
         traces: &played.traces,
-        report: entry.report(),
-        rate: entry
-            .plan
-            .as_ref()
-            .map(|plan| plan.rate)
-            .unwrap_or_default(),
+        rate: entry.rate(),
         records: &played.outcome.records,
     };
-    if !show(&shown, arguments.format, showing, output)? {
+    if !show((entry.report, &shown), arguments.format, showing, output)? {
         return Ok(Exit::RigError);
     }
     output.say(&details(&entry, &played.outcome, &played.traces));
@@ -79,16 +64,6 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
         Verdict::Inconclusive => Exit::Passed,
         verdict => Exit::of(&[verdict], false),
     })
-}
-
-/// A run that is to be shown.
-pub(crate) struct ShownRun<'s> {
-    pub(crate) title: &'s str,
-    pub(crate) traces: &'s [Trace],
-    /// How the bus shows them; `None` for a ring.
-    pub(crate) report: Option<&'static dyn SegmentReport>,
-    pub(crate) rate: Rate,
-    pub(crate) records: &'s [CellRecord],
 }
 
 /// Whether a form can go where it is to go: into a file that can be written, and what is no text not to a terminal.
@@ -105,7 +80,7 @@ pub(crate) fn fits_output(format: TraceFormat, showing: &TraceOutput, output: &m
 
 /// Shows a run. Returns false after reporting that the file could not be written.
 pub(crate) fn show(
-    shown: &ShownRun<'_>,
+    shown: (&dyn SegmentReport, &ShownRun<'_>),
     format: TraceFormat,
     showing: &TraceOutput,
     output: &mut Output,
@@ -125,81 +100,43 @@ pub(crate) fn show(
 }
 
 fn write(
-    shown: &ShownRun<'_>,
+    (report, shown): (&dyn SegmentReport, &ShownRun<'_>),
     format: TraceFormat,
     showing: &TraceOutput,
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
-    if let Some(report) = shown.report {
-        let signals = signals(showing);
-        return of_shared_line((report, shown.traces), (format, signals), rows, out);
-    }
-    match format {
-        TraceFormat::Json => json::write(shown.traces, shown.records, out),
-        TraceFormat::Csv => csv::write(shown.traces, out),
-        TraceFormat::Vcd => vcd::write(shown.traces, shown.rate, signals(showing), out),
-        TraceFormat::Pcapng => pcapng::write(shown.traces, shown.rate, out),
+    let form = match format {
+        TraceFormat::Json => FileForm::Json,
+        TraceFormat::Csv => FileForm::Csv,
+        TraceFormat::Pcapng => FileForm::Pcapng,
+        TraceFormat::Candump => FileForm::Candump,
+        TraceFormat::Vcd if showing.lines_only => FileForm::Vcd(Signals::Lines),
+        TraceFormat::Vcd => FileForm::Vcd(Signals::All),
         TraceFormat::Svg => {
-            let options = SvgOptions {
-                title: shown.title,
-                id: "ring",
-                scale: match showing.time {
-                    TraceLayout::Index => RowPlacing::Index,
-                    TraceLayout::True => RowPlacing::Time,
-                },
-                rate: shown.rate,
-                rows,
+            let placing = match showing.time {
+                TraceLayout::Index => RowPlacing::Index,
+                TraceLayout::True => RowPlacing::Time,
             };
-            out.write_all(svg(shown.traces, &options).as_bytes())?;
-            out.flush()
+            FileForm::Svg(placing, rows)
         }
-        // `fits_bus` has refused it.
-        TraceFormat::Candump => Ok(()),
         TraceFormat::Table => {
+            let part = TablePart {
+                rows,
+                ..TablePart::default()
+            };
             for trace in shown.traces {
-                let part = TablePart {
-                    rows: rows.clone(),
-                    ..TablePart::default()
-                };
-                let wires = wires(trace, WIRES);
-                write!(out, "{}\n{LEGEND}{wires}", table(trace, &part))?;
+                let (rows, damaged) = (report.rows(trace, &part), report.damaged(trace));
+                match report.legend() {
+                    "" => write!(out, "{rows}{damaged}")?,
+                    legend => write!(out, "{rows}\n{legend}{damaged}")?,
+                }
             }
             out.write_all(plots(shown.records).as_bytes())?;
-            out.flush()
+            return out.flush();
         }
-    }
-}
-
-fn signals(showing: &TraceOutput) -> Signals {
-    match showing.lines_only {
-        true => Signals::Lines,
-        false => Signals::All,
-    }
-}
-
-/// Writes what a shared line carried. Other forms have been refused by [`fits_bus`].
-fn of_shared_line(
-    (report, traces): (&dyn SegmentReport, &[Trace]),
-    (format, signals): (TraceFormat, Signals),
-    wanted: Option<Range<usize>>,
-    mut out: impl Write,
-) -> std::io::Result<()> {
-    let mut write = |form| report.write(traces, form, &mut out);
-    match format {
-        TraceFormat::Vcd => vcd::write_shared(traces, bits_per_second(traces), signals, out),
-        TraceFormat::Json => write(SharedForm::Json),
-        TraceFormat::Candump => write(SharedForm::Candump),
-        TraceFormat::Csv => write(SharedForm::Csv),
-        TraceFormat::Pcapng => write(SharedForm::Pcapng),
-        _ => {
-            for trace in traces {
-                let text = report.rows(trace, wanted.clone(), None);
-                out.write_all(text.as_bytes())?;
-            }
-            out.flush()
-        }
-    }
+    };
+    report.write(shown, form, &mut out)
 }
 
 /// Whether a form can show what was carried. One that cannot is reported.

@@ -1,7 +1,7 @@
 //! A scenario played on a simulated bench.
 
 use crate::library::Entry;
-use crate::scenario::run::{AtMismatch, Outcome, Skip};
+use crate::scenario::run::{AtMismatch, Outcome};
 use harness_sim::record::Trace;
 use std::sync::atomic::AtomicBool;
 
@@ -22,12 +22,7 @@ pub(crate) fn play_entry_until(
     at_mismatch: AtMismatch,
     interrupt: &AtomicBool,
 ) -> PlayedOnce {
-    let Some(plan) = entry.settled() else {
-        return PlayedOnce {
-            outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
-            traces: Vec::new(),
-        };
-    };
+    let plan = &entry.settled;
     let mut link = plan.simulate();
     let outcome = plan.play_until(&mut *link, at_mismatch, interrupt);
     PlayedOnce {

@@ -1,13 +1,12 @@
 //! A scenario on simulated rings, from another program.
 
 use super::Error;
-use crate::buses::novobus::simulate::simulated;
+use crate::command::play::{PlayedOnce, play_entry};
 use crate::counted::counted;
 use crate::library::Entry;
-use crate::link::Link;
 use crate::report::page::page;
 use crate::scenario::files::sources;
-use crate::scenario::run::run;
+use crate::scenario::run::AtMismatch;
 use crate::scenario::source::{Source, line_number};
 use crate::scenario::verdict::Verdict;
 use std::fmt;
@@ -56,7 +55,7 @@ impl Scenario {
 
     fn settled(source: Source, drives: Option<u8>) -> Result<Self, Error> {
         let entry = Entry::new(source, drives)?;
-        match entry.plan {
+        match entry.settled.rings() {
             Some(_) => Ok(Self { entry }),
             None => Err(Error::Mistake(format!(
                 "{}: drives of the bus `{}` cannot be simulated yet",
@@ -75,13 +74,7 @@ impl Scenario {
     /// Plays it on simulated rings, made new for it, in virtual time. Two runs give the same bytes at the same times.
     #[must_use]
     pub fn play(&self) -> Played {
-        // What has no plan has been refused by `settled`.
-        let Some(plan) = &self.entry.plan else {
-            unreachable!("a settled scenario has a plan");
-        };
-        let mut link = simulated(plan);
-        let outcome = run(plan, &mut link);
-        let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+        let PlayedOnce { outcome, traces } = play_entry(&self.entry, AtMismatch::Stop);
         Played {
             verdict: outcome.verdict,
             mismatch: outcome.finding.as_ref().map(|found| {

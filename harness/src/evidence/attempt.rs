@@ -109,20 +109,13 @@ pub(super) fn again_on_own_bench(recorded: &Recorded, text: &str, drives: &[u8])
     };
     match Entry::fitting(source, drives.first().copied()) {
         Err(problems) => Again::impossible(problems.to_string()),
-        Ok(entry) => match entry.settled() {
-            Some(plan) if plan.report().is_none() && plan.size() != written(drives) => {
+        Ok(entry) => match entry.settled.rings() {
+            Some(rings) if rings.drives != drives => {
                 Again::impossible("it is for other rings than the rig has".to_owned())
             }
-            Some(plan) => simulated_again(recorded, plan),
-            None => Again::impossible("no scenario of this bus".to_owned()),
+            _ => simulated_again(recorded, &*entry.settled),
         },
     }
-}
-
-/// The sizes of the rings of a bench, as a scenario states its own.
-fn written(drives: &[u8]) -> String {
-    let sizes: Vec<_> = drives.iter().map(u8::to_string).collect();
-    sizes.join("+")
 }
 
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.

@@ -231,10 +231,7 @@ impl Opened {
         if let Some(judge) = self.judge().ok()? {
             return judge.not_begun(&entry.source, remarks);
         }
-        Some(Outcome::skipped(match entry.settled() {
-            Some(_) => too_large(entry, &self.rig)?,
-            None => Skip::no_bus(entry.scenario.bus),
-        }))
+        Some(Outcome::skipped(too_large(entry, &self.rig)?))
     }
 }
 
@@ -242,7 +239,7 @@ impl Opened {
 #[must_use]
 pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
     if let Some(port) = rig.port() {
-        let settled = entry.settled()?;
+        let settled = &entry.settled;
         let drives = port.drives.len();
         if entry.scenario.bus != port.bus.bus() {
             return Some(Skip::not_on_rig(entry.scenario.bus));
@@ -253,8 +250,7 @@ pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
         );
         return (settled.size() != drives.to_string()).then(|| Why::OtherDrives(why).into());
     }
-    let plan = entry.plan.as_ref()?;
-    let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
+    let rings = entry.settled.rings()?;
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    (own != sizes).then(|| Skip::other_size(plan.sizes.clone(), sizes))
+    (rings.drives != sizes).then(|| Skip::other_size(rings.sizes, sizes))
 }

@@ -10,14 +10,15 @@ use super::junit::{JunitCase, junit};
 use super::merge::{MERGE, derive_merged};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened, is_name, scenarios};
+use crate::buses::report_of;
 use crate::capture::{MAX_FILE, read};
 use crate::library::Entry;
 use crate::report::finding::{class, explain};
-use crate::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use crate::scenario::problem;
 use crate::scenario::run::{Mismatch, Outcome};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use crate::shown::{Head, ScenarioView, ShownScenario, run, section};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -365,7 +366,9 @@ fn show(
     opened: &Opened,
 ) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
-    let report = entry.as_ref().and_then(Entry::report);
+    let report = entry
+        .as_ref()
+        .map_or_else(|| report_of(traces), |own| own.report);
     let sources = entry.map_or_else(Vec::new, |entry| {
         let sources = entry.scenario.sources.into_iter();
         sources.map(|source| source.text).collect()

@@ -10,13 +10,12 @@ use super::names::Names;
 use super::part::SplitRun;
 use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
-use crate::buses::SimulatedLink;
-use crate::buses::novobus::report::json;
-use crate::buses::report_of;
+use crate::bus_name::BusName;
+use crate::buses::{named, report_of};
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
-use crate::traffic::SharedForm;
+use crate::shown::{FileForm, ShownRun};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -59,7 +58,7 @@ impl<'r> AboutRun<'r> {
             rig,
             rate: Rate::default().bits_per_second(),
             tolerance: Span::ZERO,
-            capabilities: SimulatedLink::CAPABILITIES.to_vec(),
+            capabilities: named(BusName::DEFAULT).simulates.to_vec(),
             anew: false,
             own_rings: true,
             purpose: "run",
@@ -299,10 +298,13 @@ impl Keeper for KeptAttempts<'_> {
 pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
     let mut capture = Vec::new();
     // Writing to a Vec cannot fail.
-    let _infallible = match report_of(traces) {
-        None => json::write(traces, &outcome.records, &mut capture),
-        Some(report) => report.write(traces, SharedForm::Json, &mut capture),
+    let shown = ShownRun {
+        title: "",
+        traces,
+        records: &outcome.records,
+        rate: Rate::default(),
     };
+    let _infallible = report_of(traces).write(&shown, FileForm::Json, &mut capture);
     String::from_utf8_lossy(&capture).into_owned()
 }
 

@@ -10,8 +10,8 @@ use super::selection;
 use super::verify::{Judged, scenarios};
 use crate::counted::counted;
 use crate::partition::Partition;
-use crate::report::pages::ShownScenario;
 use crate::rig::playing::{QualificationRecord, Qualified, RecordJudge, RecordedPart};
+use crate::shown::ShownScenario;
 use std::collections::BTreeMap;
 use std::path::Path;
 

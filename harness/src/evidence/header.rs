@@ -4,7 +4,8 @@ use super::files::{RIG, sum};
 use super::keep::Keep;
 use super::part;
 use super::record::{RecordLine, RunPart};
-use crate::buses::{SimulatedLink, bus_of, is_bare, judge_of};
+use crate::bus_name::BusName;
+use crate::buses::{bus_of, is_bare, judge_of, named};
 use crate::capture::Carries;
 use crate::link::Capability;
 use crate::rig::Rig;
@@ -104,7 +105,7 @@ pub(super) fn header(
             rate: Rate::default().bits_per_second(),
             drives: rig.ring_size(),
             tolerance: Span::ZERO,
-            capabilities: SimulatedLink::CAPABILITIES.to_vec(),
+            capabilities: named(BusName::DEFAULT).simulates.to_vec(),
             anew: false,
         },
         false => judge_of(rig, purpose.as_deref() == Some("qualify"))?.adopt(names),

@@ -34,10 +34,10 @@ impl Keep {
     /// bytes itself is counted by them.
     #[must_use]
     pub fn estimate<'e>(self, entries: impl Iterator<Item = &'e Entry>) -> u64 {
-        let sizes = entries.map(|entry| match &entry.plan {
-            Some(plan) => {
-                let links = plan.rings.iter().map(|ring| u64::from(ring.drives()) + 1);
-                let of_link = match plan.pieces_sent() as u64 {
+        let sizes = entries.map(|entry| match entry.settled.rings() {
+            Some(rings) => {
+                let links = rings.drives.iter().map(|drives| u64::from(*drives) + 1);
+                let of_link = match entry.settled.pieces_sent() as u64 {
                     0 => EACH_LINK,
                     sent => EACH_BYTE * sent,
                 };

@@ -1,11 +1,12 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use crate::buses::novobus::capture::diff::{ComparedRun, diff};
-use crate::buses::novobus::capture::scenario::{JudgeOptions, scenario};
-use crate::buses::novobus::report::{csv, json, svg, vcd};
-use crate::capture::{ReadSettings, read, read_with};
+use crate::buses::carrier;
+use crate::capture::{Carries, JudgeOptions, ReadSettings, read, read_with};
 use crate::report::pcapng;
+use crate::report::vcd::Signals;
+use crate::shown::{FileForm, RowPlacing, ShownRun};
 use harness_proto::time::Span;
+use std::io::ErrorKind;
 
 /// The longest input that is looked at.
 const LONGEST: usize = 65_536;
@@ -39,54 +40,52 @@ pub fn capture(data: &[u8]) {
     };
     // What is written is not longer than some tens of bytes for each byte read: nothing here grows without bound.
     assert!(taken.bytes() <= data.len(), "more bytes than the file has");
+    let bus = carrier(Carries::of(&taken.traces));
+    let report = bus.report;
     let mut written = Vec::new();
     let put = pcapng::write(&taken.traces, taken.rate, &mut written);
     assert!(put.is_ok(), "a Vec takes everything");
     match read(&written, Some(taken.rate)) {
         // Small times are relative to the start; large ones are times since 1970.
         Ok(again) if taken.end().since_start() < Span::from_millis(86_400_000) => {
-            let (left, right) = (
-                ComparedRun {
-                    name: "read",
-                    capture: &taken,
-                },
-                ComparedRun {
-                    name: "written",
-                    capture: &again,
-                },
-            );
-            let same = diff(left, right, Span::ZERO);
-            assert!(same.same(), "{}", same.show("read", "written"));
+            let names = ["read", "written"];
+            let (same, text) = report.difference([&taken, &again], Span::ZERO, names);
+            assert!(same, "{text}");
         }
         Ok(_) => {}
         Err(error) => assert_eq!(taken.traces.len(), 0, "{error}"),
     }
-    let mut sink = std::io::sink();
-    let shown = csv::write(&taken.traces, &mut sink)
-        .and_then(|()| json::write(&taken.traces, &[], &mut sink))
-        .and_then(|()| vcd::write(&taken.traces, taken.rate, vcd::Signals::All, &mut sink));
-    assert!(shown.is_ok(), "a sink takes everything");
-    let picture = svg::svg(
-        &taken.traces,
-        &svg::SvgOptions {
-            title: "any",
-            id: "any",
-            scale: svg::RowPlacing::Time,
-            rate: taken.rate,
-            rows: None,
-        },
-    );
-    assert!(
-        picture.len() < 3_000_000,
-        "a picture of {} bytes",
-        picture.len()
-    );
+    let run = ShownRun {
+        title: "any",
+        traces: &taken.traces,
+        records: &[],
+        rate: taken.rate,
+    };
+    let forms = [
+        FileForm::Csv,
+        FileForm::Json,
+        FileForm::Candump,
+        FileForm::Vcd(Signals::All),
+        FileForm::Svg(RowPlacing::Time, None),
+    ];
+    for form in forms {
+        let is_picture = matches!(form, FileForm::Svg(..));
+        let mut file = Vec::new();
+        match report.write(&run, form, &mut file) {
+            Ok(()) => {}
+            Err(error) => assert_eq!(error.kind(), ErrorKind::Unsupported, "{error}"),
+        }
+        let length = file.len();
+        assert!(
+            !is_picture || length < 3_000_000,
+            "a picture of {length} bytes"
+        );
+    }
     let options = JudgeOptions {
         title: "any",
-        setup: None,
-        tolerance: Span::ZERO,
+        ..JudgeOptions::default()
     };
-    if let Ok(text) = scenario(&taken, &options) {
+    if let Ok(text) = (bus.replayed)(&taken, &options) {
         assert!(!text.is_empty());
     }
 }

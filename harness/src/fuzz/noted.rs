@@ -2,14 +2,12 @@
 
 use super::capture::capture as capture_body;
 use super::text::{rig as rig_body, scenario as scenario_body};
-use crate::bus_name::BusName;
-use crate::buses::novobus::capture::scenario as sketch;
-use crate::buses::novobus::language::syntax::Scenario;
-use crate::capture::{self, CaptureError};
+use crate::buses::{carrier, named};
+use crate::capture::{self, CaptureError, Carries, JudgeOptions};
 use crate::evidence;
-use crate::scenario::parse::parse;
-use crate::scenario::plan::plan;
+use crate::scenario::parse::bus;
 use crate::scenario::problem::Problems;
+use crate::scenario::settled::BenchSize;
 use crate::scenario::source::Source;
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
@@ -17,7 +15,7 @@ use harness_sim::fuzz::{Feature, Notebook};
 use harness_sim::record::{Channel, LineByte};
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).
-const SIZES: [Option<u8>; 3] = [None, Some(1), Some(250)];
+const SIZES: [BenchSize; 3] = [BenchSize::Own, BenchSize::Of(1), BenchSize::Of(250)];
 
 /// How many words of a line identify its statement.
 const STATEMENT: usize = 3;
@@ -31,21 +29,19 @@ pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
     let Ok(source) = Source::from_bytes("input.scn".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
     };
-    let scenario: Scenario = match parse(&source) {
-        Ok(scenario) => scenario,
-        Err(found) => return problems(notes, "a mistake", &found),
-    };
+    let bus = named(bus(&source));
+    if let Err(found) = (bus.comes_back)(&source) {
+        return problems(notes, "a mistake", &found);
+    }
     for line in source.text.lines() {
         let said = statement(line);
         if !said.is_empty() {
             notes.note(|| Feature::new("", "a statement", said));
         }
     }
-    if scenario.bus == BusName::Novobus {
-        for size in SIZES {
-            if let Err(found) = plan(&scenario, &source, size) {
-                problems(notes, "a mistake for a size of ring", &found);
-            }
+    for size in SIZES {
+        if let Err(found) = (bus.settle)(&source, size) {
+            problems(notes, "a mistake for a size of ring", &found);
         }
     }
 }
@@ -101,14 +97,14 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     {
         note(arrival(byte).to_owned());
     }
-    let options = sketch::JudgeOptions {
+    let options = JudgeOptions {
         title: "any",
-        setup: None,
-        tolerance: harness_proto::time::Span::ZERO,
+        ..JudgeOptions::default()
     };
-    note(match sketch::scenario(&read, &options) {
+    let bus = carrier(Carries::of(&read.traces));
+    note(match (bus.replayed)(&read, &options) {
         Ok(_) => "a scenario can be made of it".to_owned(),
-        Err(error) => shape(&error.to_string()),
+        Err(error) => shape(&error),
     });
 }
 

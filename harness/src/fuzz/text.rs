@@ -1,12 +1,11 @@
 //! The bodies of the fuzz targets for texts: scenarios and rig files.
 
-use super::written;
-use crate::buses::novobus::language::Novobus;
-use crate::scenario::parse::parse;
-use crate::scenario::plan::plan;
+use crate::bus::Bus;
+use crate::buses::named;
+use crate::scenario::parse::bus;
 use crate::scenario::problem::{Problem, Problems};
+use crate::scenario::settled::BenchSize;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
 
 /// The longest text that is looked at, in bytes; what lies behind is left out.
 const LONGEST: usize = 8_192;
@@ -15,7 +14,12 @@ const LONGEST: usize = 8_192;
 const MISSING: usize = 100;
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest, a small one, and the largest (ND21 8.4).
-const SIZES: [Option<u8>; 4] = [None, Some(1), Some(3), Some(250)];
+const SIZES: [BenchSize; 4] = [
+    BenchSize::Own,
+    BenchSize::Of(1),
+    BenchSize::Of(3),
+    BenchSize::Of(250),
+];
 
 /// A text as a scenario: read, and settled for rings of several sizes.
 ///
@@ -26,19 +30,10 @@ pub fn scenario(data: &[u8]) {
     let Some((text, source)) = source("input.scn", data) else {
         return;
     };
-    let read = parse(&source);
-    let shown = match &read {
-        Ok(scenario) => {
-            written(scenario);
-            settled(scenario, &source)
-        }
-        Err(problems) => check(problems, &source),
-    };
+    let bus = named(bus(&source));
+    let shown = settled(bus, &source);
     if let Some(longer) = with_newline(&text) {
-        let again = match parse(&longer) {
-            Ok(scenario) => settled(&scenario, &longer),
-            Err(problems) => check(&problems, &longer),
-        };
+        let again = settled(bus, &longer);
         assert_eq!(again, shown, "a newline at the end makes a difference");
     }
 }
@@ -81,16 +76,16 @@ fn with_newline(text: &str) -> Option<Source> {
     Source::from_bytes("input".to_owned(), format!("{text}\n").into_bytes()).ok()
 }
 
-/// What a scenario is for each size, in one text.
-fn settled(scenario: &Scenario<Novobus>, source: &Source) -> String {
-    let mut shown = format!("{scenario:?}");
-    for size in SIZES {
-        shown += &match plan(scenario, source, size) {
-            Ok(plan) => format!("{plan:?}"),
-            Err(problems) => check(&problems, source),
-        };
+/// What a scenario is for each size, in one text; or its mistakes.
+fn settled(bus: &Bus, source: &Source) -> String {
+    if let Err(problems) = (bus.comes_back)(source) {
+        return check(&problems, source);
     }
-    shown
+    let shown = SIZES.map(|size| match (bus.settle)(source, size) {
+        Ok(settled) => format!("{settled:?}"),
+        Err(problems) => check(&problems, source),
+    });
+    shown.concat()
 }
 
 /// Every mistake has a place within the text and says something; what they say comes back.

@@ -1,15 +1,10 @@
 //! A finding as a text for people: its line in the scenario, what was expected, what was received, and the table around it.
 
-use crate::buses::novobus::report::mismatch::mismatch;
 use crate::library::Entry;
 use crate::scenario::run::Mismatch;
 use crate::scenario::source::line_number;
-use crate::traffic::last_rows;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
-
-/// Frames shown in front of the one that differs, at most.
-const ROWS: usize = 12;
 
 /// The line that a finding is about, with its place, and the bytes that differ.
 #[must_use]
@@ -30,22 +25,7 @@ pub fn explain(entry: &Entry, finding: &Mismatch, traces: &[Trace]) -> String {
     if !finding.in_error.is_empty() {
         let _infallible = writeln!(text, "in the error mode: {}", finding.in_error);
     }
-    let bytes = mismatch(finding, traces, &sources);
-    if bytes.is_empty() {
-        if let Some(report) = entry.report() {
-            for trace in traces {
-                // Writing to a String cannot fail.
-                let _infallible = write!(text, "\n{}", last_rows(report, trace, ROWS));
-            }
-        }
-        if !sources.is_empty() {
-            let _infallible = writeln!(text, "see {}", sources.join(", "));
-        }
-    } else {
-        text.push('\n');
-        text.push_str(&bytes);
-    }
-    text
+    text + &entry.report.around(finding, traces, &sources)
 }
 
 /// `file:line:column` of a finding.

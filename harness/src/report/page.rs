@@ -1,9 +1,9 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
-use crate::buses::novobus::report::plot::plots;
-use crate::buses::novobus::report::table::{LEGEND, TablePart, table, wires};
 use crate::library::Entry;
+use crate::report::plot::plots;
 use crate::scenario::run::Outcome;
+use crate::shown::TablePart;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -12,9 +12,6 @@ const ROWS: usize = 120;
 
 /// Columns of a table that a page holds at most.
 const COLUMNS: usize = 20;
-
-/// Lines of bytes where a link had another one than its neighbours, at most.
-const WIRES: usize = 20;
 
 /// The page of a scenario that was played, with what each ring's links carried.
 #[must_use]
@@ -28,23 +25,18 @@ pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     for remark in &outcome.remarks {
         let _infallible = writeln!(page, "note: {remark}");
     }
-    let mut legend = true;
+    let report = entry.report;
+    let part = TablePart {
+        at_most: Some(ROWS),
+        columns_at_most: Some(COLUMNS),
+        ..TablePart::default()
+    };
     for trace in traces {
-        if let Some(report) = entry.report() {
-            let rows = report.rows(trace, None, Some(ROWS));
-            let _infallible = write!(page, "\n{rows}");
-            legend = false;
-            continue;
-        }
-        let part = TablePart {
-            at_most: Some(ROWS),
-            columns_at_most: Some(COLUMNS),
-            ..TablePart::default()
-        };
-        let _infallible = write!(page, "\n{}{}", table(trace, &part), wires(trace, WIRES));
+        let (rows, damaged) = (report.rows(trace, &part), report.damaged(trace));
+        let _infallible = write!(page, "\n{rows}{damaged}");
     }
-    if legend {
-        let _infallible = write!(page, "\n{LEGEND}");
+    if !report.legend().is_empty() {
+        let _infallible = write!(page, "\n{}", report.legend());
     }
     page.push_str(&plots(&outcome.records));
     page

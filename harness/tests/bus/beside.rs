@@ -1,40 +1,17 @@
-//! What stands beside a bus, and a record that does not show it.
+//! Probes in a record.
 
-use harness::buses::SimulatedLink;
-use harness::buses::novobus::gate::guard_rings;
-use harness::buses::novobus::link::BesideTheBus as _;
 use harness::evidence::RecordLine as Written;
+use harness::library::Entry;
 use harness::link::{Line as _, Link, LinkEvent, Recording, Replay};
+use harness::scenario::source::Source;
 use harness_proto::line::Rate;
-use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::guard::Limits;
-use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::bench::Bench;
-use harness_sim::novobus::drive::Drive;
-use harness_sim::novobus::plain::PlainDrive;
-use harness_sim::novobus::ring::Ring;
 
-fn link() -> SimulatedLink {
-    let size = RingSize::new(2).expect("1 to 250");
-    let drive = |_| Drive::Plain(PlainDrive::new(Properties::default(), [0; 256]));
-    SimulatedLink::new(Bench::one(Ring::new(size, Rate::Baud38400, drive)))
-}
-
-/// A simulation is shown by the link itself, through a guard and by a whole recording; a recording as of a rig hides it.
-#[test]
-fn only_a_recording_of_a_rig_hides_the_simulation() {
-    let sees = |link: &dyn Link| {
-        let cell = link.peek(0, 1, 0xFE00);
-        assert_eq!(cell.is_some(), link.error_of(0, 1).is_some());
-        cell.is_some()
-    };
-    assert!(sees(&link()));
-    let mut guarded = guard_rings(link(), Limits::default());
-    assert!(sees(&guarded));
-    let mut events = Vec::new();
-    assert!(sees(&Recording::whole(&mut guarded, &mut events)));
-    assert!(!sees(&Recording::new(&mut guarded, &mut events)));
+fn link() -> Box<dyn Link> {
+    let text = "title two\nring 2\ndrive 0..last model plain\n> 80\n";
+    let source = Source::from_bytes("two".to_owned(), text.into()).expect("a text");
+    let entry = Entry::new(source, None).expect("a scenario");
+    entry.settled.simulate()
 }
 
 /// A probe is recorded with what was sent, and played back only for the same bytes.
@@ -43,7 +20,7 @@ fn a_probe_is_played_back_for_the_same_bytes() {
     let bytes = [0x80, 0x80, 0x88];
     let mut link = link();
     let mut events = Vec::new();
-    let mut recording = Recording::new(&mut link, &mut events);
+    let mut recording = Recording::new(&mut *link, &mut events);
     recording.begin();
     let came = recording.probe(0, &bytes);
     assert_eq!(came.len(), bytes.len());

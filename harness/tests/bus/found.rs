@@ -58,7 +58,7 @@ impl Deviations {
             .replace(self.bus, &format!("{}{lines}", self.bus));
         let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
         let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
-        let plan = entry.settled().expect("a bus that is built");
+        let plan = &entry.settled;
         let mut link = plan.simulate();
         let outcome = plan.play(&mut *link, AtMismatch::Stop);
         (outcome.verdict, link.carried())

@@ -1,11 +1,9 @@
 //! A link of frames: a bus on CAN needs no ring to be sent to, recorded and played back.
 
-use harness::buses::novobus::gate::guard_rings;
 use harness::evidence::RecordLine as Written;
 use harness::link::{Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay};
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, CanError, Frame};
-use harness_proto::novobus::guard::Limits;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use std::collections::VecDeque;
@@ -199,17 +197,6 @@ fn other_frames_are_not_played_back() {
     replay.begin();
     replay.send(0, Out::Frames(&frames()[..1]));
     assert!(replay.trouble().is_some());
-}
-
-/// The guard of rings judges bytes; nothing leaves through a guard that does not judge it.
-#[test]
-fn the_guard_of_a_ring_lets_no_frame_pass() {
-    let mut guarded = guard_rings(Memory::default(), Limits::default());
-    assert!(!guarded.permits(0, Out::Frames(&frames())));
-    guarded.send(0, Out::Frames(&frames()));
-    assert_eq!(guarded.inner().carried(), 0);
-    let trouble = guarded.trouble().expect("trouble").to_string();
-    assert!(trouble.contains("frames are not sent"), "{trouble}");
 }
 
 /// A line of an event that cannot be is none.

@@ -13,7 +13,7 @@ use std::path::Path;
 pub(crate) fn snapshot(path: &Path) -> datatest_stable::Result<()> {
     let source = Source::read(path)?;
     let entry = Entry::new(source, None).map_err(|problems| format!("{:#?}", problems.all()))?;
-    let plan = entry.settled().ok_or("a bus that is not built yet")?;
+    let plan = &entry.settled;
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, AtMismatch::Stop);
     let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();

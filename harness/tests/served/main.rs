@@ -27,7 +27,6 @@ mod python;
 mod python_package;
 mod reports;
 mod ring;
-mod scenarios;
 mod ser2net;
 mod serve;
 mod session;

@@ -20,5 +20,4 @@ mod python;
 mod reports;
 mod rig;
 mod tidy;
-mod top;
 mod unitek;

@@ -1,7 +1,6 @@
 //! The words of the bus: header lines, messages and steps, as read, settled, played and written.
 
 use crate::bench::Bench;
-use crate::report::ValveReport;
 use crate::valve::Said;
 use harness_bench::bus_name::BusName;
 use harness_bench::link::{Capability, Link};
@@ -16,7 +15,6 @@ use harness_bench::scenario::run::outcome::Stop;
 use harness_bench::scenario::run::player::Runner;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::syntax::Scenario;
-use harness_bench::traffic::SegmentReport;
 use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
 
@@ -309,10 +307,6 @@ impl Language for Valves {
         frame.to_string()
     }
 
-    fn report() -> Option<&'static dyn SegmentReport> {
-        Some(&ValveReport)
-    }
-
     fn write_header(header: &Vec<(u8, bool)>) -> (Vec<(&'static str, String)>, Vec<String>) {
         let line = |&(valve, sticks): &(u8, bool)| match sticks {
             true => format!("valve {valve} sticks"),
@@ -338,7 +332,7 @@ mod tests {
     use super::*;
     use harness_bench::scenario::parse::parse;
     use harness_bench::scenario::run::AtMismatch;
-    use harness_bench::scenario::settled::settle;
+    use harness_bench::scenario::settled::{BenchSize, settle};
     use harness_bench::scenario::source::Source;
     use harness_bench::scenario::verdict::Verdict;
     use harness_bench::scenario::write::write;
@@ -354,7 +348,7 @@ mod tests {
         };
         let scenario: Scenario<Valves> = parse(&source).expect("a scenario");
         assert_eq!(write(&scenario), text);
-        let (_, plan) = settle::<Valves>(&source, None).expect("a scenario");
+        let (_, plan) = settle::<Valves>(&source, BenchSize::Own).expect("a scenario");
         let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
         assert_eq!(outcome.verdict, Verdict::Passed);
     }

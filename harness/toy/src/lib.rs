@@ -21,6 +21,7 @@ use harness_bench::capture::Carries;
 use harness_bench::command::deviations::DeviationRow;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
+use harness_bench::fuzz::comes_back;
 use harness_bench::manual::Manual;
 use harness_bench::scenario::settled::settle;
 
@@ -39,6 +40,7 @@ pub static BUS: Bus = Bus {
     carries: Carries::Frames,
     example: "a-valve-opens",
     settle: settle::<language::Valves>,
+    comes_back: comes_back::<language::Valves>,
     cell_names: Vec::new,
     cells: |_, output| {
         output.complain("a valve holds nothing but its place; `? valve 1 at 50` looks at it");
@@ -55,8 +57,16 @@ pub static BUS: Bus = Bus {
     },
     dissector: || "-- there is no dissector of valves yet\n".to_owned(),
     sim: |_, _, _| Err(Failure::refused("valves are not served yet")),
+    simulates: &[],
     live: |_, _| Box::new(report::ValveText),
+    report: &report::ValveReport,
+    judged: |_, _| Err("captures of valves are not judged".to_owned()),
+    replayed: |_, _| Err("captures of valves are not replayed".to_owned()),
     fuzz: (&[], &[]),
     rigs: None,
+    rings: None,
     shared: None,
+    campaigns: Vec::new,
+    campaign: |_| None,
+    embedding: None,
 };

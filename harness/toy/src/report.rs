@@ -3,9 +3,8 @@
 use crate::valve::Said;
 use harness_bench::capture::Piece;
 use harness_bench::capture::live::{LiveLine, LiveText};
-use harness_bench::traffic::SegmentReport;
+use harness_bench::shown::{SegmentReport, TablePart};
 use harness_sim::record::{LineFrame, Trace};
-use std::ops::Range;
 
 /// The table of valves.
 #[derive(Clone, Copy, Debug)]
@@ -16,11 +15,11 @@ impl SegmentReport for ValveReport {
         "frames of valves"
     }
 
-    fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
+    fn rows(&self, trace: &Trace, part: &TablePart) -> String {
         let frames = trace.channels.iter().flat_map(|channel| channel.frames());
-        let wanted = wanted.unwrap_or(0..usize::MAX);
+        let wanted = part.rows.clone().unwrap_or(0..usize::MAX);
         let shown = frames.skip(wanted.start).take(wanted.len());
-        let rows = shown.take(at_most.unwrap_or(usize::MAX)).map(row);
+        let rows = shown.take(part.at_most.unwrap_or(usize::MAX)).map(row);
         let head = "time  meaning\n".to_owned();
         std::iter::once(head).chain(rows).collect()
     }

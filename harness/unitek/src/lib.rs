@@ -25,9 +25,11 @@ mod whereabouts;
 
 use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::line::LineCampaign;
-use harness_bench::capture::Carries;
+use harness_bench::campaign::{Campaign, CampaignError};
+use harness_bench::capture::{Carries, judged_frames, replayed_frames};
+use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
+use harness_bench::shown::SegmentReport as _;
 use harness_sim::unitek::fuzz;
 
 /// UNITEK DS/BAMOCAR on CAN.
@@ -37,24 +39,32 @@ pub static BUS: Bus = Bus {
     carries: Carries::Frames,
     example: "unitek-ex-11-speed-routine",
     settle: settled::settle::<language::Unitek>,
+    comes_back: comes_back::<language::Unitek>,
     cell_names: || cli::cells::names().map(str::to_owned).collect(),
     cells: cli::cells::cells,
     deviations: cli::deviations::rows,
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
+    simulates: &simulate::Bench::CAPABILITIES,
     live: |_, _| Box::new(report::table::FrameText),
+    report: &report::FrameReport,
+    judged: |capture, options| {
+        let pieces = report::FrameReport.counted(&capture.traces);
+        judged_frames(capture::judged, pieces, (capture, options))
+    },
+    replayed: |capture, options| replayed_frames(capture::scenario, (capture, options)),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
     rigs: Some(rig::COMMANDS),
+    campaigns: campaign::names,
+    campaign: |name| {
+        let found = campaign::find(name)?.map(|own| -> Box<dyn Campaign> { Box::new(own) });
+        Some(found.map_err(CampaignError::Said))
+    },
+    embedding: None,
+    rings: None,
     shared: Some(SharedLine {
         port: &rig::PORT,
-        report: &report::FrameReport,
         description: dbc::dbc,
-        replayed: capture::scenario,
-        judged: capture::judged,
-        campaigns: campaign::names,
-        campaign: |name| {
-            Some(campaign::find(name)?.map(|own| -> Box<dyn LineCampaign> { Box::new(own) }))
-        },
     }),
 };
 

@@ -133,7 +133,7 @@ pub(crate) struct Bench {
 
 impl Bench {
     /// What a simulated bench can do.
-    pub(super) const CAPABILITIES: [Capability; 8] = [
+    pub(crate) const CAPABILITIES: [Capability; 8] = [
         Capability::Interposer,
         Capability::Tap,
         Capability::Memory,

@@ -11,6 +11,7 @@ pub mod frames;
 pub mod gap;
 pub mod import;
 pub mod json;
+mod judged;
 pub mod live;
 pub mod order;
 pub mod pcap;
@@ -23,12 +24,12 @@ pub mod telegrams;
 
 pub use import::{ChannelTarget, Imported, NamedLink, ReadSettings, UartFormat};
 
+pub use judged::{JudgeOptions, JudgedCapture, JudgedFrames, judged_frames, replayed_frames};
 pub use recorder::{AWAY, Carries, LiveRecorder, Piece, RecordedPlace};
 pub use tape::Tape;
 
 use crate::counted::counted;
 use crate::regular::{self, Links};
-use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Format, Rate};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::profibus::BusRate;
@@ -348,21 +349,6 @@ impl Capture {
         });
         last.max().unwrap_or(Instant::START)
     }
-}
-
-/// What came of judging a capture of a shared line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct JudgedFrames {
-    /// Passed, failed, or inconclusive where nothing was compared.
-    pub verdict: Verdict,
-    /// How many frames or telegrams of drives were compared.
-    pub compared: usize,
-    /// How many could be compared.
-    pub replies: usize,
-    /// What differs, a sentence each.
-    pub differences: Vec<String>,
-    /// What was not compared, a sentence each.
-    pub remarks: Vec<String>,
 }
 
 /// The formats that a line of octets may have: that of a bus whose stations share it, or that of a ring. The usual one first.

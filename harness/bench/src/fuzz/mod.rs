@@ -5,4 +5,4 @@ pub mod distil;
 pub mod input;
 mod written;
 
-pub use written::written;
+pub use written::{comes_back, written};

@@ -2,6 +2,7 @@
 
 use crate::scenario::language::Language;
 use crate::scenario::parse::parse;
+use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::write::write;
@@ -30,4 +31,15 @@ fn said<L: Language>(scenario: &Scenario<L>) -> String {
     pieces.fold(first, |all, piece| {
         all + piece.split_once('}').map_or("", |(_, behind)| behind)
     })
+}
+
+/// The same of a text.
+///
+/// # Errors
+/// The text has mistakes.
+///
+/// # Panics
+/// As [`written`].
+pub fn comes_back<L: Language>(source: &Source) -> Result<(), Problems> {
+    parse::<L>(source).map(|scenario| written(&scenario))
 }

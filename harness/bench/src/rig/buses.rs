@@ -59,6 +59,7 @@ impl PortRow {
 pub type RingMistakes = Vec<(Option<TextSpan>, Problem)>;
 
 /// What the bus of rings knows of `[ring.1]` and `[ring.2]`.
+#[derive(Clone, Copy)]
 pub struct RingRow {
     /// The lines of a profile.
     pub profile: fn(&str) -> Result<ProfileLines, ProfileError>,

@@ -11,10 +11,10 @@ use super::run::outcome::{ByteDifference, Mismatch, Stop};
 use super::run::player::{MAX_ROUND, Runner};
 use super::run::record::CellRecord;
 use super::scanner::Scanner;
+use super::settled::PlannedRings;
 use super::syntax::Scenario;
 use crate::bus_name::BusName;
 use crate::link::{Capability, Link, LinkFault};
-use crate::traffic::SegmentReport;
 use harness_proto::time::{Instant, Span};
 use std::fmt::Debug;
 
@@ -260,9 +260,16 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         Vec::new()
     }
 
-    /// How what was carried is shown; `None` for a ring.
-    fn report() -> Option<&'static dyn SegmentReport> {
+    /// The rings of its bench; `None` where stations share one line.
+    fn planned_rings(plan: &Plan<Self>) -> Option<PlannedRings> {
+        let _shared = plan;
         None
+    }
+
+    /// Whether it is for several sizes of rings, and this is one of them.
+    fn fits(header: &Self::Header, drives: u8) -> bool {
+        let _of_one_size = (header, drives);
+        false
     }
 
     /// Writes the header lines: each with its word, and behind them those about devices.

@@ -9,10 +9,33 @@ use super::run::{AtMismatch, Outcome};
 use super::source::Source;
 use super::syntax::{Scenario, ScenarioHead};
 use crate::link::{Capability, Link};
-use crate::traffic::SegmentReport;
+use harness_proto::line::Rate;
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+/// For which size of ring a scenario is settled. Where stations share one line, a scenario is for one bench alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BenchSize {
+    /// Its own.
+    #[default]
+    Own,
+    /// This one.
+    Of(u8),
+    /// This one, where it is for several sizes and this is one of them; or its own.
+    Fitting(u8),
+}
+
+/// The rings of a settled scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlannedRings {
+    /// How many drives each has.
+    pub drives: Vec<u8>,
+    /// For which sizes the scenario is: the smallest and the largest of each ring.
+    pub sizes: Vec<(u8, u8)>,
+    /// The rate of the line.
+    pub rate: Rate,
+}
 
 /// A settled scenario, and what every bus can do with it.
 pub trait Settled: Debug + Send + Sync {
@@ -28,8 +51,11 @@ pub trait Settled: Debug + Send + Sync {
     /// How many ports the master has on its bench.
     fn ports(&self) -> usize;
 
-    /// How what was carried is shown; `None` for a ring.
-    fn report(&self) -> Option<&'static dyn SegmentReport>;
+    /// The rings of its bench; `None` where stations share one line.
+    fn rings(&self) -> Option<PlannedRings>;
+
+    /// How many pieces its steps send; those of a master's own program are not known.
+    fn pieces_sent(&self) -> usize;
 
     /// A simulated bench for it.
     fn simulate(&self) -> Box<dyn Link>;
@@ -65,8 +91,12 @@ impl<L: Language> Settled for Plan<L> {
         L::ports(self)
     }
 
-    fn report(&self) -> Option<&'static dyn SegmentReport> {
-        L::report()
+    fn rings(&self) -> Option<PlannedRings> {
+        L::planned_rings(self)
+    }
+
+    fn pieces_sent(&self) -> usize {
+        Plan::pieces_sent(self)
     }
 
     fn simulate(&self) -> Box<dyn Link> {
@@ -90,9 +120,14 @@ impl<L: Language> Settled for Plan<L> {
 /// Its mistakes.
 pub fn settle<L: Language>(
     source: &Source,
-    size: Option<u8>,
+    size: BenchSize,
 ) -> Result<(ScenarioHead, Arc<dyn Settled>), Problems> {
     let scenario: Scenario<L> = parse(source)?;
+    let size = match size {
+        BenchSize::Own => None,
+        BenchSize::Of(drives) => Some(drives),
+        BenchSize::Fitting(drives) => Some(drives).filter(|own| L::fits(&scenario.header, *own)),
+    };
     let plan = plan(&scenario, source, size)?;
     Ok((scenario.head(), Arc::new(plan)))
 }

@@ -15,6 +15,7 @@ pub mod served;
 pub mod shell;
 pub mod stage;
 pub mod tcp;
+mod thread;
 
 pub use control::ControlAnswer;
 pub use control::first;
@@ -22,3 +23,4 @@ pub use place::{ClientRole, ControlPlace, Inner, Pace, ServedAt};
 pub use served::ServedBus;
 pub use shell::{EndRequest, serve_until};
 pub use shell::{ServeEnd, ServeError, ServeHost, ServeOptions, serve};
+pub use thread::ServedThread;

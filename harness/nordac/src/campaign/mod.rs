@@ -13,7 +13,8 @@ pub(crate) use converse::{Conversation, StepEnd};
 pub(crate) use file::{CampaignStep, TelegramCampaignFile};
 
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::OutcomeClass;
+use harness_bench::campaign::line::{LineCampaign, LineOutcome, PlayedLine, case_of};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};
 use include_dir::{Dir, include_dir};
@@ -29,26 +30,26 @@ const FOLDER: &str = "nordac/";
 const SHOWN: usize = 8;
 
 /// The classes, in order.
-pub(crate) const CLASSES: [LineClass; 4] = [
-    LineClass {
+pub(crate) const CLASSES: [OutcomeClass; 4] = [
+    OutcomeClass {
         name: "unharmed",
         about: "every step ended as without the fault, and no request was repeated",
         letter: '.',
         gravity: 0,
     },
-    LineClass {
+    OutcomeClass {
         name: "repeated",
         about: "every step ended as without the fault, after a repeated request",
         letter: 'R',
         gravity: 2,
     },
-    LineClass {
+    OutcomeClass {
         name: "fell-back",
         about: "the master started the slave again, or gave up",
         letter: 'F',
         gravity: 4,
     },
-    LineClass {
+    OutcomeClass {
         name: "wrong-word",
         about: "the master noticed nothing, and a word or what the slave holds is wrong",
         letter: 'W',

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::language::Nordac;
-use harness_bench::campaign::line::{replayed, table};
+use harness_bench::campaign::PlayedCampaign as _;
+use harness_bench::campaign::line::replayed;
 
 /// The page with the figures.
 const PAGE: &str = include_str!("../../../../corpora/campaigns/README.md");
@@ -42,7 +43,7 @@ fn have_the_figures_that_they_pin<'n>(names: impl IntoIterator<Item = &'n String
         assert_eq!(expect.get("cases"), Some(&pinned.iter().sum()), "{name}");
         let played = campaign.run(&|_| {});
         if !played.differs().is_empty() {
-            wrong.push_str(&table(&played));
+            wrong.push_str(&played.table());
         }
         let figures = pinned.map(|figure| figure.to_string()).join(" | ");
         let row = format!("| `{name}` | {} | {figures} |", pinned.iter().sum::<u64>());

@@ -6,7 +6,7 @@ use crate::language::Nordac;
 use harness_bench::capture::runs::{octet_time, octets, runs};
 use harness_bench::scenario::files::sources;
 use harness_bench::scenario::run::AtMismatch;
-use harness_bench::scenario::settled::settle;
+use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES};
 use harness_proto::time::{Instant, Span};
@@ -49,7 +49,7 @@ pub(super) fn trace(source: &Source, lines: &str) -> Trace {
     let mut text = source.text.to_string();
     text.insert_str(end.expect("a slave"), lines);
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
-    let found = settle::<Nordac>(&source, None);
+    let found = settle::<Nordac>(&source, BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);

@@ -12,7 +12,6 @@ pub(crate) use jobs::KnownSlaves;
 
 use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, TelegramStep};
-use crate::report::TelegramReport;
 use crate::simulate;
 use harness_bench::bus_name::BusName;
 use harness_bench::link::Link;
@@ -23,7 +22,6 @@ use harness_bench::scenario::run::outcome::{Mismatch, Stop};
 use harness_bench::scenario::run::player::Runner;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::syntax::Scenario;
-use harness_bench::traffic::SegmentReport;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 
@@ -50,10 +48,6 @@ impl Language for Nordac {
     type Received = Received;
     type State = KnownSlaves;
     type Planner = Planner;
-
-    fn report() -> Option<&'static dyn SegmentReport> {
-        Some(&TelegramReport)
-    }
 
     fn header_words() -> Vec<&'static str> {
         parse::HEADER.to_vec()

@@ -5,7 +5,7 @@ use harness_bench::bus_name::BusName;
 use harness_bench::fuzz::written;
 use harness_bench::scenario::files::sources;
 use harness_bench::scenario::parse::{bus, parse};
-use harness_bench::scenario::settled::settle;
+use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
@@ -22,7 +22,7 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let found = settle::<Nordac>(&source(&format!("{HEADER}{lines}")), None);
+    let found = settle::<Nordac>(&source(&format!("{HEADER}{lines}")), BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
@@ -43,7 +43,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = settle::<Nordac>(&source, None).expect_err(lines);
+    let found = settle::<Nordac>(&source, BenchSize::Own).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);

@@ -8,19 +8,22 @@ pub(crate) mod live;
 pub(crate) mod pcapng;
 pub(crate) mod sequence;
 pub(crate) mod table;
+mod vcd;
 mod words;
 
 pub(crate) use words::Reader;
 pub(super) use words::{CONTROL, PRM};
 
 use harness_bench::bus_name::BusName;
+use harness_bench::capture::Capture;
 use harness_bench::capture::runs::said;
 use harness_bench::html::Html;
-use harness_bench::traffic::{SegmentReport, SharedForm, drawn, no_form};
+use harness_bench::shown::{
+    FileForm, SegmentReport, ShownRun, TablePart, TraceView, drawn, no_form,
+};
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
 use std::io::{Error, Write};
-use std::ops::Range;
 
 /// How telegrams are shown.
 #[derive(Clone, Copy, Debug)]
@@ -38,31 +41,36 @@ impl SegmentReport for TelegramReport {
 
     fn difference(
         &self,
-        [left, right]: [&[Trace]; 2],
+        [left, right]: [&Capture; 2],
         tolerance: Span,
         names: [&str; 2],
-    ) -> Option<(bool, String)> {
-        let found = diff::difference(left, right, tolerance);
-        Some((found.is_none(), found.show(names)))
+    ) -> (bool, String) {
+        let found = diff::difference(&left.traces, &right.traces, tolerance);
+        (found.is_none(), found.show(names))
     }
 
-    fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
-        table::table(trace, wanted, at_most)
+    fn rows(&self, trace: &Trace, part: &TablePart) -> String {
+        table::table(trace, part.rows.clone(), part.at_most)
     }
 
-    fn pictures(&self, trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+    fn pictures(&self, view: &TraceView<'_>) -> Vec<(String, Html)> {
+        let TraceView {
+            trace, id, title, ..
+        } = *view;
         drawn(
             |html| sequence::sequence(html, id, title, trace),
             |html| curves::curves(html, id, trace),
         )
     }
 
-    fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
+    fn write(&self, run: &ShownRun<'_>, form: FileForm, out: &mut dyn Write) -> Result<(), Error> {
+        let traces = run.traces;
         match form {
-            SharedForm::Json => json::write(BusName::Nordac, traces, out),
-            SharedForm::Csv => csv::write(traces, out),
-            SharedForm::Pcapng => pcapng::write(traces, out),
-            SharedForm::Candump => Err(no_form(self.carries(), form)),
+            FileForm::Json => json::write(BusName::Nordac, traces, out),
+            FileForm::Csv => csv::write(traces, out),
+            FileForm::Pcapng => pcapng::write(traces, out),
+            FileForm::Vcd(signals) => vcd::write(traces, signals, out),
+            FileForm::Candump | FileForm::Svg(..) => Err(no_form(self.carries(), &form)),
         }
     }
 }

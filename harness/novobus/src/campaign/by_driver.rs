@@ -295,7 +295,8 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut later = 0;
         for name in names() {
-            let campaign = find(Path::new(name)).expect("a built-in campaign");
+            let found = find(Path::new(&name)).expect("a built-in campaign");
+            let campaign = found.expect("a campaign");
             let Some(by_driver) = campaign.driver() else {
                 continue;
             };

@@ -24,10 +24,8 @@ const SPELLING_AFTER_SILENCE: usize = SPELLING + 150;
 
 /// What the master sent, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Said {
-    /// Why.
+pub(crate) struct Said {
     pub why: &'static str,
-    /// The bytes.
     pub bytes: Vec<u8>,
 }
 

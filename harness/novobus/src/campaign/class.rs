@@ -1,6 +1,7 @@
 //! What can come of a fault.
 
 use crate::campaign::fault::link_index;
+use harness_bench::campaign::OutcomeClass;
 use harness_proto::novobus::master::{Fault, LinkEnd};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -13,7 +14,7 @@ use std::fmt;
 /// every job has been confirmed by a right answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum CaseClass {
+pub(crate) enum CaseClass {
     /// Not noticed and without effect: every drive has the right cells and waits for a sync byte.
     Harmless,
     /// Noticed, the damaged link named, everything back, every cell right.
@@ -34,7 +35,7 @@ pub enum CaseClass {
 
 impl CaseClass {
     /// All of them, in order of gravity.
-    pub const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Harmless,
         Self::Located,
         Self::Recovered,
@@ -46,32 +47,57 @@ impl CaseClass {
 
     /// The name in files and tables.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Harmless => "harmless",
-            Self::Located => "located",
-            Self::Recovered => "recovered",
-            Self::Mislocated => "mislocated",
-            Self::NotRecovered => "not-recovered",
-            Self::Corrupted => "corrupted",
-            Self::SilentCorruption => "silent-corruption",
-        }
+    pub(crate) const fn name(self) -> &'static str {
+        self.outcome().name
     }
 
     /// What it means, in a line.
     #[must_use]
-    pub const fn about(self) -> &'static str {
-        match self {
-            Self::Harmless => "not noticed, and nothing differs",
-            Self::Located => "the damaged link named, all back",
-            Self::Recovered => "no link named, all back",
-            Self::Mislocated => "a sound link named, all back",
-            Self::NotRecovered => "noticed, not all back",
-            Self::Corrupted => "noticed and repaired, but a cell is wrong",
-            Self::SilentCorruption => "not noticed, and a value is wrong",
-        }
+    pub(crate) const fn about(self) -> &'static str {
+        self.outcome().about
+    }
+
+    /// What tables and pages say of it.
+    #[must_use]
+    pub(crate) const fn outcome(self) -> &'static OutcomeClass {
+        &OUTCOMES[self as usize]
     }
 }
+
+const fn outcome(
+    gravity: u8,
+    letter: char,
+    name: &'static str,
+    about: &'static str,
+) -> OutcomeClass {
+    OutcomeClass {
+        name,
+        about,
+        letter,
+        gravity,
+    }
+}
+
+/// What tables and pages say of each class, in order.
+pub(crate) static OUTCOMES: [OutcomeClass; CaseClass::ALL.len()] = [
+    outcome(0, '.', "harmless", "not noticed, and nothing differs"),
+    outcome(1, 'L', "located", "the damaged link named, all back"),
+    outcome(2, 'R', "recovered", "no link named, all back"),
+    outcome(3, 'M', "mislocated", "a sound link named, all back"),
+    outcome(4, 'N', "not-recovered", "noticed, not all back"),
+    outcome(
+        5,
+        'C',
+        "corrupted",
+        "noticed and repaired, but a cell is wrong",
+    ),
+    outcome(
+        6,
+        'S',
+        "silent-corruption",
+        "not noticed, and a value is wrong",
+    ),
+];
 
 impl fmt::Display for CaseClass {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -81,10 +107,9 @@ impl fmt::Display for CaseClass {
 
 /// A value that is wrong when everything is over.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Wrong {
+pub(crate) enum Wrong {
     /// A cell of a drive.
     Cell {
-        /// Which drive.
         drive: u8,
         /// Which cell.
         address: u16,
@@ -106,7 +131,7 @@ pub enum Wrong {
 
 /// What was seen of a case.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct CaseEvidence {
+pub(crate) struct CaseEvidence {
     /// Whether the master noticed anything.
     pub noticed: bool,
     /// The link that it named, counted from the master's outgoing one.
@@ -128,7 +153,7 @@ impl CaseEvidence {
     ///
     /// # Errors
     /// A contradiction in the bench's own evidence, as a sentence: it fits no class.
-    pub fn class(&self, links: &[usize]) -> Result<CaseClass, &'static str> {
+    pub(crate) fn class(&self, links: &[usize]) -> Result<CaseClass, &'static str> {
         let noticed = self.noticed;
         if !noticed && (self.named.is_some() || self.sequences > 0) {
             return Err("a link was named or a check sequence sent, and nothing had been noticed");
@@ -153,7 +178,7 @@ impl CaseEvidence {
 
 /// The link that a master's diagnosis names, if it names one.
 #[must_use]
-pub fn named(fault: Fault, drives: u8) -> Option<usize> {
+pub(crate) fn named(fault: Fault, drives: u8) -> Option<usize> {
     let (Fault::Damaged(link) | Fault::Broken(link)) = fault else {
         return None;
     };

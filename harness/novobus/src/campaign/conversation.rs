@@ -16,7 +16,7 @@ const MAX_LENGTH: usize = 4096;
 
 /// What the master sends.
 #[derive(Clone, Debug)]
-pub enum MasterTalk {
+pub(crate) enum MasterTalk {
     /// These bytes, without a gap; a master by the manual alone reads what comes back (9.7, 9.8).
     Bytes(Vec<u8>),
     /// These calls, one step of the scenario after the other; the driver plays them.
@@ -28,7 +28,7 @@ pub enum MasterTalk {
 ///
 /// # Errors
 /// A step that a campaign does not play, or drives whose cells change by themselves.
-pub fn talk(plan: &Plan) -> Result<MasterTalk, Problem> {
+pub(crate) fn talk(plan: &Plan) -> Result<MasterTalk, Problem> {
     let start = TextSpan::default();
     let refused = |span, message: &str| {
         let expected =
@@ -107,7 +107,7 @@ pub(crate) struct Answers {
 
 /// Where telegrams begin, counted from 1, and the byte behind the last one.
 #[must_use]
-pub fn telegrams(bytes: &[u8]) -> Vec<u64> {
+pub(crate) fn telegrams(bytes: &[u8]) -> Vec<u64> {
     let mut starts = Vec::new();
     let mut place = 0;
     while let Some(&byte) = bytes.get(place) {

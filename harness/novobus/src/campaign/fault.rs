@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// A bit of a byte on the line (ND21 8.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LineBit {
+pub(crate) enum LineBit {
     /// The start bit.
     Start,
     /// Data bit 0 to 7.
@@ -26,7 +26,7 @@ pub enum LineBit {
 impl LineBit {
     /// All 11, in the order in which they are sent.
     #[must_use]
-    pub fn all() -> Vec<Self> {
+    pub(crate) fn all() -> Vec<Self> {
         let data = (0..8).map(Self::Data);
         let mut all = vec![Self::Start];
         all.extend(data);
@@ -37,7 +37,7 @@ impl LineBit {
 
 /// What a fault does to its byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FaultEffect {
+pub(crate) enum FaultEffect {
     /// A bit is inverted.
     Bit(LineBit),
     /// The byte does not arrive.
@@ -58,7 +58,7 @@ pub enum FaultEffect {
 
 /// One fault: what, on which link, at which byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Injected {
+pub(crate) struct Injected {
     /// The link, counted from the master's outgoing one.
     pub link: usize,
     /// The byte that its transmitter sends, counted from 1.
@@ -89,7 +89,7 @@ pub(crate) fn link_place(drives: u8, link: LinkName) -> Option<usize> {
 pub(crate) const MAX_GAP: u16 = 1000;
 
 /// The longest delay or break.
-pub const LONGEST: Duration = Duration::from_secs(1);
+pub(crate) const LONGEST: Duration = Duration::from_secs(1);
 
 fn time(text: &str) -> Result<Time, ()> {
     let time: Time = text.parse().map_err(|_| ())?;
@@ -103,7 +103,7 @@ fn span(time: Time) -> Span {
 impl FaultEffect {
     /// The same as faults of a link, each with its distance in bytes.
     #[must_use]
-    pub fn on_link(self) -> Vec<(u64, LinkFault)> {
+    pub(crate) fn on_link(self) -> Vec<(u64, LinkFault)> {
         let flip = |flips| LinkFault::Flip(flips);
         let none = Flips::default();
         let fault = match self {
@@ -135,7 +135,7 @@ impl FaultEffect {
 
     /// For how many byte times the line is disturbed.
     #[must_use]
-    pub fn lasts(self, byte_time: Span) -> u64 {
+    pub(crate) fn lasts(self, byte_time: Span) -> u64 {
         match self {
             Self::Gap(bytes) => u64::from(bytes),
             Self::Delay(time) | Self::Break(time) => {
@@ -147,7 +147,7 @@ impl FaultEffect {
 
     /// The same as a scenario has it, with the distance in bytes of each line.
     #[must_use]
-    pub fn lines(self) -> Vec<(u64, LinkFaultKind)> {
+    pub(crate) fn lines(self) -> Vec<(u64, LinkFaultKind)> {
         let micros = |time: Time| {
             let micros = time.0.as_micros();
             times::Duration::micros(u64::try_from(micros).unwrap_or(u64::MAX))
@@ -226,8 +226,7 @@ impl FromStr for FaultEffect {
 
 /// The faults of one case: one, or two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct CaseFaults {
-    /// The first.
+pub(crate) struct CaseFaults {
     pub first: Injected,
     /// The second, where there are two.
     pub second: Option<Injected>,
@@ -235,19 +234,19 @@ pub struct CaseFaults {
 
 impl CaseFaults {
     /// The faults, in order.
-    pub fn faults(&self) -> impl Iterator<Item = &Injected> {
+    pub(crate) fn faults(&self) -> impl Iterator<Item = &Injected> {
         std::iter::once(&self.first).chain(&self.second)
     }
 
     /// The links that are damaged.
     #[must_use]
-    pub fn links(&self) -> Vec<usize> {
+    pub(crate) fn links(&self) -> Vec<usize> {
         self.faults().map(|fault| fault.link).collect()
     }
 
     /// Its name: `98->97:10:0`, and `98->97:10:0+98->97:11:p` for two faults.
     #[must_use]
-    pub fn name(&self, drives: u8) -> String {
+    pub(crate) fn name(&self, drives: u8) -> String {
         let faults = self.faults().map(|fault| {
             let link = link_name(0, drives, fault.link);
             format!("{link}:{}:{}", fault.byte, fault.what)
@@ -259,7 +258,7 @@ impl CaseFaults {
     ///
     /// # Errors
     /// What is wrong with the name, in a sentence.
-    pub fn from_name(name: &str, drives: u8) -> Result<Self, String> {
+    pub(crate) fn from_name(name: &str, drives: u8) -> Result<Self, String> {
         let one = |text: &str| -> Option<Injected> {
             let mut parts = text.splitn(3, ':');
             let link = link_place(drives, parts.next()?.parse::<LinkName>().ok()?)?;

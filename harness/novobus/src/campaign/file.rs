@@ -17,7 +17,7 @@ pub(crate) const MAX_CASES: u64 = 1_000_000;
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CampaignFile {
+pub(crate) struct CampaignFile {
     /// The version of this schema: 1.
     #[schemars(range(min = 1, max = 1))]
     pub schema: u32,
@@ -79,7 +79,7 @@ pub struct CampaignFile {
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
-pub enum FaultFamily {
+pub(crate) enum FaultFamily {
     /// Each bit of `bits`.
     Bits,
     /// The byte is lost.
@@ -100,7 +100,7 @@ pub enum FaultFamily {
 
 /// A bit of a byte on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-pub enum BitName {
+pub(crate) enum BitName {
     /// The start bit.
     #[serde(rename = "b")]
     Start,
@@ -150,7 +150,7 @@ impl From<BitName> for LineBit {
 /// Where the two faults of a pair are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Pairs {
+pub(crate) enum Pairs {
     /// In one byte.
     Byte,
     /// In two bytes of one telegram, on one link.
@@ -162,7 +162,7 @@ pub enum Pairs {
 /// The figures that a campaign pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
-pub struct ExpectedCounts {
+pub(crate) struct ExpectedCounts {
     /// All cases together.
     #[schemars(range(min = 0))]
     pub cases: Option<u64>,
@@ -192,7 +192,7 @@ pub struct ExpectedCounts {
 impl ExpectedCounts {
     /// How many cases of a class are expected.
     #[must_use]
-    pub const fn of(&self, class: CaseClass) -> Option<u64> {
+    pub(crate) const fn of(&self, class: CaseClass) -> Option<u64> {
         match class {
             CaseClass::Harmless => self.harmless,
             CaseClass::Located => self.located,
@@ -223,20 +223,20 @@ fn range(text: &str) -> Option<(u64, u64)> {
 
 /// A byte in two hexadecimal digits.
 #[must_use]
-pub fn hex(text: &str) -> Option<u8> {
+pub(crate) fn hex(text: &str) -> Option<u8> {
     let digits = text.len() == 2 && text.bytes().all(|b| b.is_ascii_hexdigit());
     u8::from_str_radix(text, 16).ok().filter(|_| digits)
 }
 
 /// The JSON schema of a campaign file, draft 2020-12.
 #[must_use]
-pub fn schema() -> serde_json::Value {
+pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(CampaignFile).to_value()
 }
 
 /// A campaign file's text, read and not yet settled for a ring.
 #[derive(Debug)]
-pub struct Read<'a> {
+pub(crate) struct Read<'a> {
     /// What it says.
     pub file: CampaignFile,
     table: Spanned<DeTable<'a>>,
@@ -247,7 +247,7 @@ pub struct Read<'a> {
 ///
 /// # Errors
 /// All its mistakes, each with its place.
-pub fn read(source: &Source) -> Result<Read<'_>, Problems> {
+pub(crate) fn read(source: &Source) -> Result<Read<'_>, Problems> {
     let problems = |mut all: Vec<Problem>| {
         all.sort_by_key(|problem| (problem.span.start, problem.span.end));
         all.dedup();
@@ -274,7 +274,7 @@ pub fn read(source: &Source) -> Result<Read<'_>, Problems> {
 
 impl Read<'_> {
     /// A mistake at a key of the file.
-    pub fn wrong(
+    pub(crate) fn wrong(
         &self,
         path: &[&str],
         message: impl Into<String>,
@@ -286,7 +286,7 @@ impl Read<'_> {
 
     /// The same as what is shown of a whole file.
     #[must_use]
-    pub fn problems(&self, problem: Problem) -> Problems {
+    pub(crate) fn problems(&self, problem: Problem) -> Problems {
         Problems::new(&self.source.name, self.source.text.clone(), vec![problem])
     }
 
@@ -386,7 +386,7 @@ impl Read<'_> {
     ///
     /// # Errors
     /// The first key that does not fit.
-    pub fn fits(&self, drives: u8, length: u64) -> Result<(), Problem> {
+    pub(crate) fn fits(&self, drives: u8, length: u64) -> Result<(), Problem> {
         for (index, link) in self.file.links.iter().flatten().enumerate() {
             if link_place(drives, *link).is_none() {
                 let message = format!("a ring of {drives} has no link {link}");

@@ -1,4 +1,4 @@
-//! The page of campaigns: how many cases of each class, and where in the ring which class happens, as a map of letters and colours.
+//! The section of a campaign: where in the ring which class happens, as a map of letters and colours.
 
 use crate::campaign::PlayedCampaign;
 use crate::campaign::class::CaseClass;
@@ -6,7 +6,7 @@ use crate::campaign::fault::{FaultEffect, LineBit};
 use crate::campaign::report::{WORST, happened};
 use harness_bench::campaign::share::share;
 use harness_bench::html::Html;
-use harness_bench::report::html::{FoldedPart, Section, page};
+use harness_bench::report::html::{FoldedPart, Section};
 use std::collections::BTreeMap;
 
 /// Maximum number of cells of a map; a larger map shows several bytes in one row.
@@ -14,19 +14,6 @@ const CELLS: usize = 12_000;
 
 /// Maximum number of rows of the table by link: the manual's largest ring has 251 links.
 const LINKS: usize = 251;
-
-/// A class's letter, for readers who see no colours.
-const fn letter(class: CaseClass) -> char {
-    match class {
-        CaseClass::Harmless => '.',
-        CaseClass::Located => 'L',
-        CaseClass::Recovered => 'R',
-        CaseClass::Mislocated => 'M',
-        CaseClass::NotRecovered => 'N',
-        CaseClass::Corrupted => 'C',
-        CaseClass::SilentCorruption => 'S',
-    }
-}
 
 /// The class of a class's colour.
 fn colour(class: CaseClass) -> String {
@@ -36,79 +23,12 @@ fn colour(class: CaseClass) -> String {
 /// How many cases there are of each class.
 type Counts = BTreeMap<CaseClass, u64>;
 
-/// The page of campaigns that were played; those of frames as sections, which stand behind the others.
-#[must_use]
-pub fn campaigns(all: &[PlayedCampaign], of_frames: Vec<Section>) -> String {
-    let mut front = Html::new();
-    front.element("section", &[("aria-labelledby", &"summary")], |html| {
-        html.line("h2", &[("id", &"summary")], "Summary");
-        if !all.is_empty() {
-            summary(html, all);
-        }
-        html.line(
-            "p",
-            &[],
-            "A case is a conversation played with one fault, or two. A map shows the gravest class of all cases at a place.",
-        );
-        if !all.is_empty() {
-            letters(html);
-        }
-    });
-    let of_rings = all
-        .iter()
-        .enumerate()
-        .map(|(number, one)| section(number + 1, one));
-    let sections: Vec<_> = of_rings.chain(of_frames).collect();
-    page("drivebench: campaigns of faults", &front, &sections)
-}
-
-fn summary(html: &mut Html, all: &[PlayedCampaign]) {
-    html.element("table", &[], |html| {
-        html.line("caption", &[], "Campaigns");
-        let mut names = vec!["Campaign", "Drives", "Bytes", "Cases", "Pinned figures"];
-        names.extend(CaseClass::ALL.map(CaseClass::name));
-        html.heads(&names);
-        for (number, one) in all.iter().enumerate() {
-            html.element("tr", &[], |html| {
-                html.element("th", &[("scope", &"row")], |html| {
-                    let place = format!("#s{}", number + 1);
-                    html.line("a", &[("href", &place)], name(one));
-                });
-                html.line("td", &[("class", &"n")], one.drives);
-                html.line("td", &[("class", &"n")], one.bytes);
-                html.line("td", &[("class", &"n")], one.outcomes.len());
-                match one.differs().len() {
-                    0 => html.line("td", &[("class", &"good")], "as found"),
-                    many => html.line("td", &[("class", &"bad")], format_args!("{many} differ")),
-                }
-                for class in CaseClass::ALL {
-                    html.line("td", &[("class", &"n")], one.count(class));
-                }
-            });
-        }
-    });
-}
-
-/// What the letters mean.
-fn letters(html: &mut Html) {
-    html.element("table", &[], |html| {
-        html.line("caption", &[], "Classes, in order of gravity");
-        html.heads(&["Letter", "Class", "What it means"]);
-        for class in CaseClass::ALL {
-            html.element("tr", &[], |html| {
-                html.line("td", &[("class", &colour(class))], letter(class));
-                html.line("th", &[("scope", &"row")], class.name());
-                html.line("td", &[], class.about());
-            });
-        }
-    });
-}
-
 fn name(finished: &PlayedCampaign) -> &str {
     finished.name.trim_end_matches(".toml")
 }
 
-fn section(number: usize, finished: &PlayedCampaign) -> Section {
+/// A campaign as a section; `number` counts the sections of the page from 1.
+pub(super) fn section(number: usize, finished: &PlayedCampaign) -> Section {
     let mut html = Html::new();
     html.line("p", &[], &finished.title);
     html.line(
@@ -223,7 +143,7 @@ fn cell(html: &mut Html, counts: Option<&Counts>) {
     html.line(
         "td",
         &[("class", &colour(*class)), ("title", &words.join(", "))],
-        letter(*class),
+        class.outcome().letter,
     );
 }
 

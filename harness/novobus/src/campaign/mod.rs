@@ -4,23 +4,25 @@
 //! ring and the conversation. [`replay`] prints one case as a scenario.
 
 mod alike;
-pub mod by_driver;
-pub mod by_manual;
-pub mod class;
-pub mod conversation;
-pub mod fault;
-pub mod file;
-pub mod find;
+pub(crate) mod by_driver;
+pub(crate) mod by_manual;
+pub(crate) mod class;
+mod common;
+pub(crate) mod conversation;
+pub(crate) mod fault;
+pub(crate) mod file;
+pub(crate) mod find;
 mod html;
-pub mod pairs;
-pub mod part;
-pub mod plan;
-pub mod replay;
-pub mod report;
+pub(crate) mod pairs;
+pub(crate) mod plan;
+pub(crate) mod replay;
+pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod sharing;
-pub mod sound;
+pub(crate) mod sound;
 
-pub use fault::CaseFaults;
-pub use html::campaigns;
-pub use run::{Campaign, CaseOutcome, CasePlayer, Contradiction, PlayedCampaign};
+#[cfg(test)]
+pub(crate) use fault::CaseFaults;
+pub(crate) use run::PlayedCampaign;
+#[cfg(test)]
+pub(crate) use run::{Campaign, CaseOutcome};

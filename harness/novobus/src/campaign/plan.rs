@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// What of a conversation a plan depends on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// How many drives the ring has.
     pub drives: u8,
     /// Where telegrams begin, counted from 1, and behind the last one the byte after the conversation.
@@ -17,7 +17,7 @@ pub struct Shape {
 impl Shape {
     /// How many bytes the conversation has.
     #[must_use]
-    pub fn length(&self) -> u64 {
+    pub(crate) fn length(&self) -> u64 {
         self.telegrams.last().map_or(0, |end| end - 1)
     }
 
@@ -30,13 +30,13 @@ impl Shape {
 /// More cases than a campaign may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} cases; at most {MAX_CASES} are played")]
-pub struct TooMany(pub u64);
+pub(crate) struct TooMany(pub u64);
 
 /// The cases of a campaign, in order of links, bytes and kinds.
 ///
 /// # Errors
 /// There are more than `MAX_CASES`.
-pub fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults>, TooMany> {
+pub(crate) fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults>, TooMany> {
     let singles = singles(file, shape);
     let groups = match file.pairs {
         None => vec![Group::Singles(0..singles.len())],

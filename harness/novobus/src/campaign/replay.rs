@@ -20,7 +20,7 @@ const RUN: usize = 3;
 ///
 /// # Errors
 /// The case fits no class.
-pub fn scenario(campaign: &Campaign, case: &CaseFaults) -> Result<String, Contradiction> {
+pub(crate) fn scenario(campaign: &Campaign, case: &CaseFaults) -> Result<String, Contradiction> {
     let (outcome, said) = campaign.play(case)?;
     let drives = campaign.shape.drives;
     let entry = &campaign.entry;

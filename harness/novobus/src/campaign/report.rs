@@ -10,7 +10,7 @@ use std::fmt;
 use std::fmt::Write as _;
 
 /// How many of the worst cases a table shows.
-pub const WORST: usize = 10;
+pub(crate) const WORST: usize = 10;
 
 /// How many wrong values a line shows.
 const VALUES: usize = 4;
@@ -45,7 +45,7 @@ impl fmt::Display for Wrong {
 
 /// What happened in a case, in a line.
 #[must_use]
-pub fn happened(evidence: &CaseEvidence, drives: u8) -> String {
+pub(crate) fn happened(evidence: &CaseEvidence, drives: u8) -> String {
     let mut parts = Vec::new();
     if let Some(link) = evidence.named {
         parts.push(format!("named {}", link_name(0, drives, link)));
@@ -67,9 +67,8 @@ pub fn happened(evidence: &CaseEvidence, drives: u8) -> String {
     parts.join("; ")
 }
 
-/// One case in a line.
 #[must_use]
-pub fn line(outcome: &CaseOutcome, drives: u8) -> String {
+pub(crate) fn line(outcome: &CaseOutcome, drives: u8) -> String {
     let name = outcome.case.name(drives);
     let happened = happened(&outcome.evidence, drives);
     let line = format!("{:18} {name:28} {happened}", outcome.class.name());
@@ -78,7 +77,7 @@ pub fn line(outcome: &CaseOutcome, drives: u8) -> String {
 
 /// How many cases there are of each class, what differs from the file, and the worst cases.
 #[must_use]
-pub fn table(finished: &PlayedCampaign) -> String {
+pub(crate) fn table(finished: &PlayedCampaign) -> String {
     let all = finished.outcomes.len() as u64;
     // Writing to a String cannot fail.
     let mut text = format!(
@@ -238,9 +237,8 @@ impl<'a> Json<'a> {
     }
 }
 
-/// All campaigns of a run for tools, as `corpora/campaigns/README.md` describes; of one class, where `only` is given.
+/// A campaign for tools, as `corpora/campaigns/README.md` describes; of its cases those of one class, where `only` is given.
 #[must_use]
-pub fn json(all: &[PlayedCampaign], only: Option<CaseClass>) -> serde_json::Value {
-    let campaigns: Vec<_> = all.iter().map(|one| Json::of(one, only)).collect();
-    serde_json::json!({ "schema": 1, "campaigns": campaigns })
+pub(crate) fn json(finished: &PlayedCampaign, only: Option<CaseClass>) -> serde_json::Value {
+    serde_json::json!(Json::of(finished, only))
 }

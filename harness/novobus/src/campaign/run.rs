@@ -28,7 +28,7 @@ const BATCH: usize = 32;
 
 /// A campaign that can be played.
 #[derive(Debug)]
-pub struct Campaign {
+pub(crate) struct Campaign {
     /// Its name, for messages: a path, or the name of a built-in one.
     pub name: String,
     /// The text of its file.
@@ -51,10 +51,8 @@ enum Played {
     ByDriver(Box<ByDriver>),
 }
 
-/// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CaseOutcome {
-    /// The faults.
+pub(crate) struct CaseOutcome {
     pub case: CaseFaults,
     /// The class of the outcome.
     pub class: CaseClass,
@@ -65,18 +63,15 @@ pub struct CaseOutcome {
 /// A case that fits no class: a defect of the bench.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{campaign}: the case {case} fits no class: {why}; please report it")]
-pub struct Contradiction {
-    /// Of which campaign.
+pub(crate) struct Contradiction {
     pub campaign: String,
-    /// Which case.
     pub case: String,
-    /// Why.
     pub why: &'static str,
 }
 
 /// A campaign that has been played.
 #[derive(Clone, Debug)]
-pub struct PlayedCampaign {
+pub(crate) struct PlayedCampaign {
     /// The campaign's name.
     pub name: String,
     /// What it shows.
@@ -98,7 +93,7 @@ impl Campaign {
     ///
     /// # Errors
     /// Mistakes in either, or a scenario that is not there.
-    pub fn load(source: &Source, folder: &Path) -> Result<Self, Box<Problems>> {
+    pub(crate) fn load(source: &Source, folder: &Path) -> Result<Self, Box<Problems>> {
         let read = read(source).map_err(Box::new)?;
         let mistake = |problem: Problem| Box::new(read.problems(problem));
         let own = folder.join(&read.file.scenario);
@@ -213,13 +208,13 @@ impl Campaign {
 
     /// The texts of its file and of its scenario.
     #[must_use]
-    pub fn texts(&self) -> [&str; 2] {
+    pub(crate) fn texts(&self) -> [&str; 2] {
         [&self.text, &self.entry.source.text]
     }
 
     /// Whether the driver plays, and not a master by the manual alone.
     #[must_use]
-    pub fn by_driver(&self) -> bool {
+    pub(crate) fn by_driver(&self) -> bool {
         matches!(self.played, Played::ByDriver(_))
     }
 
@@ -236,7 +231,10 @@ impl Campaign {
     ///
     /// # Errors
     /// It fits no class.
-    pub fn play(&self, case: &CaseFaults) -> Result<(CaseOutcome, Vec<Said>), Contradiction> {
+    pub(crate) fn play(
+        &self,
+        case: &CaseFaults,
+    ) -> Result<(CaseOutcome, Vec<Said>), Contradiction> {
         let (evidence, said) = match &self.played {
             Played::ByManual(by_manual) => by_manual.play(case),
             Played::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
@@ -264,7 +262,7 @@ impl Campaign {
 
     /// Plays cases one after another, which share what they have in common. The outcomes are those of [`Self::play`].
     #[must_use]
-    pub fn player(&self) -> CasePlayer<'_> {
+    pub(crate) fn player(&self) -> CasePlayer<'_> {
         CasePlayer {
             campaign: self,
             sharing: self.sharing(),
@@ -284,7 +282,7 @@ impl Campaign {
     ///
     /// # Errors
     /// The first case, in the order of the plan, that fits no class.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         threads: usize,
         progress: &(dyn Fn(u64) + Sync),
@@ -332,7 +330,7 @@ impl Campaign {
 
 /// Plays cases of a campaign one after another; see [`Campaign::player`].
 #[derive(Debug)]
-pub struct CasePlayer<'a> {
+pub(crate) struct CasePlayer<'a> {
     campaign: &'a Campaign,
     /// `None` where cases have to be played from the start.
     sharing: Option<Sharing<'a>>,
@@ -349,7 +347,7 @@ impl CasePlayer<'_> {
     ///
     /// # Errors
     /// It fits no class.
-    pub fn play(&mut self, case: &CaseFaults) -> Result<CaseOutcome, Contradiction> {
+    pub(crate) fn play(&mut self, case: &CaseFaults) -> Result<CaseOutcome, Contradiction> {
         match self.sharing.as_mut().and_then(|own| own.play(case)) {
             Some(evidence) => self.campaign.outcome(case, evidence.as_ref().clone()),
             None => self.campaign.play(case).map(|(outcome, _)| outcome),
@@ -359,7 +357,7 @@ impl CasePlayer<'_> {
 
 /// A pinned figure that was not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Differs {
+pub(crate) struct Differs {
     /// Of which class; `None` for all cases together.
     pub class: Option<CaseClass>,
     /// What the file says.
@@ -371,20 +369,20 @@ pub struct Differs {
 impl PlayedCampaign {
     /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
     #[must_use]
-    pub fn link(&self, place: usize) -> String {
+    pub(crate) fn link(&self, place: usize) -> String {
         harness_bench::link::link_name(0, self.drives, place)
     }
 
     /// How many cases there are of a class.
     #[must_use]
-    pub fn count(&self, class: CaseClass) -> u64 {
+    pub(crate) fn count(&self, class: CaseClass) -> u64 {
         let of_class = |outcome: &&CaseOutcome| outcome.class == class;
         self.outcomes.iter().filter(of_class).count() as u64
     }
 
     /// The pinned figures that were not met: the number of cases first, then the classes in order of gravity.
     #[must_use]
-    pub fn differs(&self) -> Vec<Differs> {
+    pub(crate) fn differs(&self) -> Vec<Differs> {
         let all =
             CaseClass::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));
         let cases = (None, self.expect.cases, self.outcomes.len() as u64);
@@ -403,7 +401,7 @@ impl PlayedCampaign {
     /// How many cases of each class there are at each link and byte, where a case with two faults counts at both:
     /// the figures of a map with a row for a link and a column for a byte.
     #[must_use]
-    pub fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
+    pub(crate) fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
         let mut map: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
         for outcome in &self.outcomes {
             let mut places: Vec<_> = outcome.case.faults().map(|f| (f.link, f.byte)).collect();

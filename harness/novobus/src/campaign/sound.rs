@@ -10,21 +10,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What drives hold, and held, without a fault.
 #[derive(Clone, Debug)]
-pub struct Sound {
+pub(crate) struct Sound {
     end: SimulatedLink,
     /// Every value that a cell had on the way, where it had several.
     history: BTreeMap<(u8, u16), BTreeSet<u8>>,
 }
 
 /// The drives of a ring, past their bus.
-pub trait DrivesBeyondBus {
+pub(crate) trait DrivesBeyondBus {
     /// How many there are.
     fn count(&self) -> u8;
 
     /// The cells of a drive, if the ring has it.
     fn cells(&self, drive: u8) -> Option<&Cells>;
 
-    /// Its end of the bus.
     fn bus_end(&self, drive: u8) -> Option<&BusEnd>;
 
     /// What a comparison of a drive's cells gives, which is always the same for the same state of it; `None` if the ring has not got the
@@ -59,7 +58,7 @@ fn differences<'c>(a: &'c Cells, b: &'c Cells) -> impl Iterator<Item = u16> + 'c
 impl Sound {
     /// Starts with a ring before anything is sent.
     #[must_use]
-    pub fn new(start: SimulatedLink) -> Self {
+    pub(crate) fn new(start: SimulatedLink) -> Self {
         Self {
             end: start,
             history: BTreeMap::new(),
@@ -67,7 +66,7 @@ impl Sound {
     }
 
     /// Notes what drives hold now.
-    pub fn note(&mut self, now: &SimulatedLink) {
+    pub(crate) fn note(&mut self, now: &SimulatedLink) {
         for drive in 0..now.count() {
             let (Some(before), Some(cells)) = (self.end.cells(drive), now.cells(drive)) else {
                 continue;
@@ -82,7 +81,7 @@ impl Sound {
 
     /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
     #[must_use]
-    pub fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<Wrong> {
+    pub(crate) fn wrong(&self, now: &impl DrivesBeyondBus, confirmed: bool) -> Vec<Wrong> {
         let mut wrong = Vec::new();
         for drive in 0..now.count() {
             let Some(sound) = self.end.cells(drive) else {

@@ -16,7 +16,7 @@ const AROUND: usize = 4;
 
 /// One side of a comparison.
 #[derive(Clone, Copy, Debug)]
-pub struct ComparedRun<'r> {
+pub(crate) struct ComparedRun<'r> {
     /// What it is called.
     pub name: &'r str,
     /// What was captured.
@@ -25,7 +25,7 @@ pub struct ComparedRun<'r> {
 
 /// The first difference on one link.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LinkDifference {
+pub(crate) struct LinkDifference {
     /// The link, as in a scenario.
     pub link: String,
     /// Which byte of it, counted from 1.
@@ -44,7 +44,7 @@ pub struct LinkDifference {
 
 /// The result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Summary {
+pub(crate) struct Summary {
     /// The first difference in time.
     pub first: Option<LinkDifference>,
     /// How many links both have.
@@ -64,14 +64,14 @@ pub struct Summary {
 impl Summary {
     /// Whether nothing differs.
     #[must_use]
-    pub fn same(&self) -> bool {
+    pub(crate) fn same(&self) -> bool {
         self.first.is_none() && self.alone.is_empty()
     }
 }
 
 /// Compares two runs: bytes, line status, and times as far as `tolerance`.
 #[must_use]
-pub fn diff(left: ComparedRun<'_>, right: ComparedRun<'_>, tolerance: Span) -> Summary {
+pub(crate) fn diff(left: ComparedRun<'_>, right: ComparedRun<'_>, tolerance: Span) -> Summary {
     compare(left, right, tolerance, &|_, _, _| false, None)
 }
 
@@ -239,7 +239,7 @@ fn shown(byte: Option<&LineByte>) -> String {
 impl Summary {
     /// The comparison for people, the sides by their names.
     #[must_use]
-    pub fn show<'s>(&'s self, left: &'s str, right: &'s str) -> impl fmt::Display + 's {
+    pub(crate) fn show<'s>(&'s self, left: &'s str, right: &'s str) -> impl fmt::Display + 's {
         Show {
             summary: self,
             names: [left, right],

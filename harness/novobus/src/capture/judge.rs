@@ -5,14 +5,14 @@ use super::begin::{
 };
 use super::diff::{ComparedRun, Summary, compare};
 use super::open::explanations;
-use super::scenario::{JudgeOptions, SketchError, scenario_with, unforeseen};
+use super::scenario::{SketchError, scenario_with, unforeseen};
 use super::stimuli::Told;
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::locate::locate;
 use crate::simulate::simulated;
-use harness_bench::capture::Capture;
 use harness_bench::capture::gap;
+use harness_bench::capture::{Capture, JudgeOptions};
 use harness_bench::link::{Link, link_name};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{AtMismatch, play};
@@ -25,7 +25,7 @@ use harness_sim::record::LineByte;
 
 /// The result of a judgement.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub(crate) struct Judged {
     /// Passed where the last link of every ring carried what the model says; inconclusive where no last link was captured.
     pub verdict: Verdict,
     /// The last links: what the master received.
@@ -78,7 +78,7 @@ impl Judged {
 
 /// Why there is no judgement.
 #[derive(Debug, thiserror::Error)]
-pub enum JudgeError {
+pub(crate) enum JudgeError {
     /// No scenario can be made of the capture.
     #[error(transparent)]
     Sketch(#[from] SketchError),
@@ -113,7 +113,7 @@ fn first(problems: &Problems) -> String {
 ///
 /// # Errors
 /// [`JudgeError`].
-pub fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
+pub(crate) fn judge(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let judged = judge_part(capture, options);
     let differs = judged
         .as_ref()
@@ -142,7 +142,7 @@ fn judge_part(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, J
         return Ok(judged);
     }
     let is_midway = is_midway(capture);
-    let shown = shown(capture, options.tolerance);
+    let shown = shown(capture, options.tolerance());
     // Its time in the capture; a byte that is missing at the end lies behind all.
     let first = judged.master.first.as_ref();
     let first = first.and_then(|first| first.sides[0]).map(|byte| byte.at);
@@ -230,11 +230,11 @@ fn may_test_itself(
 fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, JudgeError> {
     let told = unforeseen(capture);
     let none = Header::default();
-    let judged = judge_as(capture, options, &told, (&none, options.tolerance))?;
+    let judged = judge_as(capture, options, &told, (&none, options.tolerance()))?;
     if judged.verdict != Verdict::Failed {
         return Ok(judged);
     }
-    if options.tolerance > Span::ZERO {
+    if options.tolerance() > Span::ZERO {
         let exact = judge_as(capture, options, &told, (&none, Span::ZERO))?;
         if exact.verdict != Verdict::Failed {
             return Ok(exact);
@@ -244,8 +244,8 @@ fn judge_whole(capture: &Capture, options: &JudgeOptions<'_>) -> Result<Judged, 
         return Ok(judged);
     }
     for explanation in explanations(capture, &told) {
-        let gaps = [options.tolerance, Span::ZERO];
-        let exact = explanation.is_right && options.tolerance > Span::ZERO;
+        let gaps = [options.tolerance(), Span::ZERO];
+        let exact = explanation.is_right && options.tolerance() > Span::ZERO;
         for gaps in &gaps[..1 + usize::from(exact)] {
             let Ok(mut explained) = judge_as(capture, options, &told, (&explanation.header, *gaps))
             else {
@@ -278,7 +278,7 @@ fn judge_as(
         let told = told.get(ring).filter(|_| own.from.is_some());
         told.is_some_and(|told| told.unforeseen.contains(&index))
     };
-    let tolerance = Span::from_units(options.tolerance.units().max(6));
+    let tolerance = Span::from_units(options.tolerance().units().max(6));
     let (left, right) = (
         ComparedRun {
             name: "capture",
@@ -359,8 +359,8 @@ fn model(
     (more, tolerance): (&Header, Span),
 ) -> Result<(Capture, Vec<String>), JudgeError> {
     let options = JudgeOptions {
-        tolerance,
-        ..options.clone()
+        tolerance: Some(tolerance),
+        ..*options
     };
     let text = scenario_with(capture, &options, more)?;
     let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;

@@ -6,11 +6,10 @@ use crate::language::syntax::{
     CellPlace, DriveRange, Header, RingStep, Scenario, Setup, SetupKind, Step, Written,
 };
 use crate::language::write::Text;
-use harness_bench::capture::Capture;
+use harness_bench::capture::{Capture, JudgeOptions};
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::pattern::{Expected, Pattern};
 use harness_bench::scenario::problem::Problems;
-use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::{Action, When};
 use harness_bench::scenario::times::Duration;
 use harness_proto::line::{Rate, Received};
@@ -28,21 +27,9 @@ const MOST_A_LINE: usize = 3_000;
 /// The longest title.
 const TITLE: usize = 100;
 
-/// How a scenario is made of a capture.
-#[derive(Clone, Debug)]
-pub struct JudgeOptions<'o> {
-    /// What it is called; any text.
-    pub title: &'o str,
-    /// A scenario whose header describes the drives: models, cells, properties. Without one the drives are plain, and their cells hold what
-    /// they first report.
-    pub setup: Option<&'o Source>,
-    /// Smaller gaps between bytes sent are removed, because real clocks are not exact.
-    pub tolerance: Span,
-}
-
 /// Why there is no scenario in a capture.
 #[derive(Debug, thiserror::Error)]
-pub enum SketchError {
+pub(crate) enum SketchError {
     /// What the master sent is not there.
     #[error(
         "the capture has no link {0}: what the master sent is not known, and nothing can be played"
@@ -68,7 +55,10 @@ pub enum SketchError {
 ///
 /// # Errors
 /// [`SketchError`].
-pub fn scenario(capture: &Capture, options: &JudgeOptions<'_>) -> Result<String, SketchError> {
+pub(crate) fn scenario(
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
+) -> Result<String, SketchError> {
     scenario_with(capture, options, &Header::default())
 }
 
@@ -100,7 +90,7 @@ pub(super) fn scenario_with(
             }
         }
     }
-    for step in sends(&rings, capture.rate, options.tolerance, width) {
+    for step in sends(&rings, capture.rate, options.tolerance(), width) {
         text.step(&step, "");
     }
     for (index, ring) in rings.iter().enumerate() {

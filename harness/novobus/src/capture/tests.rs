@@ -1,13 +1,59 @@
 //! Files that were written are read as they were.
 
+use crate::language::read::RingScenario;
 use crate::report::csv;
-use crate::report::vcd::{self, Signals};
+use crate::report::vcd;
+use crate::simulate::simulated;
 use harness_bench::capture::{Capture, read};
-use harness_bench::report::pcapng::name;
+use harness_bench::link::Link as _;
+use harness_bench::report::pcapng::{self, name};
+use harness_bench::report::vcd::Signals;
+use harness_bench::scenario::run::{AtMismatch, play};
+use harness_bench::scenario::source::Source;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte, Trace};
 use std::fmt::Write as _;
+
+/// A scenario's run.
+pub(super) fn run(text: &str) -> Capture {
+    let source = Source::from_bytes("test.scn".to_owned(), text.into()).expect("a text");
+    let plan = RingScenario::new(source, None).expect("a scenario").plan;
+    let mut link = simulated(&plan);
+    play(&plan, &mut link, AtMismatch::GoOn);
+    Capture {
+        rate: plan.rate,
+        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+        listened: None,
+        timed: true,
+    }
+}
+
+/// A built-in scenario's text.
+pub(super) fn text(name: &str) -> String {
+    let root = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../corpora/scenarios/novobus"
+    );
+    std::fs::read_to_string(format!("{root}/{name}.scn")).expect("a scenario")
+}
+
+/// A built-in scenario's run.
+pub(super) fn built_in(name: &str) -> Capture {
+    run(&text(name))
+}
+
+pub(super) fn pcapng(capture: &Capture) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    pcapng::write(&capture.traces, capture.rate, &mut bytes).expect("a Vec");
+    bytes
+}
+
+/// Every kind of damage on the link between two drives, every byte a telegram of its own.
+pub(super) const DAMAGED: &str = "title damage\nring 2\n\
+    ! 1->0 byte 3: flip 2\n! 1->0 byte 5: flip p\n! 1->0 byte 7: flip s\n! 1->0 byte 9: break 300us\n\
+    ! 1->0 byte 12: overrun\n! 1->0 byte 14: drop\n! 1->0 byte 16: insert 55\n! 1->0 byte 18: replace 81\n\
+    ! 1->0 byte 20: duplicate\n> 80*30\n";
 
 /// A line for each link: its name, and what was received.
 fn shown(capture: &Capture) -> String {

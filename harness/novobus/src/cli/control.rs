@@ -2,7 +2,7 @@
 
 use super::axes;
 use super::rig::{self, OpenBench};
-use crate::driver::{Axis, Error, OpenRings, State};
+use crate::driver::{Axis, Error, OpenRings};
 use crate::language::run::over_bus::reset_drives;
 use crate::rig::Session;
 use harness_bench::command::drive::{DeleteErrorArguments, MoveArguments, SelectArguments};
@@ -11,6 +11,7 @@ use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
 use harness_bench::command::rig_name::{RigName, Use};
 use harness_bench::link::Line;
+use harness_proto::nd21::State;
 use harness_proto::nd21::bits::status;
 use harness_proto::time::Span;
 

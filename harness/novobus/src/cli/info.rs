@@ -3,7 +3,7 @@
 use super::axes;
 use super::rig::{self, OpenBench};
 use crate::driver::cell::{CellFound, find};
-use crate::driver::{Axis, Identity, State};
+use crate::driver::{Axis, Identity};
 use crate::language::argument::{MemoryRange, cells};
 use crate::language::scale::shown;
 use harness_bench::command::drive::{InfoArguments, OutputForm};
@@ -14,6 +14,7 @@ use harness_bench::command::output::columns;
 use harness_bench::command::progress::progress_bar;
 use harness_bench::command::rig_name::Use;
 use harness_bench::counted::counted;
+use harness_proto::nd21::State;
 use harness_proto::nd21::units::{Date, Scale, Value};
 use serde_json::json;
 

@@ -3,7 +3,7 @@
 use super::axes;
 use super::rig::{self, OpenBench};
 use super::top_page::HeardLinks;
-use crate::driver::{Axis, State, Width};
+use crate::driver::{Axis, Width};
 use crate::top::{DriveReading, FORM, RingReading};
 use harness_bench::command::drive::TopArguments;
 use harness_bench::command::exit::Exit;
@@ -14,6 +14,7 @@ use harness_bench::command::top::{RateWindow, TopReader, TopScene, check, live, 
 use harness_bench::counted::counted;
 use harness_bench::top::{HeadLine, Heading, Snapshot, Top, view};
 use harness_bench::web::LiveNews;
+use harness_proto::nd21::State;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::master::{Counters, Event};

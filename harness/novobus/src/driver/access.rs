@@ -28,8 +28,7 @@ fn page(address: u16) -> Result<u8, Error> {
 
 /// How much of a cell is read at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Width {
-    /// A byte.
+pub(crate) enum Width {
     Byte,
     /// A word: two bytes from an even address on.
     Word,
@@ -41,7 +40,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_ReadByte")]
-    pub fn read_byte(&self, axis: Axis, address: u16) -> Result<u8, Error> {
+    pub(crate) fn read_byte(&self, axis: Axis, address: u16) -> Result<u8, Error> {
         narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadByte { address }))?)
     }
 
@@ -50,7 +49,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_ReadWord")]
-    pub fn read_word(&self, axis: Axis, address: u16) -> Result<u16, Error> {
+    pub(crate) fn read_word(&self, axis: Axis, address: u16) -> Result<u16, Error> {
         narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadWord { address }))?)
     }
 
@@ -59,7 +58,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_ReadLong")]
-    pub fn read_long(&self, axis: Axis, address: u16) -> Result<u32, Error> {
+    pub(crate) fn read_long(&self, axis: Axis, address: u16) -> Result<u32, Error> {
         narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadLong { address }))?)
     }
 
@@ -67,7 +66,12 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`]; the first one where several reads fail.
-    pub fn read_bytes(&self, axis: Axis, address: u16, count: u16) -> Result<Vec<u8>, Error> {
+    pub(crate) fn read_bytes(
+        &self,
+        axis: Axis,
+        address: u16,
+        count: u16,
+    ) -> Result<Vec<u8>, Error> {
         let addresses = (0..count).map_while(|offset| address.checked_add(offset));
         let reads = addresses.map(|address| (axis, Command::ReadByte { address }));
         self.run_commands(reads)?.into_iter().map(narrow).collect()
@@ -143,7 +147,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_WriteByte")]
-    pub fn write_byte(&self, axis: Axis, address: u16, data: u8) -> Result<(), Error> {
+    pub(crate) fn write_byte(&self, axis: Axis, address: u16, data: u8) -> Result<(), Error> {
         let command = Command::WriteByte { address, data };
         self.run_job(axis, |drive| Job::new(drive, command))?;
         Ok(())
@@ -154,7 +158,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_WriteWord")]
-    pub fn write_word(&self, axis: Axis, address: u16, data: u16) -> Result<(), Error> {
+    pub(crate) fn write_word(&self, axis: Axis, address: u16, data: u16) -> Result<(), Error> {
         let command = Command::WriteWord { address, data };
         self.run_job(axis, |drive| Job::new(drive, command))?;
         Ok(())
@@ -164,7 +168,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn and(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
+    pub(crate) fn and(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
         let address_low = page(address)?;
         let command = Command::And {
             address_low,
@@ -178,7 +182,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn or(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
+    pub(crate) fn or(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
         let address_low = page(address)?;
         let command = Command::Or {
             address_low,

@@ -33,7 +33,7 @@ pub(crate) fn read(
 }
 
 /// Writes bytes from the address of a cell on, word by word where the bus can.
-pub fn write(
+pub(crate) fn write(
     bus: &OpenRings<'_>,
     axis: Axis,
     location: &MemoryRange,
@@ -74,8 +74,7 @@ fn low(address: u16) -> u8 {
     low
 }
 
-/// What was found in a cell.
-pub struct CellFound<'a> {
+pub(crate) struct CellFound<'a> {
     pub(crate) axis: Axis,
     pub(crate) location: &'a MemoryRange,
     /// The bytes, in the order of their addresses.
@@ -103,7 +102,7 @@ impl CellFound<'_> {
     }
 
     /// The value without its unit, for tools.
-    pub fn number(&self) -> serde_json::Value {
+    pub(crate) fn number(&self) -> serde_json::Value {
         match (self.location.scale, self.decoded()) {
             (_, Some(Value::Exact(number))) => json!(number.to_f64()),
             (_, Some(Value::Approximate(number))) => json!(number),
@@ -113,7 +112,7 @@ impl CellFound<'_> {
     }
 
     /// The unit; empty if there is none.
-    pub fn unit(&self) -> &'static str {
+    pub(crate) fn unit(&self) -> &'static str {
         self.location.scale.map_or("", |scale| scale.unit())
     }
 
@@ -136,7 +135,7 @@ impl CellFound<'_> {
     }
 
     /// Bytes with value or bits: `0652 (428.44 rpm)`.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let words = self.words();
         if words.is_empty() {
             self.raw()
@@ -147,7 +146,7 @@ impl CellFound<'_> {
 }
 
 /// Reads a cell with what its scale depends on.
-pub fn find<'a>(
+pub(crate) fn find<'a>(
     bus: &OpenRings<'_>,
     (axis, units): (Axis, DriveUnits),
     location: &'a MemoryRange,

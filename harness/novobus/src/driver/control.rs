@@ -5,7 +5,6 @@ use harness_proto::nd21::bits::status;
 use harness_proto::nd21::{self, ram};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
-use harness_proto::novobus::output::OutputChange;
 
 impl OpenRings<'_> {
     /// Takes the software block and the software stop away: the drive starts if its inputs let it.
@@ -13,7 +12,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_Go")]
-    pub fn go(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn go(&self, axis: Axis) -> Result<(), Error> {
         self.and(axis, ram::STATUS, !(status::BLOCK | status::STOP))
     }
 
@@ -22,7 +21,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_Stop")]
-    pub fn stop(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn stop(&self, axis: Axis) -> Result<(), Error> {
         self.or(axis, ram::STATUS, status::STOP)
     }
 
@@ -31,7 +30,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_Sperre")]
-    pub fn block(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn block(&self, axis: Axis) -> Result<(), Error> {
         self.or(axis, ram::STATUS, status::BLOCK)
     }
 
@@ -40,7 +39,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_DeleteError")]
-    pub fn delete_error(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn delete_error(&self, axis: Axis) -> Result<(), Error> {
         self.write_byte(axis, ram::ERRORCODE, nd21::CONFIRM_ERROR)
     }
 
@@ -50,18 +49,8 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_ResetH8")]
-    pub fn reset(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn reset(&self, axis: Axis) -> Result<(), Error> {
         self.run_job(axis, |drive| Job::new(drive, Command::ResetH8))?;
-        Ok(())
-    }
-
-    /// Sets or clears GPO1 or GPO2, by the codes of 10.4 (those of 12.8 are misprinted, E49).
-    ///
-    /// # Errors
-    /// See [`Error`].
-    #[doc(alias = "NB_IO")]
-    pub fn write_output(&self, axis: Axis, change: OutputChange) -> Result<(), Error> {
-        self.run_job(axis, |drive| Job::new(drive, Command::WriteIo(change)))?;
         Ok(())
     }
 

@@ -1,17 +1,15 @@
 //! How many drives a ring has, and which (ND21 8.5, 9.3, 14.8).
 
-use super::error::in_words;
 use super::{Axis, Error, OpenRings};
 use crate::language::run::over_bus::read_byte;
 use crate::locate::locate;
 use harness_bench::link::{Line, Octets, wait_keeping};
 use harness_proto::line::Received;
-use harness_proto::nd21::bits::{flags, flags2, status};
-use harness_proto::nd21::errors::display_digits;
+use harness_proto::nd21::bits::flags2;
 use harness_proto::nd21::units::{
     Date, SpeedRange, operating_hours_from_bytes, serial_number_from_bytes,
 };
-use harness_proto::nd21::{ee, ram};
+use harness_proto::nd21::{State, ee, ram};
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, enough};
 use harness_proto::novobus::sync::SYNCO;
@@ -25,7 +23,7 @@ pub(crate) const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 ///
 /// # Errors
 /// [`Error::TimeOut`] where no ring answers, [`Error::Link`] where the link carries nothing.
-pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
+pub(crate) fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
     let counted = count_behind(link, ring, &[]);
     counted
         .or_else(|| count_repaired(link, ring))
@@ -131,7 +129,7 @@ pub(crate) fn unasked(line: &mut dyn Line, ring: usize) -> Vec<Received> {
 
 /// What a ring reported during its recovery (9.7, 9.8).
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Recovery {
+pub(crate) struct Recovery {
     /// The drive that spelled out its address before.
     pub before: Option<SpelledOut>,
     /// The drive that does so behind the check sequence: the ring is not back.
@@ -152,7 +150,7 @@ const SHOWN: usize = 8;
 impl Recovery {
     /// The drive that reported a fault in front of it, before the ring was brought back.
     #[must_use]
-    pub fn fault(&self) -> Option<SpelledOut> {
+    pub(crate) fn fault(&self) -> Option<SpelledOut> {
         self.before
             .filter(|spelled| spelled.why != SpellingCause::MissedMaster)
     }
@@ -160,8 +158,7 @@ impl Recovery {
 
 /// A drive that spelled out its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SpelledOut {
-    /// Which.
+pub(crate) struct SpelledOut {
     pub drive: u8,
     /// What can have made it do so.
     pub why: SpellingCause,
@@ -169,7 +166,7 @@ pub struct SpelledOut {
 
 /// What makes a drive spell out its address (9.7, 9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpellingCause {
+pub(crate) enum SpellingCause {
     /// A fault in front of it.
     Fault,
     /// A fault, or no byte for 10 ms: it monitors time-outs, and so does a drive between it and the master. That one names itself where no
@@ -181,7 +178,7 @@ pub enum SpellingCause {
 
 /// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
 #[must_use]
-pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
+pub(crate) fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     let (before, _) = reported(link, ring);
     let drives = count_repaired(link, ring);
     let (after, heard) = match drives {
@@ -248,7 +245,7 @@ fn reported(link: &mut dyn Line, ring: usize) -> (Option<u8>, Vec<u8>) {
 
 /// The identity that a drive reports (14.3.5, 14.8).
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Identity {
+pub(crate) struct Identity {
     /// The serial number; `None` where the EEPROM holds none.
     pub serial_number: Option<u32>,
     /// `EE_Version` as it stands: the places of its bits are lost in the print (14.3.5).
@@ -263,49 +260,12 @@ pub struct Identity {
     pub rom: [u8; 8],
 }
 
-/// How a drive is (11.8, 14.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct State {
-    /// `Status`.
-    pub status: u8,
-    /// `Flags`.
-    pub flags: u8,
-    /// `Flags2`.
-    pub flags2: u8,
-    /// `errorcode`.
-    pub error: u16,
-}
-
-impl State {
-    /// The mode in the manual's words (11.8): reset, error, block, stop or go.
-    #[must_use]
-    pub fn mode(&self) -> &'static str {
-        if self.status & status::RESET != 0 {
-            "reset"
-        } else if self.status & status::ERROR != 0 {
-            "error"
-        } else if self.flags & flags::BLOCK != 0 {
-            "block"
-        } else if self.flags & flags::STOP != 0 {
-            "stop"
-        } else {
-            "go"
-        }
-    }
-
-    /// The error in words; `None` where there is none.
-    #[must_use]
-    pub fn error_in_words(&self) -> Option<String> {
-        (self.error != 0 && display_digits(self.error).is_some()).then(|| in_words(self.error))
-    }
-}
-
 impl OpenRings<'_> {
     /// Reads how a drive is.
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn state(&self, axis: Axis) -> Result<State, Error> {
+    pub(crate) fn state(&self, axis: Axis) -> Result<State, Error> {
         Ok(State {
             status: self.read_byte(axis, ram::STATUS)?,
             flags: self.read_byte(axis, ram::FLAGS)?,
@@ -327,7 +287,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn identity(&self, axis: Axis) -> Result<Identity, Error> {
+    pub(crate) fn identity(&self, axis: Axis) -> Result<Identity, Error> {
         let mut identities = self.identities(&[axis])?;
         identities.pop().ok_or(Error::NoSuchOrder)
     }
@@ -337,7 +297,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`]; the first one where several drives fail.
-    pub fn identities(&self, axes: &[Axis]) -> Result<Vec<Identity>, Error> {
+    pub(crate) fn identities(&self, axes: &[Axis]) -> Result<Vec<Identity>, Error> {
         let mut eeproms = vec![[0; 256]; axes.len()];
         let words = [
             ee::BETRIEB_STD,

@@ -25,7 +25,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_ReadEEPROM")]
-    pub fn read_eeprom(&self, axis: Axis, address: u8) -> Result<u8, Error> {
+    pub(crate) fn read_eeprom(&self, axis: Axis, address: u8) -> Result<u8, Error> {
         let bytes = self.read_eeprom_of(&[axis], address)?;
         bytes.first().copied().ok_or(Error::NoSuchOrder)
     }
@@ -92,7 +92,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_WriteEEPROM")]
-    pub fn write_eeprom(&self, axis: Axis, address: u8, data: u8) -> Result<(), Error> {
+    pub(crate) fn write_eeprom(&self, axis: Axis, address: u8, data: u8) -> Result<(), Error> {
         self.write_byte(axis, ram::EEPROM_BUFFER, address)?;
         self.write_byte(axis, ram::EEPROM_BUFFER + 1, data)?;
         self.write_byte(axis, ram::EEPROM_CONTROL, WRITE_BYTE)?;
@@ -105,7 +105,7 @@ impl OpenRings<'_> {
     /// See [`Error`].
     #[doc(alias = "NB_RAMtoEEPROM")]
     #[doc(alias = "ProgParam")]
-    pub fn ram_to_eeprom(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn ram_to_eeprom(&self, axis: Axis) -> Result<(), Error> {
         self.write_byte(axis, ram::EEPROM_CONTROL, PROG_PARAM)?;
         self.wait_for_eeprom(axis, WRITTEN)
     }

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use harness_bench::counted::counted;
 use harness_bench::link::Trouble;
-use harness_proto::nd21::errors::{ErrorCode, display_digits};
+use harness_proto::nd21::errors::in_words;
 use harness_proto::novobus::master::{BusStop, Fault, Refused};
 use harness_proto::time::Span;
 use thiserror::Error;
@@ -28,7 +28,6 @@ pub enum Error {
     TimeOut {
         /// How long.
         waited: Span,
-        /// For what.
         what: String,
     },
     /// The result of this order has been fetched (11.6).
@@ -53,7 +52,6 @@ pub enum Error {
     Interrupted {
         /// The drive.
         axis: Axis,
-        /// What.
         what: &'static str,
         /// `stop` or `block`.
         by: &'static str,
@@ -74,7 +72,6 @@ pub enum Error {
     /// Every attempt of a step was disturbed so that it may have run once or twice.
     #[error("{what} was disturbed {}", counted(*.attempts, "time"))]
     Disturbed {
-        /// What.
         what: String,
         /// How often it was tried.
         attempts: u8,
@@ -85,13 +82,4 @@ pub enum Error {
     /// A value that cannot be.
     #[error("{0}")]
     Value(String),
-}
-
-/// An error code with its printed name.
-#[must_use]
-pub(crate) fn in_words(code: u16) -> String {
-    match (ErrorCode::from_code(code), display_digits(code)) {
-        (Some(error), _) => format!("{error}: {}", error.meaning()),
-        (None, _) => format!("{code:04X}"),
-    }
 }

@@ -9,7 +9,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// [`Error::Value`] for axes of two rings or of none, [`Error::Refused`] for one that the ring has not got, [`Error::TimeOut`] and whatever
     /// ends the work of the bus.
-    pub fn exchange(&self, values: &[(Axis, u16)]) -> Result<Vec<u16>, Error> {
+    pub(crate) fn exchange(&self, values: &[(Axis, u16)]) -> Result<Vec<u16>, Error> {
         let ring = values.first().map_or(0, |(axis, _)| axis.ring());
         let own: Vec<u8> = values.iter().map(|(axis, _)| axis.drive()).collect();
         if values.is_empty() || values.iter().any(|(axis, _)| axis.ring() != ring) {

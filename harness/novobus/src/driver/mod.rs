@@ -9,7 +9,7 @@
 
 mod access;
 mod axis;
-pub mod cell;
+pub(crate) mod cell;
 mod control;
 mod discovery;
 mod eeprom;
@@ -17,18 +17,16 @@ mod error;
 mod exchange;
 mod positioning;
 mod pump;
-mod s_ramp;
 mod scope;
 
-pub use access::Width;
-pub use axis::Axis;
+pub(crate) use access::Width;
+pub(crate) use axis::Axis;
 pub(crate) use discovery::{COUNT, count_behind, unasked};
-pub use discovery::{Identity, Recovery, SpelledOut, SpellingCause, State, count_drives, recover};
-pub use error::Error;
+pub(crate) use discovery::{Identity, Recovery, SpelledOut, SpellingCause, count_drives, recover};
+pub(crate) use error::Error;
 /// What a master may send, by the rules of the bus alone.
-pub use harness_sim::novobus::fuzz::jobs::conduct;
-pub use s_ramp::SkStatus;
-pub use scope::{Measurement, ScopeSettings, Trigger};
+pub(crate) use harness_sim::novobus::fuzz::jobs::conduct;
+pub(crate) use scope::{Measurement, ScopeSettings, Trigger};
 
 use harness_bench::link::Line;
 use harness_proto::novobus::address::RingSize;
@@ -40,7 +38,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// How a bus works. All of it can be left at its default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
+pub(crate) struct Options {
     /// How the masters of the rings work.
     pub master: master::MasterOptions,
     /// How long a call waits for the end of its job, beside what the ring itself needs.
@@ -49,9 +47,6 @@ pub struct Options {
     pub drive_patience: Span,
     /// How long it waits for a motion to end.
     pub motion_patience: Span,
-    /// Whether the points of the S-ramp go over the wire `puffer`, an invention of this project for its
-    /// simulated drives: the manual does not say how they come to the drive (13.5.3).
-    pub s_ramp_puffer: bool,
     /// How the masters break the manual on purpose, for tests of what must find a wrong one.
     pub deviates: Option<&'static MasterDeviation>,
 }
@@ -63,7 +58,6 @@ impl Default for Options {
             patience: Span::from_millis(5_000),
             drive_patience: Span::from_millis(5_000),
             motion_patience: Span::from_millis(60_000),
-            s_ramp_puffer: false,
             deviates: None,
         }
     }
@@ -71,14 +65,14 @@ impl Default for Options {
 
 /// One or two open rings. Clones are handles of the same bus.
 #[derive(Clone)]
-pub struct OpenRings<'l> {
+pub(crate) struct OpenRings<'l> {
     pump: Arc<Mutex<Masters<'l>>>,
     options: Options,
 }
 
 /// The number of a job that was started: an order of NOVOBUS.LIB (11.6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct OrderNumber {
+pub(crate) struct OrderNumber {
     ring: usize,
     id: JobId,
 }
@@ -92,7 +86,7 @@ impl<'l> OpenRings<'l> {
     #[doc(alias = "InitNovobus1")]
     #[doc(alias = "InitNovobus2")]
     #[doc(alias = "NB_OpenBus1")]
-    pub fn open(
+    pub(crate) fn open(
         link: Box<dyn Line + 'l>,
         rings: &[RingSize],
         options: Options,
@@ -134,44 +128,34 @@ impl<'l> OpenRings<'l> {
     /// Closes the bus: sends nothing more and waits until all bytes are back.
     #[doc(alias = "CloseNovobus")]
     #[doc(alias = "NB_CloseBus")]
-    pub fn close(self) {
+    pub(crate) fn close(self) {
         let mut pump = self.lock();
         let end = pump.now() + self.options.patience;
         pump.drain(end);
     }
 
-    /// How many rings are active: 0 when a bus has been stopped (12.1).
-    #[doc(alias = "NB_Status")]
-    #[must_use]
-    pub fn active_rings(&self) -> usize {
-        let pump = self.lock();
-        pump.phases()
-            .filter(|phase| *phase != Phase::Stopped)
-            .count()
-    }
-
     /// SpellingCause nothing goes on any more, if so: a ring has been stopped (11.5), or the link carries nothing. Time may stand still then.
     #[must_use]
-    pub fn halted(&self) -> Option<Error> {
+    pub(crate) fn halted(&self) -> Option<Error> {
         self.lock().halt()
     }
 
     /// How many errors were corrected since the bus was opened (11.5).
     #[doc(alias = "NB_BusError")]
     #[must_use]
-    pub fn corrected_errors(&self) -> u64 {
+    pub(crate) fn corrected_errors(&self) -> u64 {
         self.counters().iter().map(|ring| ring.corrected).sum()
     }
 
     /// What the master of each ring has done.
     #[must_use]
-    pub fn counters(&self) -> Vec<Counters> {
+    pub(crate) fn counters(&self) -> Vec<Counters> {
         self.lock().counters()
     }
 
     /// Every axis of the bus, ring after ring.
     #[must_use]
-    pub fn axes(&self) -> Vec<Axis> {
+    pub(crate) fn axes(&self) -> Vec<Axis> {
         let sizes = self.lock().sizes();
         sizes
             .iter()
@@ -182,12 +166,12 @@ impl<'l> OpenRings<'l> {
 
     /// The time on the clock of the link.
     #[must_use]
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.lock().now()
     }
 
     /// Lets the bus work for this long: what a program does while it waits for something else.
-    pub fn run(&self, span: Span) {
+    pub(crate) fn run(&self, span: Span) {
         let mut pump = self.lock();
         let end = pump.now() + span;
         while pump.now() < end && pump.halt().is_none() {
@@ -199,13 +183,13 @@ impl<'l> OpenRings<'l> {
 
     /// Keeps the line for some milliseconds without the caller: before he does something else that takes its time, such as drawing.
     /// Drives that watch for silence take 10 ms of it for an error (ND21 9.9).
-    pub fn keep(&self) {
+    pub(crate) fn keep(&self) {
         self.lock().keep();
     }
 
     /// What happened on the way that no call reports: faults and recoveries, oldest first, in words.
     #[must_use]
-    pub fn take_log(&self) -> Vec<String> {
+    pub(crate) fn take_log(&self) -> Vec<String> {
         let several = self.lock().sizes().len() > 1;
         let words = |(ring, event): (usize, Event)| {
             let words = match event {
@@ -224,7 +208,7 @@ impl<'l> OpenRings<'l> {
 
     /// The same as events, with the ring of each, counted from 0.
     #[must_use]
-    pub fn take_events(&self) -> Vec<(usize, Event)> {
+    pub(crate) fn take_events(&self) -> Vec<(usize, Event)> {
         self.lock().take_log()
     }
 
@@ -234,7 +218,11 @@ impl<'l> OpenRings<'l> {
     /// [`Error::Refused`] where the ring, the drive or the address does not exist, or too many jobs wait.
     #[doc(alias = "NB_StartReadByte")]
     #[doc(alias = "NB_StartReadWord")]
-    pub fn start(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<OrderNumber, Error> {
+    pub(crate) fn start(
+        &self,
+        axis: Axis,
+        job: impl FnOnce(u8) -> Job,
+    ) -> Result<OrderNumber, Error> {
         let ring = axis.ring();
         let mut pump = self.lock();
         pump.pause();
@@ -247,22 +235,13 @@ impl<'l> OpenRings<'l> {
         }
     }
 
-    /// Whether a job has ended, so that [`Self::result`] does not wait (12.4).
-    #[doc(alias = "NB_Test")]
-    #[must_use]
-    pub fn test(&self, order: OrderNumber) -> bool {
-        let mut pump = self.lock();
-        pump.poll();
-        pump.has(order.ring, order.id)
-    }
-
     /// Waits for the end of a job and fetches its result, which can be fetched only once (11.6).
     ///
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Unknown`], [`Error::Stopped`], or [`Error::NoSuchOrder`] for an order whose
     /// result has been fetched.
     #[doc(alias = "NB_Result")]
-    pub fn result(&self, order: OrderNumber) -> Result<Option<u32>, Error> {
+    pub(crate) fn result(&self, order: OrderNumber) -> Result<Option<u32>, Error> {
         value_of(self.outcome(order)?)
     }
 
@@ -270,7 +249,7 @@ impl<'l> OpenRings<'l> {
     ///
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
-    pub fn outcome(&self, order: OrderNumber) -> Result<Outcome, Error> {
+    pub(crate) fn outcome(&self, order: OrderNumber) -> Result<Outcome, Error> {
         let began = self.lock().begin();
         loop {
             let mut pump = self.lock();

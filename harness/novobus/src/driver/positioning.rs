@@ -27,7 +27,7 @@ impl OpenRings<'_> {
     /// [`Error::InReset`], [`Error::DriveError`]; [`Error::Interrupted`] by a stop or a block, then `ps_v0` is as
     /// before, where the line permits it; others see [`Error`].
     #[doc(alias = "NB_Referenzfahrt")]
-    pub fn reference(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn reference(&self, axis: Axis) -> Result<(), Error> {
         self.reference_showing(axis, |_| {})
     }
 
@@ -110,7 +110,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// [`Error::NotSet`] where the value is off by 256 increments or more every time; others see [`Error`].
     #[doc(alias = "NB_IstwertSetzen")]
-    pub fn set_actual_value(&self, axis: Axis, position: u32) -> Result<(), Error> {
+    pub(crate) fn set_actual_value(&self, axis: Axis, position: u32) -> Result<(), Error> {
         let mut deviation = 0;
         for _ in 0..ATTEMPTS {
             // Step 1.
@@ -155,7 +155,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_InitPS")]
-    pub fn init_ps(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn init_ps(&self, axis: Axis) -> Result<(), Error> {
         // Steps 1 and 2.
         self.and(axis, ram::FLAGS2, !flags2::CALCULATE)?;
         self.and(axis, ram::PS_STATUS, !ps_status::CALCULATE)?;
@@ -180,7 +180,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// See [`Error`].
     #[doc(alias = "NB_WritePS")]
-    pub fn write_ps(&self, axis: Axis, position: Position) -> Result<(), Error> {
+    pub(crate) fn write_ps(&self, axis: Axis, position: Position) -> Result<(), Error> {
         // Step 1.
         let patience = self.options.motion_patience;
         self.poll_byte(
@@ -203,7 +203,7 @@ impl OpenRings<'_> {
     /// # Errors
     /// [`Error::DriveError`] where the calculation ended in an error (13.4); others see [`Error`].
     #[doc(alias = "NB_StartPS")]
-    pub fn start_ps(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn start_ps(&self, axis: Axis) -> Result<(), Error> {
         // Step 1.
         let patience = self.options.drive_patience;
         self.poll_byte(axis, ram::PS_STATUS, patience, "the calculation", |byte| {
@@ -221,7 +221,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// [`Error::Interrupted`] where a stop or a block has ended it; others see [`Error`].
-    pub fn wait_for_end(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn wait_for_end(&self, axis: Axis) -> Result<(), Error> {
         self.wait_for_end_showing(axis, |_| {})
     }
 

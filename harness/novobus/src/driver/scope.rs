@@ -10,7 +10,7 @@ use harness_proto::time::Span;
 
 /// What a recording waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Trigger {
+pub(crate) struct Trigger {
     /// The low byte of the address of the signal.
     pub signal: u8,
     /// `scope_level` (14.10.6.3).
@@ -23,7 +23,7 @@ pub struct Trigger {
 
 /// What is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ScopeSettings {
+pub(crate) struct ScopeSettings {
     /// The low bytes of the addresses of signal 1 and 2 (14.10.6.1).
     pub signals: [u8; 2],
     /// `scope_timer0` (14.10.6.2).
@@ -34,7 +34,7 @@ pub struct ScopeSettings {
 
 /// A byte of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Measurement {
+pub(crate) struct Measurement {
     /// Of signal 1 or 2.
     pub signal: u8,
     /// What the cell held.
@@ -46,7 +46,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn start_scope(&self, axis: Axis, scope: &ScopeSettings) -> Result<(), Error> {
+    pub(crate) fn start_scope(&self, axis: Axis, scope: &ScopeSettings) -> Result<(), Error> {
         // "The signal selecting must be made with a blocked recording" (14.10.6.1).
         self.write_byte(axis, ram::SCOPE_STATUS, STOPPED)?;
         let [first, second] = scope.signals;
@@ -79,7 +79,7 @@ impl OpenRings<'_> {
     ///
     /// # Errors
     /// [`Error::TimeOut`] where nothing triggered it: then it has been stopped; others see [`Error`].
-    pub fn finish_scope(
+    pub(crate) fn finish_scope(
         &self,
         axis: Axis,
         scope: &ScopeSettings,

@@ -13,10 +13,10 @@ use harness_sim::fault::Flips;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of acts of a case.
-pub const MOST_ACTS: usize = 48;
+pub(crate) const MOST_ACTS: usize = 48;
 
 /// Maximum number of bytes that a case sends.
-pub const MOST_BYTES: usize = 400;
+pub(crate) const MOST_BYTES: usize = 400;
 
 /// Maximum number of net bytes of a telegram (ND21 9.2).
 pub(crate) const MOST_NET: u8 = 7;
@@ -24,7 +24,7 @@ pub(crate) const MOST_NET: u8 = 7;
 /// A conversation with a ring of a given size.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Case {
+pub(crate) struct Case {
     /// How many drives the ring has.
     pub drives: u8,
     /// The other ring of the bench, where there is one.
@@ -37,7 +37,7 @@ pub struct Case {
 /// The other ring of the bench and its number of drives (ND21 12.2). No byte goes from one ring to the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum OtherRing {
+pub(crate) enum OtherRing {
     /// It is ring 1: the conversation is with ring 2.
     First(u8),
     /// It is ring 2: the conversation is with ring 1.
@@ -47,8 +47,7 @@ pub enum OtherRing {
 /// An action of the master, with the faults on its bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Act {
-    /// What.
+pub(crate) struct Act {
     pub what: ActKind,
     /// The faults on its bytes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -58,7 +57,7 @@ pub struct Act {
 /// What the master can do.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum ActKind {
+pub(crate) enum ActKind {
     /// This number of SYNCO (ND21 9.2).
     Synco(u8),
     /// This number of PAUSE (9.2).
@@ -77,7 +76,6 @@ pub enum ActKind {
     Wait(u16),
     /// A drive loses its power, or gets it back.
     Power {
-        /// Which.
         drive: u8,
         /// Whether it has power from now on.
         on: bool,
@@ -87,7 +85,7 @@ pub enum ActKind {
 /// Telegrams to one drive (9.1). If the commands do not fit into one telegram, they are split over several telegrams to the same drive.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Talk {
+pub(crate) struct Talk {
     /// The addressee.
     pub to: To,
     /// The process data of the first telegram (9.4).
@@ -119,7 +117,7 @@ const fn is_most_net(room: &u8) -> bool {
 /// The addressee of a telegram (9.2, 9.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum To {
+pub(crate) enum To {
     /// A drive, by an address byte.
     Drive(u8),
     /// The drive of the telegram before.
@@ -133,19 +131,18 @@ pub enum To {
 /// A fault at a byte of an act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Damage {
+pub(crate) struct Damage {
     /// On which link, counted from the master's outgoing one as 0.
     pub link: u8,
     /// At which byte of the act, counted from 0; the last one where there are fewer.
     pub at: u16,
-    /// What.
     pub harm: Harm,
 }
 
 /// What happens to a byte on a wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Harm {
+pub(crate) enum Harm {
     /// Bits are inverted.
     Flip {
         /// Data bits.
@@ -174,7 +171,7 @@ pub enum Harm {
 impl Talk {
     /// One command to a drive.
     #[must_use]
-    pub fn one(to: To, command: RawCommand) -> Self {
+    pub(crate) fn one(to: To, command: RawCommand) -> Self {
         Self {
             to,
             process_data: None,
@@ -186,7 +183,7 @@ impl Talk {
 
     /// The telegrams, each with its bytes, in a ring of `drives`.
     #[must_use]
-    pub fn telegrams(&self, drives: u8) -> Vec<Vec<u8>> {
+    pub(crate) fn telegrams(&self, drives: u8) -> Vec<Vec<u8>> {
         let mut telegrams = Vec::new();
         self.each_telegram(drives, |bytes| telegrams.push(bytes.to_vec()));
         telegrams
@@ -248,7 +245,7 @@ fn telegram(bytes: &mut Vec<u8>, to: To, data: Option<u16>, parameters: &[u8], d
 impl Act {
     /// An act without a fault.
     #[must_use]
-    pub const fn sound(what: ActKind) -> Self {
+    pub(crate) const fn sound(what: ActKind) -> Self {
         Self {
             what,
             damages: Vec::new(),
@@ -257,7 +254,7 @@ impl Act {
 
     /// What is sent, telegram by telegram.
     #[must_use]
-    pub fn parts(&self, drives: u8) -> Vec<Vec<u8>> {
+    pub(crate) fn parts(&self, drives: u8) -> Vec<Vec<u8>> {
         let mut parts = Vec::new();
         self.each_part(drives, |part| parts.push(part.to_vec()));
         parts
@@ -284,7 +281,7 @@ impl Act {
 
     /// How many bytes are sent.
     #[must_use]
-    pub fn length(&self, drives: u8) -> usize {
+    pub(crate) fn length(&self, drives: u8) -> usize {
         let mut length = 0;
         self.each_part(drives, |part| length += part.len());
         length
@@ -294,7 +291,7 @@ impl Act {
 impl Case {
     /// Which ring of the bench it is with, counted from 0.
     #[must_use]
-    pub const fn ring(&self) -> usize {
+    pub(crate) const fn ring(&self) -> usize {
         match self.beside {
             Some(OtherRing::First(_)) => 1,
             Some(OtherRing::Second(_)) | None => 0,
@@ -303,7 +300,7 @@ impl Case {
 
     /// How many drives the rings of the bench have, in order.
     #[must_use]
-    pub fn sizes(&self) -> Vec<u8> {
+    pub(crate) fn sizes(&self) -> Vec<u8> {
         match self.beside {
             None => vec![self.drives],
             Some(OtherRing::First(other)) => vec![other, self.drives],
@@ -313,7 +310,7 @@ impl Case {
 
     /// All bytes that are sent.
     #[must_use]
-    pub fn bytes(&self) -> Vec<u8> {
+    pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(MOST_BYTES);
         for act in &self.acts {
             act.each_part(self.drives, |part| bytes.extend(part));
@@ -328,7 +325,7 @@ impl Case {
 
     /// The faults on links: link, byte counted from 1 over all bytes that the master sends, and what happens.
     #[must_use]
-    pub fn faults(&self) -> Vec<(u8, u64, Harm)> {
+    pub(crate) fn faults(&self) -> Vec<(u8, u64, Harm)> {
         let mut faults = Vec::new();
         if self.acts.iter().all(|act| act.damages.is_empty()) {
             return faults;
@@ -346,8 +343,7 @@ impl Case {
         faults
     }
 
-    /// All commands, in order.
-    pub fn orders(&self) -> impl Iterator<Item = &CommandSent> {
+    pub(crate) fn orders(&self) -> impl Iterator<Item = &CommandSent> {
         self.acts.iter().flat_map(|act| match &act.what {
             ActKind::Talk(talk) => &talk.orders[..],
             _ => &[],
@@ -356,13 +352,13 @@ impl Case {
 
     /// Whether it stays within the bounds of a case, and its rings within theirs (ND21 8.4).
     #[must_use]
-    pub fn is_bounded(&self) -> bool {
+    pub(crate) fn is_bounded(&self) -> bool {
         self.is_within(1)
     }
 
     /// The same for a finding, in which more may stand than in a new case: what was sent before.
     #[must_use]
-    pub fn is_kept(&self) -> bool {
+    pub(crate) fn is_kept(&self) -> bool {
         self.is_within(30)
     }
 
@@ -376,7 +372,7 @@ impl Case {
     /// What stands in it, for shrinking: every step makes this smaller. In order of weight: bytes on the wire, faults, acts,
     /// drives, milliseconds of silence, and the values themselves.
     #[must_use]
-    pub fn measure(&self) -> [u64; 6] {
+    pub(crate) fn measure(&self) -> [u64; 6] {
         let damages = self.acts.iter().flat_map(|act| &act.damages);
         let values = self.acts.iter().map(|act| values(&act.what)).sum();
         let waits = self.acts.iter().map(|act| match act.what {
@@ -419,7 +415,7 @@ fn values(what: &ActKind) -> u64 {
 impl Harm {
     /// The fault of the language.
     #[must_use]
-    pub const fn fault(self) -> LinkFault {
+    pub(crate) const fn fault(self) -> LinkFault {
         match self {
             Self::Flip { data, parity, stop } => LinkFault::Flip(Flips {
                 data,
@@ -439,7 +435,7 @@ impl Harm {
 
     /// How complex it is: a single inverted bit is the simplest.
     #[must_use]
-    pub const fn weight(self) -> u64 {
+    pub(crate) const fn weight(self) -> u64 {
         match self {
             Self::Flip { data, parity, stop } => {
                 let bits = data.count_ones() as u64 + parity as u64 + 4 * stop as u64;

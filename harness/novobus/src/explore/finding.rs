@@ -24,7 +24,7 @@ pub(super) fn is_bounded(finding: &Finding) -> bool {
 ///
 /// # Errors
 /// The model cannot be made.
-pub fn scenario(
+pub(crate) fn scenario(
     finding: &Finding,
     title: &str,
     sources: &[String],
@@ -64,7 +64,7 @@ pub(crate) fn scenario_on(
 }
 
 /// The tables of the manual that it is about, as the catalogue names them.
-pub fn sources(finding: &Finding) -> Vec<String> {
+pub(crate) fn sources(finding: &Finding) -> Vec<String> {
     let tables = MANUAL.tables().unwrap_or_default();
     let own = tables
         .iter()

@@ -12,8 +12,7 @@ use harness_proto::novobus::guard::{Limits, Need};
 
 /// What cases may have on a rig.
 #[derive(Clone, Debug)]
-pub struct CaseScope {
-    /// Its ring.
+pub(crate) struct CaseScope {
     pub first: RingScope,
     /// Its second ring, where it has two: a case is with one of them.
     pub second: Option<RingScope>,
@@ -28,7 +27,7 @@ pub struct CaseScope {
 impl CaseScope {
     /// A ring of it, counted from 0.
     #[must_use]
-    pub fn ring(&self, ring: usize) -> &RingScope {
+    pub(crate) fn ring(&self, ring: usize) -> &RingScope {
         let second = self.second.as_ref().filter(|_| ring > 0);
         second.unwrap_or(&self.first)
     }
@@ -36,8 +35,7 @@ impl CaseScope {
 
 /// A ring that cases may be with.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RingScope {
-    /// How many drives it has.
+pub(crate) struct RingScope {
     pub drives: u8,
     /// The other ring of the bench, where there is one.
     pub beside: Option<OtherRing>,
@@ -49,7 +47,7 @@ impl RingScope {
     /// The rings of a bench of these sizes, with the links that `reaches` says of a ring and a link, both counted from 0. What is
     /// damaged behind the last drive no drive hears: that link is left out.
     #[must_use]
-    pub fn both(
+    pub(crate) fn both(
         first: u8,
         second: Option<u8>,
         reaches: impl Fn(usize, u8) -> bool,
@@ -67,7 +65,7 @@ impl RingScope {
 
     /// A case with this ring.
     #[must_use]
-    pub const fn case(&self, acts: Vec<Act>) -> Case {
+    pub(crate) const fn case(&self, acts: Vec<Act>) -> Case {
         Case {
             drives: self.drives,
             beside: self.beside,
@@ -106,7 +104,7 @@ const BYTES: [u8; 12] = [
 
 /// Makes acts of a swarm's kind.
 #[derive(Debug)]
-pub struct Generator<'s> {
+pub(crate) struct Generator<'s> {
     scope: &'s CaseScope,
     ring: &'s RingScope,
     swarm: &'s Swarm,
@@ -116,7 +114,7 @@ pub struct Generator<'s> {
 
 impl<'s> Generator<'s> {
     /// A generator for one of the scope's rings, with a few cells of its own.
-    pub fn new(
+    pub(crate) fn new(
         scope: &'s CaseScope,
         ring: &'s RingScope,
         swarm: &'s Swarm,
@@ -135,7 +133,7 @@ impl<'s> Generator<'s> {
     }
 
     /// A new case.
-    pub fn case(&self, dice: &mut Dice) -> Case {
+    pub(crate) fn case(&self, dice: &mut Dice) -> Case {
         let mut acts = Vec::new();
         for _ in 0..1 + dice.below(NEW_ACTS) {
             self.add(&mut acts, dice);
@@ -150,7 +148,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Adds an act, or some that belong together.
-    pub fn add(&self, acts: &mut Vec<Act>, dice: &mut Dice) {
+    pub(crate) fn add(&self, acts: &mut Vec<Act>, dice: &mut Dice) {
         let possible = Idiom::ALL
             .iter()
             .filter(|(_, spice)| self.swarm.has(*spice));
@@ -210,7 +208,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Any act.
-    pub fn act(&self, dice: &mut Dice) -> Act {
+    pub(crate) fn act(&self, dice: &mut Dice) -> Act {
         let has = |spice| self.swarm.has(spice);
         let what = match dice.below(100) {
             0..6 if has(Spice::Idle) => ActKind::Synco(1 + dice.below(4) as u8),
@@ -247,7 +245,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Telegrams to a drive.
-    pub fn talk(&self, dice: &mut Dice) -> Talk {
+    pub(crate) fn talk(&self, dice: &mut Dice) -> Talk {
         let with_data = self.swarm.has(Spice::ProcessData) && dice.percent(35);
         let mut orders = Vec::new();
         while orders.len() < 3 && (orders.is_empty() && !with_data || dice.percent(30)) {
@@ -270,7 +268,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Chooses the addressee of a telegram.
-    pub fn to(&self, dice: &mut Dice) -> To {
+    pub(crate) fn to(&self, dice: &mut Dice) -> To {
         let drive = dice.below(usize::from(self.ring.drives)) as u8;
         match dice.below(100) {
             0..20 if self.swarm.has(Spice::Same) => To::Same,
@@ -291,7 +289,7 @@ impl<'s> Generator<'s> {
     }
 
     /// A command that the rig allows, now and then spoiled.
-    pub fn order(&self, dice: &mut Dice) -> CommandSent {
+    pub(crate) fn order(&self, dice: &mut Dice) -> CommandSent {
         let command = self.command(dice);
         let spoiled = self.swarm.has(Spice::Spoil) && dice.percent(15);
         CommandSent {
@@ -371,7 +369,7 @@ impl<'s> Generator<'s> {
     }
 
     /// Puts faults on bytes, in a third of the cases.
-    pub fn damage(&self, acts: &mut [Act], dice: &mut Dice) {
+    pub(crate) fn damage(&self, acts: &mut [Act], dice: &mut Dice) {
         let own = self.swarm.of(&Spice::FAULTS);
         if own.is_empty() || !dice.percent(35) {
             return;

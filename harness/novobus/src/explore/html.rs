@@ -2,12 +2,12 @@
 
 use super::setup::planted_line;
 use crate::explore::FuzzSettings;
-use crate::report::html::ShownScenario;
 use harness_bench::counted::counted;
 use harness_bench::explore::Progress;
 use harness_bench::html::Html;
 use harness_bench::report::chart::{Along, Chart, Curve, Points};
 use harness_bench::report::html::{Section, page};
+use harness_bench::shown::{ShownScenario, colour};
 use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
 
 /// Progress shown in a table at most; of a longer run every n-th line is.
@@ -112,11 +112,7 @@ fn findings(html: &mut Html, all: &[ShownScenario]) {
         html.heads(&["Verdict", "Finding", "What differed"]);
         for ShownScenario { row, section } in all {
             html.element("tr", &[], |html| {
-                html.line(
-                    "td",
-                    &[("class", &crate::report::html::colour(row.verdict))],
-                    row.verdict,
-                );
+                html.line("td", &[("class", &colour(row.verdict))], row.verdict);
                 html.element("th", &[("scope", &"row")], |html| {
                     html.line("a", &[("href", &format!("#{}", section.id))], &row.name);
                 });

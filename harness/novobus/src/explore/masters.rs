@@ -16,7 +16,7 @@ const FAULTS: [u8; 6] = [10, 11, 12, 13, 14, 15];
 
 /// The input of a case, as the fuzz target `jobs` takes it: of a seed, and the number of the case.
 #[must_use]
-pub fn input(seed: u64, number: u64) -> Vec<u8> {
+pub(crate) fn input(seed: u64, number: u64) -> Vec<u8> {
     let mut dice = Dice::of_part(seed, number);
     let mut input = vec![dice.byte(), dice.byte()];
     let jobs = 1 + dice.below(MOST_RECORDS - 4);
@@ -33,13 +33,13 @@ pub fn input(seed: u64, number: u64) -> Vec<u8> {
 
 /// What the case of this number is.
 #[must_use]
-pub fn case(seed: u64, number: u64) -> Work {
+pub(crate) fn case(seed: u64, number: u64) -> Work {
     Work::read(&input(seed, number))
 }
 
 /// How many cases it takes until a wrong master is found, and by what; `None` where `most` do not show it.
 #[must_use]
-pub fn cases_until_found(
+pub(crate) fn cases_until_found(
     deviates: &'static MasterDeviation,
     seed: u64,
     most: u64,

@@ -6,7 +6,12 @@ use super::order::{CommandSent, RawCommand};
 use harness_bench::explore::Dice;
 
 /// A case made of one that is kept, and now and then of two.
-pub fn mutate(case: &Case, other: Option<&Case>, maker: &Generator<'_>, dice: &mut Dice) -> Case {
+pub(crate) fn mutate(
+    case: &Case,
+    other: Option<&Case>,
+    maker: &Generator<'_>,
+    dice: &mut Dice,
+) -> Case {
     let mut new = case.clone();
     for _ in 0..1 + dice.below(3) {
         one(&mut new, other, maker, dice);

@@ -13,7 +13,7 @@ use harness_sim::record::Trace;
 
 /// The features of a run of the model; the same one may come several times.
 #[must_use]
-pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> Vec<u32> {
+pub(crate) fn features(case: &Case, seen: &MasterView, trace: &Trace) -> Vec<u32> {
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
         return Vec::new();
     };

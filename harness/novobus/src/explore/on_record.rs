@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 /// An attempt at a case, with all that its difference rests on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct AttemptRecord {
+pub(crate) struct AttemptRecord {
     /// Which values of the manual's open properties the bench took for possible, as numbers of 4 bits. From the highest one:
     /// `empty-short-telegram = error`, `short-address = kept-sum`, `read-long = as-printed`, `broken-sequence = forwarded`.
     pub(super) possible: Vec<u8>,
@@ -27,7 +27,6 @@ pub struct AttemptRecord {
     pub(super) before: Vec<AnsweredCase>,
     /// The case, and what came back; nothing where it was not played.
     pub(super) last: AnsweredCase,
-    /// Whether it was played.
     pub(super) played: bool,
     /// Whether its drives may monitor time-outs (ND21 9.9), in real time.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -43,7 +43,7 @@ const PATIENCE: Span = Span::from_millis(60);
 const LATEST: Span = Span::from_millis(1_000);
 
 /// A rig in use.
-pub struct OnRig<'r, 's> {
+pub(crate) struct OnRig<'r, 's> {
     run: &'r mut Run<'s>,
     /// The model that cases are rehearsed on.
     model: SimulatedLink,
@@ -67,7 +67,7 @@ impl<'r, 's> OnRig<'r, 's> {
     ///
     /// # Errors
     /// Its model cannot be made.
-    pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
+    pub(crate) fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
         let mut rig = session.rig().clone();
         // The setup describes the simulated drives themselves; the model must follow the manual.
@@ -98,7 +98,7 @@ impl<'r, 's> OnRig<'r, 's> {
     }
 
     /// Lets the end of the longest run come between two cases, by [`Target::over`], and not in the middle of one.
-    pub fn end_between_cases(&mut self) {
+    pub(crate) fn end_between_cases(&mut self) {
         self.run.session().link().set_deadline(None);
     }
 

@@ -14,7 +14,7 @@ use harness_sim::record::Trace;
 
 /// Compares a simulated ring with its model, and with the reference model if its drives are plain and sound.
 #[derive(Debug)]
-pub struct OnSim {
+pub(crate) struct OnSim {
     setup: RingSetup,
     /// Fresh rings of the sizes of the last case.
     fresh: Option<Fresh>,
@@ -28,9 +28,8 @@ struct Fresh {
 }
 
 impl OnSim {
-    /// Rings of this setup.
     #[must_use]
-    pub const fn new(setup: RingSetup) -> Self {
+    pub(crate) const fn new(setup: RingSetup) -> Self {
         Self { setup, fresh: None }
     }
 
@@ -47,7 +46,7 @@ impl OnSim {
     ///
     /// # Errors
     /// The lines of the setup have mistakes, or there is no reference for the drives that they describe.
-    pub fn ready(setup: RingSetup, sizes: &[u8]) -> Result<Self, ExploreError> {
+    pub(crate) fn ready(setup: RingSetup, sizes: &[u8]) -> Result<Self, ExploreError> {
         let mut new = Self::new(setup);
         new.fresh_of(sizes.to_vec())?;
         Ok(new)

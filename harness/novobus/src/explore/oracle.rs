@@ -27,7 +27,7 @@ use std::ops::RangeInclusive;
 /// Mismatch of a ring with the expected behaviour.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// What differs.
     pub what: Symptom,
     /// The section of the ND21 manual with the rule, such as `9.6`.
@@ -56,21 +56,21 @@ pub struct Difference {
 impl Difference {
     /// Whether another finding is of the same kind: the same symptom, against the same rule of the same section.
     #[must_use]
-    pub fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         let kind = |own: &Self| (own.what, own.section.clone(), own.rule.clone());
         kind(self) == kind(other)
     }
 
     /// The kind of the finding in words.
     #[must_use]
-    pub fn kind(&self) -> String {
+    pub(crate) fn kind(&self) -> String {
         let what = self.what.words();
         format!("{what} (ND21 {}, {})", self.section, self.rule)
     }
 
     /// Identifies a finding within a run: the same kind, in telegrams to the same drive.
     #[must_use]
-    pub fn key(&self) -> String {
+    pub(crate) fn key(&self) -> String {
         match self.meant {
             Some(drive) => format!(
                 "to drive {}: {}",
@@ -83,7 +83,7 @@ impl Difference {
 
     /// The kind, and the drive that is to blame where that is known.
     #[must_use]
-    pub fn signature(&self) -> String {
+    pub(crate) fn signature(&self) -> String {
         self.signature_of(self.drive)
     }
 
@@ -178,7 +178,11 @@ pub(crate) fn sent(case: &Case) -> Vec<(u8, bool)> {
 /// The first place where a simulated ring of plain drives differs from the reference model. `None` also if the model does not cover
 /// the case: it has no time and no power.
 #[must_use]
-pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Option<Difference> {
+pub(crate) fn against_reference(
+    case: &Case,
+    link: &SimulatedLink,
+    trace: &Trace,
+) -> Option<Difference> {
     let beyond =
         |act: &super::case::Act| matches!(act.what, ActKind::Wait(_) | ActKind::Power { .. });
     if case.acts.iter().any(beyond) || asks_for_code(case) {
@@ -294,7 +298,7 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
 
 /// The first byte on the other ring of the bench, to whose drives nothing was sent (ND21 12.2).
 #[must_use]
-pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
+pub(crate) fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
     let other = match case.beside? {
         OtherRing::First(_) => 0,
         OtherRing::Second(_) => 1,

@@ -9,8 +9,7 @@ const LONGEST: usize = 6;
 
 /// A command, perhaps spoiled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CommandSent {
-    /// Which.
+pub(crate) struct CommandSent {
     #[serde(flatten)]
     pub command: RawCommand,
     /// A byte of it that is put wrong after its checking byte was worked out.
@@ -21,7 +20,7 @@ pub struct CommandSent {
 /// A byte put wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Spoil {
+pub(crate) struct Spoil {
     /// Which byte of the command, counted from 0; the last one where there are fewer.
     pub at: u8,
     /// What stands there.
@@ -31,7 +30,7 @@ pub struct Spoil {
 /// A command of chapter 10 with any parameters, proper or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case")]
-pub enum RawCommand {
+pub(crate) enum RawCommand {
     /// 10.1.
     ReadByte {
         /// The address.
@@ -51,14 +50,12 @@ pub enum RawCommand {
     WriteByte {
         /// The address.
         cell: u16,
-        /// What.
         data: u8,
     },
     /// 10.2.
     WriteWord {
         /// The address.
         cell: u16,
-        /// What.
         data: u16,
     },
     /// 10.3.
@@ -77,7 +74,6 @@ pub enum RawCommand {
     },
     /// 10.4.
     WriteIo {
-        /// The code.
         code: u8,
     },
     /// 10.5.
@@ -87,7 +83,7 @@ pub enum RawCommand {
 impl RawCommand {
     /// Its bytes without the checking byte.
     #[must_use]
-    pub fn head(self) -> Vec<u8> {
+    pub(crate) fn head(self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(LONGEST);
         self.append_head(&mut bytes);
         bytes
@@ -113,7 +109,7 @@ impl RawCommand {
 
     /// The address that is written in it whole; none of the bit commands.
     #[must_use]
-    pub const fn cell(self) -> Option<u16> {
+    pub(crate) const fn cell(self) -> Option<u16> {
         match self {
             Self::ReadByte { cell }
             | Self::ReadWord { cell }
@@ -139,7 +135,7 @@ impl RawCommand {
 
     /// The same command with the address `new` in place of `old`.
     #[must_use]
-    pub fn at(mut self, old: u16, new: u16) -> Self {
+    pub(crate) fn at(mut self, old: u16, new: u16) -> Self {
         match &mut self {
             Self::ReadByte { cell }
             | Self::ReadWord { cell }
@@ -157,7 +153,7 @@ impl RawCommand {
 
     /// What the guard calls it.
     #[must_use]
-    pub const fn act(self) -> GuardedAct {
+    pub(crate) const fn act(self) -> GuardedAct {
         match self {
             Self::ReadByte { cell } | Self::ReadWord { cell } | Self::ReadLong { cell } => {
                 GuardedAct::Read(cell)
@@ -173,7 +169,7 @@ impl RawCommand {
 
     /// The manual's name for it, with its parameters.
     #[must_use]
-    pub fn words(self) -> String {
+    pub(crate) fn words(self) -> String {
         match self {
             Self::ReadByte { cell } => format!("ReadByte {cell:04X}"),
             Self::ReadWord { cell } => format!("ReadWord {cell:04X}"),
@@ -196,7 +192,7 @@ impl RawCommand {
 impl CommandSent {
     /// A command as it should be.
     #[must_use]
-    pub const fn sound(command: RawCommand) -> Self {
+    pub(crate) const fn sound(command: RawCommand) -> Self {
         Self {
             command,
             spoil: None,
@@ -205,7 +201,7 @@ impl CommandSent {
 
     /// Its bytes with the checking byte.
     #[must_use]
-    pub fn bytes(&self) -> Vec<u8> {
+    pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(LONGEST);
         self.append_to(&mut bytes);
         bytes

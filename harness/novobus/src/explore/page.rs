@@ -8,9 +8,7 @@ use crate::explore::Finding;
 use crate::explore::play;
 use crate::explore::{KeptRun, LogLine};
 use crate::language::read::RingScenario;
-use crate::report::html::ScenarioView;
-use crate::report::html::ShownScenario;
-use crate::report::html::section;
+use crate::report::ring::RingReport;
 use crate::simulate::simulated;
 use harness_bench::explore::ExploreError;
 use harness_bench::explore::read_as;
@@ -19,6 +17,7 @@ use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::{self, AtMismatch, Outcome};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
+use harness_bench::shown::{ScenarioView, ShownScenario, section};
 use harness_proto::line::{Rate, Received};
 use harness_sim::novobus::device::Device as _;
 use harness_sim::novobus::transitions::{Reached, Watched};
@@ -32,7 +31,7 @@ const MOST: usize = 40;
 ///
 /// # Errors
 /// It holds no run, or its record or a finding is damaged.
-pub fn page(folder: &Path) -> Result<String, ExploreError> {
+pub(crate) fn page(folder: &Path) -> Result<String, ExploreError> {
     let (kept, _) = read_as::<Case>(folder)?;
     let mut findings = Vec::new();
     let mut features = vec![(0, 0)];
@@ -150,7 +149,7 @@ fn shown(
         text: &text,
         outcome: &outcome,
         traces: &traces,
-        report: None,
+        report: &RingReport,
         rate: Rate::default(),
         again: &again,
     };

@@ -14,7 +14,7 @@ const USUAL: usize = 128;
 
 /// What the master saw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct MasterView {
+pub(crate) struct MasterView {
     /// What it received, and when.
     pub received: Vec<(Instant, Received)>,
     /// How long it took on the line.
@@ -22,7 +22,7 @@ pub struct MasterView {
 }
 
 /// Plays a case on a ring to which nothing has been sent, in the steps of a scenario.
-pub fn play(link: &mut SimulatedLink, case: &Case) -> MasterView {
+pub(crate) fn play(link: &mut SimulatedLink, case: &Case) -> MasterView {
     let ring = case.ring();
     link.reserve(ring, USUAL);
     for (place, byte, harm) in case.faults() {

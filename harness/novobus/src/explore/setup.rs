@@ -24,7 +24,7 @@ pub(super) fn planted_line(own: &Planted) -> String {
 
 /// The same as a header; `None` where there is no such deviation.
 #[must_use]
-pub fn planted_setup(own: &Planted) -> Option<HeaderLine> {
+pub(crate) fn planted_setup(own: &Planted) -> Option<HeaderLine> {
     let known = deviation::deviation(&own.name)?;
     Some(HeaderLine::deviates(
         DriveRange::one(own.ring, own.drive),
@@ -35,7 +35,7 @@ pub fn planted_setup(own: &Planted) -> Option<HeaderLine> {
 /// What simulated rings are made of.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RingSetup {
+pub(crate) struct RingSetup {
     /// The header of the rings, without deviations; a list of its lines in a file.
     #[serde(default)]
     pub header: Header,
@@ -48,7 +48,7 @@ impl RingSetup {
     /// The rings of a simulated rig, with more deviations than its file plants. `sim:N` says nothing of its drives: they are plain,
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
-    pub fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
+    pub(crate) fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
         let own = sim::setup(rig);
         let mut header = own.only(|setup| planted_by(setup, rig).is_empty());
         let mut deviates: Vec<_> = own
@@ -71,14 +71,14 @@ impl RingSetup {
 
     /// Adds a hidden deviation: the model has it as well.
     #[must_use]
-    pub fn hides(mut self, planted: &Planted) -> Self {
+    pub(crate) fn hides(mut self, planted: &Planted) -> Self {
         self.header.setups.extend(planted_setup(planted));
         self
     }
 
     /// The model of a rig with ports and this number of rings.
     #[must_use]
-    pub fn of_ports(rings: usize) -> Self {
+    pub(crate) fn of_ports(rings: usize) -> Self {
         Self {
             header: Header::whole(rings),
             deviates: Vec::new(),
@@ -87,7 +87,7 @@ impl RingSetup {
 
     /// The setup of one ring, as for a bench without another; the ring is counted from 0.
     #[must_use]
-    pub fn of_ring(&self, ring: usize) -> Self {
+    pub(crate) fn of_ring(&self, ring: usize) -> Self {
         let mut header = self.header.only(|setup| setup.drives.ring == ring);
         for setup in &mut header.setups {
             setup.drives.ring = 0;
@@ -106,7 +106,7 @@ impl RingSetup {
 
     /// Whether the drives have no setup: these are what the reference model describes.
     #[must_use]
-    pub fn is_plain(&self) -> bool {
+    pub(crate) fn is_plain(&self) -> bool {
         self.header.is_empty()
     }
 
@@ -120,9 +120,8 @@ impl RingSetup {
         first.map(ToString::to_string)
     }
 
-    /// The header with the deviations.
     #[must_use]
-    pub fn with_deviations(&self) -> Header {
+    pub(crate) fn with_deviations(&self) -> Header {
         let mut header = self.header.clone();
         let planted = self.deviates.iter().filter_map(planted_setup);
         header.setups.extend(planted);
@@ -133,7 +132,7 @@ impl RingSetup {
     ///
     /// # Errors
     /// The lines have mistakes, or name drives that these rings do not have.
-    pub fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
+    pub(crate) fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
         rings(sizes, &self.header)
     }
 
@@ -141,7 +140,7 @@ impl RingSetup {
     ///
     /// # Errors
     /// The same.
-    pub fn under_test(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
+    pub(crate) fn under_test(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
         rings(sizes, &self.with_deviations())
     }
 
@@ -149,7 +148,7 @@ impl RingSetup {
     ///
     /// # Errors
     /// The same.
-    pub fn model_answers(&self, case: &Case) -> Result<MasterView, Box<Problems>> {
+    pub(crate) fn model_answers(&self, case: &Case) -> Result<MasterView, Box<Problems>> {
         Ok(play(&mut self.model(&case.sizes())?, case))
     }
 }

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 /// What is shrunk: a conversation with a ring.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Subject {
+pub(crate) struct Subject {
     /// The conversation.
     pub case: Case,
     /// What its rings are made of.
@@ -23,7 +23,7 @@ pub struct Subject {
 
 /// The result of shrinking.
 #[derive(Clone, Debug)]
-pub struct Shrunk {
+pub(crate) struct Shrunk {
     /// The smallest subject found.
     pub subject: Subject,
     /// How its ring differs from the expected behaviour.
@@ -41,7 +41,7 @@ pub(crate) type Asking<'a> = dyn FnMut(&Subject) -> Result<Option<Difference>, E
 ///
 /// # Errors
 /// A run is not possible.
-pub fn shrink(
+pub(crate) fn shrink(
     subject: Subject,
     difference: Difference,
     most_runs: u32,

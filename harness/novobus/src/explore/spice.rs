@@ -4,7 +4,7 @@ use harness_bench::explore::Spiced;
 
 /// Something that a conversation can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Spice {
+pub(crate) enum Spice {
     /// `ReadByte` (ND21 10.1).
     ReadByte,
     /// `ReadWord` (10.1).
@@ -63,7 +63,7 @@ pub enum Spice {
 
 impl Spice {
     /// All with their names.
-    pub const NAMES: [(&'static str, Self); 27] = [
+    pub(crate) const NAMES: [(&'static str, Self); 27] = [
         ("read-byte", Self::ReadByte),
         ("read-word", Self::ReadWord),
         ("read-long", Self::ReadLong),
@@ -94,7 +94,7 @@ impl Spice {
     ];
 
     /// The commands; a conversation has at least one of them.
-    pub const COMMANDS: [Self; 9] = [
+    pub(crate) const COMMANDS: [Self; 9] = [
         Self::ReadByte,
         Self::ReadWord,
         Self::ReadLong,
@@ -107,7 +107,7 @@ impl Spice {
     ];
 
     /// The faults on links.
-    pub const FAULTS: [Self; 4] = [Self::Flip, Self::Framing, Self::Slip, Self::Late];
+    pub(crate) const FAULTS: [Self; 4] = [Self::Flip, Self::Framing, Self::Slip, Self::Late];
 }
 
 impl Spiced for Spice {

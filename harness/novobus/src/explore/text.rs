@@ -28,8 +28,7 @@ const MOST_COMMENT: usize = 60;
 
 /// What stands around the steps.
 #[derive(Clone, Debug, Default)]
-pub struct Surroundings<'a> {
-    /// The title.
+pub(crate) struct Surroundings<'a> {
     pub title: &'a str,
     /// The tables that it pins, such as `nd21 9.7`.
     pub sources: &'a [String],
@@ -43,7 +42,7 @@ pub struct Surroundings<'a> {
 
 /// What the master must receive.
 #[derive(Clone, Copy, Debug)]
-pub struct ExpectedBytes<'a> {
+pub(crate) struct ExpectedBytes<'a> {
     /// The bytes.
     pub seen: &'a MasterView,
     /// Indexes of bytes that may have any value: data that a drive measures, and their checking bytes.
@@ -54,7 +53,7 @@ pub struct ExpectedBytes<'a> {
 
 /// The text of a scenario.
 #[must_use]
-pub fn text(case: &Case, page: &Surroundings<'_>) -> String {
+pub(crate) fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let none = Header::default();
     let header = page.header.unwrap_or(&none);
     let header = Header::of_rings(&case.sizes()).and(header);

@@ -33,7 +33,7 @@ const CELLS: [(u16, Width); 9] = [
 ///
 /// # Errors
 /// See [`Error`]: the first drive that did not answer.
-pub fn learn<L: Line>(line: &mut Guarded<L>) -> Result<(), Error> {
+pub(crate) fn learn<L: Line>(line: &mut Guarded<L>) -> Result<(), Error> {
     let limits = line.limits();
     if !limits.motion || limits.allow_everything() {
         return Ok(());

@@ -48,7 +48,6 @@ impl From<SafeConfirmation> for Safe {
 pub struct NotSafe {
     /// The drive.
     pub axis: Axis,
-    /// Why.
     pub why: String,
 }
 
@@ -85,7 +84,7 @@ impl fmt::Display for SafeConfirmation {
 ///
 /// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop. Where the computer stood still on
 /// the way, which drives cannot tell from a master that has gone, a ring gets up to three attempts.
-pub fn safe_state(
+pub(crate) fn safe_state(
     line: &mut dyn Line,
     rings: &[RingSize],
     standing: &Standstill,
@@ -324,7 +323,7 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
 
 /// The check sequence (9.8) and the software stop for every drive of a ring (14.10), for senders that cannot wait for an answer.
 #[must_use]
-pub fn blind_stop(size: RingSize) -> Vec<u8> {
+pub(crate) fn blind_stop(size: RingSize) -> Vec<u8> {
     let mut bytes = CHECK_SEQUENCE.to_vec();
     let stop = Command::Or {
         address_low: ram::STATUS.to_be_bytes()[1],

@@ -18,7 +18,7 @@ const MAX_LENGTH: i64 = 256;
 
 /// Which of a drive's memories.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MemoryKind {
+pub(crate) enum MemoryKind {
     /// RAM, ROM and registers, by their addresses (ND21 10.1).
     Ram,
     /// The EEPROM, behind its controller (ND21 14.10.5).
@@ -27,8 +27,7 @@ pub enum MemoryKind {
 
 /// A cell, or a number of bytes from an address on.
 #[derive(Clone, Debug)]
-pub struct MemoryRange {
-    /// Where.
+pub(crate) struct MemoryRange {
     pub memory: MemoryKind,
     /// How many bytes.
     pub size: u16,
@@ -40,7 +39,7 @@ pub struct MemoryRange {
 impl MemoryRange {
     /// All of a cell of the tables.
     #[must_use]
-    pub fn of(memory: MemoryKind, cell: &'static Cell) -> Self {
+    pub(crate) fn of(memory: MemoryKind, cell: &'static Cell) -> Self {
         Self {
             memory,
             size: cell.size,
@@ -58,7 +57,7 @@ impl MemoryRange {
 
     /// The same number of bytes at another place.
     #[must_use]
-    pub fn moved(&self, memory: MemoryKind, address: u16) -> Self {
+    pub(crate) fn moved(&self, memory: MemoryKind, address: u16) -> Self {
         let mut moved = self.clone();
         moved.memory = memory;
         moved.place.address = address;
@@ -67,7 +66,7 @@ impl MemoryRange {
 
     /// The name or the address as written; what is reached through the EEPROM has `EE_` or `ee:` in front.
     #[must_use]
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let name = &self.place.name;
         if self.memory == MemoryKind::Ram || name.starts_with("EE_") {
             name.clone()
@@ -78,13 +77,13 @@ impl MemoryRange {
 
     /// The address of the first byte.
     #[must_use]
-    pub fn address(&self) -> u16 {
+    pub(crate) fn address(&self) -> u16 {
         self.place.address
     }
 
     /// The cell that begins there, if one does.
     #[must_use]
-    pub fn cell(&self) -> Option<&'static Cell> {
+    pub(crate) fn cell(&self) -> Option<&'static Cell> {
         self.place.cell
     }
 
@@ -120,7 +119,11 @@ impl MemoryRange {
     ///
     /// # Errors
     /// The cell cannot hold the value.
-    pub fn bytes(&self, value: &Written, units: units::DriveUnits) -> Result<Vec<u8>, Problem> {
+    pub(crate) fn bytes(
+        &self,
+        value: &Written,
+        units: units::DriveUnits,
+    ) -> Result<Vec<u8>, Problem> {
         let Written::Bytes(pattern) = value else {
             return number_bytes(self.scale, value, units);
         };
@@ -149,7 +152,7 @@ impl MemoryRange {
 ///
 /// # Errors
 /// All that are no cells.
-pub fn cells(texts: &[String]) -> Result<Vec<MemoryRange>, Problems> {
+pub(crate) fn cells(texts: &[String]) -> Result<Vec<MemoryRange>, Problems> {
     each(texts, location)
 }
 
@@ -158,7 +161,7 @@ pub fn cells(texts: &[String]) -> Result<Vec<MemoryRange>, Problems> {
 ///
 /// # Errors
 /// All that are none, or that cannot be written.
-pub fn assignments(texts: &[String]) -> Result<Vec<(MemoryRange, Written)>, Problems> {
+pub(crate) fn assignments(texts: &[String]) -> Result<Vec<(MemoryRange, Written)>, Problems> {
     each(texts, |scanner| {
         let text = scanner.rest();
         let location = location(scanner)?;
@@ -209,7 +212,7 @@ fn own_value(
 ///
 /// # Errors
 /// All that their cells cannot hold.
-pub fn encode(
+pub(crate) fn encode(
     texts: &[String],
     assignments: &[(MemoryRange, Written)],
     units: units::DriveUnits,
@@ -224,7 +227,11 @@ pub fn encode(
 ///
 /// # Errors
 /// It is none.
-pub fn value_at(text: &str, offset: usize, location: &MemoryRange) -> Result<Written, Problem> {
+pub(crate) fn value_at(
+    text: &str,
+    offset: usize,
+    location: &MemoryRange,
+) -> Result<Written, Problem> {
     let mut scanner = Scanner::new(text, offset);
     let value = own_value(&mut scanner, location.scale, (location, &location.name()))?;
     scanner.expect_end()?;

@@ -1,12 +1,12 @@
 //! The words of the scenario language that belong to the NOVOBUS: drives, jobs, checks of cells, calls of the driver.
 
-pub mod argument;
+pub(crate) mod argument;
 pub(crate) mod parse;
-pub mod plan;
-pub mod read;
-pub mod run;
+pub(crate) mod plan;
+pub(crate) mod read;
+pub(crate) mod run;
 pub(crate) mod scale;
-pub mod syntax;
+pub(crate) mod syntax;
 pub(crate) mod write;
 
 use self::plan::{PlannedBench, Planner, RingAct, planner};
@@ -26,6 +26,7 @@ use harness_bench::scenario::problem::{Problem, Spanned};
 use harness_bench::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
 use harness_bench::scenario::run::record::CellRecord;
 use harness_bench::scenario::scanner::Scanner;
+use harness_bench::scenario::settled::PlannedRings;
 use harness_bench::scenario::syntax::Scenario;
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
@@ -167,7 +168,7 @@ impl Language for Novobus {
     }
 
     fn show(received: Received) -> String {
-        bytes::show(received)
+        received.to_string()
     }
 
     fn difference(
@@ -177,6 +178,19 @@ impl Language for Novobus {
         received: &[(Instant, Received)],
     ) -> Option<ByteDifference> {
         Some(state::difference(ring, place, wanted, received))
+    }
+
+    fn planned_rings(plan: &Plan<Self>) -> Option<PlannedRings> {
+        Some(PlannedRings {
+            drives: plan.rings.iter().map(|ring| ring.drives()).collect(),
+            sizes: plan.sizes.clone(),
+            rate: plan.rate,
+        })
+    }
+
+    fn fits(header: &Header, drives: u8) -> bool {
+        let range = header.rings.first();
+        range.is_some_and(|own| own.contains(drives))
     }
 
     fn next_look(state: &RunState) -> Instant {

@@ -1,8 +1,10 @@
 //! A scenario of rings, read and settled.
 
+use super::Novobus;
 use super::plan::Plan;
 use super::syntax::Scenario;
 use harness_bench::scenario::files;
+use harness_bench::scenario::language::Language as _;
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::plan::plan;
 use harness_bench::scenario::problem::Problems;
@@ -10,7 +12,7 @@ use harness_bench::scenario::source::Source;
 
 /// A scenario of rings, read and settled, and not yet played.
 #[derive(Clone, Debug)]
-pub struct RingScenario {
+pub(crate) struct RingScenario {
     /// Its name and text.
     pub source: Source,
     /// What it says.
@@ -24,7 +26,7 @@ impl RingScenario {
     ///
     /// # Errors
     /// Its mistakes.
-    pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
+    pub(crate) fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
         let scenario = parse(&source)?;
         Self::settled(scenario, source, size)
     }
@@ -33,11 +35,9 @@ impl RingScenario {
     ///
     /// # Errors
     /// Its mistakes.
-    pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
+    pub(crate) fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
         let scenario: Scenario = parse(&source)?;
-        let range = scenario.header.rings.first();
-        let fits = |drives: &u8| range.is_some_and(|own| own.contains(*drives));
-        let size = drives.filter(fits);
+        let size = drives.filter(|own| Novobus::fits(&scenario.header, *own));
         Self::settled(scenario, source, size)
     }
 
@@ -56,7 +56,7 @@ impl RingScenario {
 
     /// The name without folders and ending.
     #[must_use]
-    pub fn short_name(&self) -> &str {
+    pub(crate) fn short_name(&self) -> &str {
         files::last(&self.source.name)
     }
 }

@@ -21,7 +21,7 @@ use std::fmt;
 
 /// How the byte at which an attempt differed belongs to a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Meant {
+pub(crate) enum Meant {
     /// It stands in a telegram with the address of this drive.
     Own(u8),
     /// It stands behind such a telegram with an error in it, and nothing but SYNCO between: this drive and those behind it are in the error
@@ -33,7 +33,7 @@ pub enum Meant {
 
 /// An attempt that differed from the model.
 #[derive(Clone, Debug)]
-pub struct Sighting {
+pub(crate) struct Sighting {
     /// The drive that the byte belongs to.
     pub meant: Meant,
     /// The section of the broken rule.
@@ -68,7 +68,7 @@ impl Sighting {
     /// The byte of a conversation at which an attempt on a ring of `drives` differed from the model; `None` where the attempt cannot be
     /// sent again, or no other value came.
     #[must_use]
-    pub fn of(
+    pub(crate) fn of(
         attempt: &[Conversation],
         (place, compared): (usize, &Comparison),
         drives: u8,
@@ -157,7 +157,7 @@ impl Sighting {
 
 /// A sighting that was played again with exchanged roles, step by step, and the owner of the differing byte in each step, if one differed.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// The drive that the byte belonged to in the attempt.
     pub meant: Meant,
     /// The offset of the addresses and the result, one for each other drive. An offset of 0 is the attempt without short addresses.
@@ -178,7 +178,7 @@ type Ask<'a, E> = &'a mut dyn FnMut(&RingScenario) -> Result<Option<Option<Meant
 ///
 /// # Errors
 /// Those of `ask`.
-pub fn exchange<E>(
+pub(crate) fn exchange<E>(
     drives: u8,
     mut sightings: Vec<(String, Sighting)>,
     ask: Ask<'_, E>,
@@ -223,8 +223,7 @@ pub fn exchange<E>(
 
 /// A drive that is to blame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Culprit {
-    /// Which.
+pub(crate) struct Culprit {
     pub drive: u8,
     /// Whether every drive of the ring may be as wrong as this one.
     pub perhaps_of_all: bool,
@@ -243,7 +242,12 @@ impl fmt::Display for Culprit {
 /// The drive that explains where attempts differed: `seen` are all of them, some were tried again with the roles exchanged, and `pinned` is
 /// what the ring has shown when it was asked.
 #[must_use]
-pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial], pinned: &[Pinned]) -> Option<Culprit> {
+pub(crate) fn culprit(
+    drives: u8,
+    seen: &[Meant],
+    trials: &[Trial],
+    pinned: &[Pinned],
+) -> Option<Culprit> {
     let mut shown = pinned.iter().filter(|own| own.names_the_drive);
     if let Some(first) = shown.next() {
         let same = shown.all(|own| own.drive == first.drive);
@@ -297,7 +301,7 @@ pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial], pinned: &[Pinned]) 
 /// The drive to blame, and the deviations that agree with it. Where none agrees with the drive, no drive is proven: all deviations are
 /// returned, and each may be one of any drive that one of them accuses.
 #[must_use]
-pub fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
+pub(crate) fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
     let Some(blamed) = culprit else {
         return (None, proven(named.to_vec()));
     };

@@ -24,8 +24,7 @@ const MOST_AGAINST: u64 = 2;
 
 /// A deviation that explains every byte.
 #[derive(Clone, Debug)]
-pub struct Named {
-    /// Which.
+pub(crate) struct Named {
     pub deviation: &'static Deviation,
     /// Which drives have it.
     pub whose: Whose,
@@ -35,7 +34,7 @@ pub struct Named {
 
 /// Which drives have a deviation, as far as the bytes tell.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Whose {
+pub(crate) enum Whose {
     /// One of these; more than one where the bytes do not tell which.
     OneOf(Vec<u8>),
     /// All of them: one alone does not explain the bytes.
@@ -74,7 +73,7 @@ impl fmt::Display for Named {
 
 /// What a ring was seen to do, attempt by attempt.
 #[derive(Clone, Copy, Debug)]
-pub struct RingSeen<'s> {
+pub(crate) struct RingSeen<'s> {
     /// How many drives the ring has.
     pub drives: u8,
     /// The drives that are tried one by one in a large ring.
@@ -112,7 +111,10 @@ impl Candidate {
 /// Simulated drives keep their state from earlier scenarios, which a fresh twin does not have, so no twin may give every byte. For them
 /// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are named only if no other
 /// deviation explains everything, or if they accuse another drive: then it is not proven which drive it is.
-pub fn name<E>(seen: &RingSeen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Vec<Named> {
+pub(crate) fn name<E>(
+    seen: &RingSeen<'_>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
+) -> Vec<Named> {
     let mut named = name_among(seen, candidates(seen, deviations()), twin);
     if !named.is_empty() && seen.exactness.knows_cells {
         return named;
@@ -260,7 +262,7 @@ fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
 
 /// The deviations of the master under which everything is as it was recorded, in every attempt in which the driver had a part.
 #[must_use]
-pub fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDeviation> {
+pub(crate) fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDeviation> {
     let explains = |deviation: &&'static MasterDeviation| {
         let mut all = attempts.iter();
         all.all(|driven| driven.is_explained_by(Some(deviation)))

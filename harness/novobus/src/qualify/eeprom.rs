@@ -29,12 +29,11 @@ const COPIED: [u8; 6] = [0x20, 0x21, 0x2F, 0x30, 0x3E, 0x3F];
 /// The largest ring that is marched over.
 const MOST_DRIVES: u8 = 16;
 
-/// Cells on a line.
 const CELLS_A_LINE: usize = 8;
 
 /// The scenarios that read all cells, one for each drive.
 #[must_use]
-pub fn dumps(drives: u8) -> Vec<(u8, RingScenario)> {
+pub(crate) fn dumps(drives: u8) -> Vec<(u8, RingScenario)> {
     let of = |drive: u8| {
         let mut text = header("read every cell that is tested later", drives);
         let cells: Vec<u8> = GROUPS.into_iter().flat_map(|(_, cells)| cells).collect();
@@ -53,7 +52,7 @@ pub fn dumps(drives: u8) -> Vec<(u8, RingScenario)> {
 
 /// The scenarios that write the cells of a drive, where the played [`dumps`] have read all of them.
 #[must_use]
-pub fn marches(drives: u8, drive: u8, read: &[Conversation]) -> Vec<RingScenario> {
+pub(crate) fn marches(drives: u8, drive: u8, read: &[Conversation]) -> Vec<RingScenario> {
     let held = values(drives, drive, read);
     let of = |(group, cells): (&str, RangeInclusive<u8>)| {
         let mut text = header(&format!("write the {group} and read them back"), drives);

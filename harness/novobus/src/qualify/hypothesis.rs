@@ -6,7 +6,7 @@ use harness_proto::time::Span;
 
 /// A model with something changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Hypothesis {
+pub(crate) struct Hypothesis {
     /// The assumption, as text for people.
     pub name: String,
     /// What makes simulated drives behave so.
@@ -15,7 +15,7 @@ pub struct Hypothesis {
 
 /// How well a hypothesis explains the bytes received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// All differences of times together.
     pub apart: Span,
     /// Whether every byte also came at the predicted time.
@@ -31,7 +31,7 @@ pub struct Fit {
 ///
 /// # Errors
 /// The error of `twin` for a header that does not describe a ring.
-pub fn explaining<'h, E>(
+pub(crate) fn explaining<'h, E>(
     hypotheses: &'h [Hypothesis],
     conversations: &[Conversation],
     exactness: Exactness,

@@ -14,19 +14,27 @@ mod qualification;
 mod recorded;
 mod settle;
 
-pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
-pub use diagnose::{Named, RingSeen, Whose, deviating_masters, name};
-pub use eeprom::{dumps, marches};
-pub use hypothesis::{Fit, Hypothesis, explaining};
-pub use pinned::{Pinned, Question, questions};
-pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
-pub use qualification::{Qualification, QualificationFacts, QualifiedBench};
+#[cfg(test)]
+pub(crate) use blame::{Culprit, Meant, Sighting, agreed, culprit, exchange};
+#[cfg(test)]
+pub(crate) use diagnose::{Named, RingSeen, Whose, deviating_masters, name};
+#[cfg(test)]
+pub(crate) use eeprom::{dumps, marches};
+#[cfg(test)]
+pub(crate) use hypothesis::{Hypothesis, explaining};
+#[cfg(test)]
+pub(crate) use pinned::{Pinned, questions};
+#[cfg(test)]
+pub(crate) use probes::{Asked, Probe, hypotheses};
+pub(crate) use probes::{conversations, probes, thorough};
+pub(crate) use qualification::{Qualification, QualificationFacts, QualifiedBench};
 pub(crate) use recorded::{of_parts, of_run};
-pub use settle::{Answer, answer};
+#[cfg(test)]
+pub(crate) use settle::{Answer, answer};
 
 /// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the
 /// ring, and marches over the EEPROM.
-pub const TRIALS: [&str; 3] = [EXCHANGED, ASKED, EEPROM_TRIAL];
+pub(crate) const TRIALS: [&str; 3] = [EXCHANGED, ASKED, EEPROM_TRIAL];
 const EXCHANGED: &str = "exchanged-";
 const ASKED: &str = "asked-";
 const EEPROM_TRIAL: &str = "thorough-eeprom-";

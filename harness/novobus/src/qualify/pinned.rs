@@ -45,8 +45,7 @@ const TIME_OUT: u8 = 0x08;
 
 /// A drive that a question has shown to be wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pinned {
-    /// Which.
+pub(crate) struct Pinned {
     pub drive: u8,
     /// The section of the broken rule.
     pub section: &'static str,
@@ -77,17 +76,16 @@ enum Kind {
 
 /// A question, and the scenario that asks it.
 #[derive(Clone, Debug)]
-pub struct Question<'s> {
+pub(crate) struct Question<'s> {
     kind: Kind,
     sighting: &'s Sighting,
     drives: u8,
-    /// The scenario.
     pub entry: RingScenario,
 }
 
 /// The questions about sightings on a ring of `drives`, each sighting with the name of its scenario; those with the fewest bytes first.
 #[must_use]
-pub fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Question<'_>> {
+pub(crate) fn questions(drives: u8, sightings: &[(String, Sighting)]) -> Vec<Question<'_>> {
     if !(2..=MOST_DRIVES).contains(&drives) {
         return Vec::new();
     }
@@ -164,7 +162,7 @@ impl Kind {
 impl Question<'_> {
     /// What the conversations of the played scenario show.
     #[must_use]
-    pub fn answer(&self, conversations: &[Conversation]) -> Option<Pinned> {
+    pub(crate) fn answer(&self, conversations: &[Conversation]) -> Option<Pinned> {
         match self.kind {
             Kind::Refusal => self.refused(conversations),
             Kind::Nobody(byte) => taken_by(self.drives, byte, conversations),

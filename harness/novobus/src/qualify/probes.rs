@@ -50,13 +50,11 @@ const WAITS: [u64; 11] = [10, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15];
 
 /// A probe for a ring of a given size.
 #[derive(Clone, Debug)]
-pub struct Probe {
+pub(crate) struct Probe {
     /// The property that it settles.
     pub property: &'static str,
     /// The section that leaves it open.
     pub section: &'static str,
-    /// What the property decides.
-    pub about: &'static str,
     /// What the probe asks.
     pub asked: Asked,
     /// What is assumed of the drive.
@@ -93,7 +91,7 @@ const OF_SILENT: &str = "-silent";
 
 /// What a probe asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Asked {
+pub(crate) enum Asked {
     /// The whole ring: every drive answers with its end of the bus.
     Ring,
     /// One drive, by these cells.
@@ -150,7 +148,7 @@ fn text(files: &'static Dir<'_>, property: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// A probe has mistakes.
-pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
+pub(crate) fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
     let mut probes = Vec::new();
     for property in &PROPERTIES {
         let Some(text) = text(&FILES, property.name) else {
@@ -169,7 +167,6 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
         probes.push(Probe {
             property: property.name,
             section: property.section,
-            about: property.about,
             asked: Asked::Ring,
             assumed: Header::default(),
             entries,
@@ -197,7 +194,6 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             probes.push(Probe {
                 property: property.name,
                 section: property.section,
-                about: property.about,
                 asked: Asked::Drive(drive, looks),
                 assumed: released(drive).into(),
                 entries: vec![probe(&name, &text, drives)?],
@@ -250,7 +246,7 @@ const RECEIVER: &str = "{receiver}";
 ///
 /// # Errors
 /// One of them has mistakes.
-pub fn conversations(
+pub(crate) fn conversations(
     drives: u8,
     reaches: &dyn Fn(usize) -> bool,
 ) -> Result<Vec<RingScenario>, Box<Problems>> {
@@ -313,7 +309,7 @@ fn entry_for(source: Source, drives: u8) -> Result<Option<RingScenario>, Box<Pro
 ///
 /// # Errors
 /// One of them has mistakes.
-pub fn thorough(drives: u8) -> Result<Vec<RingScenario>, Box<Problems>> {
+pub(crate) fn thorough(drives: u8) -> Result<Vec<RingScenario>, Box<Problems>> {
     let mut files: Vec<_> = THOROUGH.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let entries = files.into_iter().filter_map(|file| {
@@ -328,7 +324,7 @@ pub fn thorough(drives: u8) -> Result<Vec<RingScenario>, Box<Problems>> {
 
 /// The possible values of a property of the bus: first all drives alike, then one drive different from the others.
 #[must_use]
-pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
+pub(crate) fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let known = PROPERTIES.iter().find(|known| known.name == property);
     let values: Vec<SetupKind> = match (property, known.map(|known| known.values)) {
         (_, None) => return Vec::new(),
@@ -368,7 +364,6 @@ fn alike(value: &SetupKind) -> Hypothesis {
     }
 }
 
-/// A property that is a time.
 fn time(property: &str, milliseconds: u64) -> SetupKind {
     SetupKind::time(property, Duration::millis(milliseconds))
 }

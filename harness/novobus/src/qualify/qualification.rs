@@ -34,7 +34,7 @@ const ENDED: &str = "the run ended before everything was played";
 const PROBED: usize = 3;
 
 /// What plays the scenarios of a qualification: a rig in use, or the record of one.
-pub trait QualifiedBench {
+pub(crate) trait QualifiedBench {
     /// Why nothing more is played.
     type Stop;
 
@@ -81,8 +81,7 @@ pub trait QualifiedBench {
 
 /// What is known of a qualification before anything is played.
 #[derive(Clone, Debug)]
-pub struct QualificationFacts {
-    /// The rig.
+pub(crate) struct QualificationFacts {
     pub rig: Rig,
     /// How long a byte takes.
     pub byte_time: Span,
@@ -96,7 +95,7 @@ pub struct QualificationFacts {
 
 impl QualificationFacts {
     /// Those of a qualification that begins on a rig in use.
-    pub fn of(run: &mut Run<'_>) -> Self {
+    pub(crate) fn of(run: &mut Run<'_>) -> Self {
         let rig = run.session().rig().clone();
         let links = 0..usize::from(rig.ring_size());
         Self {
@@ -112,7 +111,7 @@ impl QualificationFacts {
 }
 
 /// A qualification in progress.
-pub struct Qualification {
+pub(crate) struct Qualification {
     facts: QualificationFacts,
     /// When it began, as a date and time of day in UTC.
     began: String,
@@ -135,7 +134,7 @@ const SILENT: &str = "silent";
 
 impl Qualification {
     /// One of which nothing was played yet.
-    pub fn new(facts: QualificationFacts) -> Self {
+    pub(crate) fn new(facts: QualificationFacts) -> Self {
         let drives = facts.rig.ring_size();
         Self {
             drives,
@@ -152,14 +151,14 @@ impl Qualification {
     }
 
     /// Notes the outcome of a selected scenario.
-    pub fn note(&mut self, name: &str, played: &PlayedScenario) {
+    pub(crate) fn note(&mut self, name: &str, played: &PlayedScenario) {
         self.findings.note(name, played);
         self.ill = played.shows_an_ill_rig();
         self.assume(played);
     }
 
     /// Notes what parts of a qualification have not played, in sentences. How one of them ended is not held against the others.
-    pub fn note_missing(&mut self, missing: &[String]) {
+    pub(crate) fn note_missing(&mut self, missing: &[String]) {
         let missing = missing.iter().cloned();
         missing.for_each(|own| self.findings.note_open(own));
         self.lacks_a_part = true;
@@ -180,7 +179,7 @@ impl Qualification {
     ///
     /// # Errors
     /// Those of the bench.
-    pub fn settle<B: QualifiedBench>(
+    pub(crate) fn settle<B: QualifiedBench>(
         mut self,
         bench: &mut B,
         began: String,

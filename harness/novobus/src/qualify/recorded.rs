@@ -178,7 +178,6 @@ impl QualifiedBench for RunRecord<'_> {
 /// The record of a part, behind its selected scenarios, in place of a rig.
 struct PartRecord<'r> {
     rig: &'r Rig,
-    /// Which.
     name: String,
     whole: bool,
     thorough: bool,

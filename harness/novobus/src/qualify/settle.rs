@@ -22,7 +22,7 @@ const LATENESS: Span = Span::from_millis(2);
 
 /// The result of a probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub(crate) enum Answer {
     /// A value explains every byte.
     Settled {
         /// It, for people.
@@ -47,7 +47,7 @@ pub enum Answer {
 ///
 /// # Errors
 /// What `twin` says of a header that makes no ring.
-pub fn answer<E>(
+pub(crate) fn answer<E>(
     probe: &Probe,
     drives: u8,
     conversations: &[Vec<Conversation>],

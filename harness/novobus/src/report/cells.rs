@@ -1,8 +1,9 @@
 //! The bytes of a diagram, and equal neighbours put together.
 
 use super::csv::{remark, status};
-use super::picture::{MAX_ROWS, RowPlacing};
+use super::picture::MAX_ROWS;
 use super::walk::{Reader, SenderState};
+use harness_bench::shown::RowPlacing;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;

@@ -25,13 +25,14 @@ use std::fmt::Write as _;
 use std::io::Write;
 
 /// The first line.
-pub const HEADING: &str = "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
+pub(crate) const HEADING: &str =
+    "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
 
 /// Writes one or two rings of a run, one behind the other.
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     out.write_all(HEADING.as_bytes())?;
     // A row is written at once: each of its fields would be a call.
     let mut row = String::new();
@@ -68,7 +69,7 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
 
 /// What the receiver noticed, in a word.
 #[must_use]
-pub fn status(byte: &LineByte) -> &'static str {
+pub(crate) fn status(byte: &LineByte) -> &'static str {
     match (byte.received, byte.error) {
         (None, _) => "dropped",
         (_, None) => "ok",
@@ -76,7 +77,6 @@ pub fn status(byte: &LineByte) -> &'static str {
     }
 }
 
-/// What a byte is, in words.
 pub(crate) fn words(seen: &ByteSeen<'_>, byte: &LineByte) -> String {
     seen.meaning.words(byte.received)
 }

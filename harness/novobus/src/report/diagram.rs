@@ -4,10 +4,11 @@
 //! as data. The script shows the meaning of a byte under the pointer or selected by keys, and can place the bytes at their times.
 
 use super::cells::Area;
-use super::picture::{LEFT, MAX_AREAS, ROW, RingPicture, RowPlacing, TOP};
+use super::picture::{LEFT, MAX_AREAS, ROW, RingPicture, TOP};
 use super::walk::SenderState;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng::name;
+use harness_bench::shown::RowPlacing;
 use harness_proto::line::Rate;
 use harness_sim::record::{Channel, LineByte, Trace};
 use serde::Serialize;

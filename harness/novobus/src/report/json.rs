@@ -89,7 +89,11 @@ struct SampleObject {
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(traces: &[Trace], records: &[CellRecord], mut out: impl Write) -> std::io::Result<()> {
+pub(crate) fn write(
+    traces: &[Trace],
+    records: &[CellRecord],
+    mut out: impl Write,
+) -> std::io::Result<()> {
     let of = |ring| records.iter().filter(move |record| record.ring == ring);
     let second = traces
         .get(1)

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 /// What a byte is on its link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ByteRole {
+pub(crate) enum ByteRole {
     /// SYNCO (9.2).
     Synco,
     /// PAUSE (9.2).
@@ -51,7 +51,7 @@ pub enum ByteRole {
 impl ByteRole {
     /// The word that tables and dissectors use.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Synco => "synco",
             Self::Pause => "pause",
@@ -74,8 +74,7 @@ impl ByteRole {
 
 /// What one byte is, and of which conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Meaning {
-    /// What it is.
+pub(crate) struct Meaning {
     pub role: ByteRole,
     /// The number that the telegram means, whether the ring has such a drive or not.
     pub drive: Option<u8>,
@@ -103,13 +102,13 @@ impl Meaning {
 
     /// The document and section of the rule, such as `ND21 9.2`.
     #[must_use]
-    pub fn citation(&self) -> String {
+    pub(crate) fn citation(&self) -> String {
         format!("ND21 {}", self.section())
     }
 
     /// The section of the ND21 manual with the rule.
     #[must_use]
-    pub fn section(&self) -> &'static str {
+    pub(crate) fn section(&self) -> &'static str {
         match self.role {
             ByteRole::Synco | ByteRole::Pause | ByteRole::Sync => "9.2",
             ByteRole::Address => "9.3",
@@ -128,7 +127,7 @@ impl Meaning {
 
     /// What the byte is, in a few words; the same bytes give the same words.
     #[must_use]
-    pub fn words(&self, byte: Option<u8>) -> String {
+    pub(crate) fn words(&self, byte: Option<u8>) -> String {
         let to = self
             .drive
             .map_or_else(String::new, |drive| format!(" for drive {drive}"));

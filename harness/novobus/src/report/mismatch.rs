@@ -1,8 +1,9 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
-use crate::language::run::bytes::show;
-use crate::report::table::{LEGEND, TablePart, table};
+use crate::report::table::{LEGEND, table};
 use harness_bench::scenario::run::{ByteDifference, Mismatch};
+use harness_bench::shown::{TablePart, see};
+use harness_proto::line::Received;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -15,7 +16,7 @@ const BYTES_AROUND: usize = 8;
 
 /// The bytes of a finding, expected beside received, and the part of the table around them.
 #[must_use]
-pub fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> String {
+pub(crate) fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> String {
     let mut out = String::new();
     let Some(difference) = &finding.difference else {
         return out;
@@ -33,10 +34,7 @@ pub fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> Str
     };
     // Writing to a String cannot fail.
     let _infallible = write!(out, "\n{}\n{LEGEND}", table(trace, &part));
-    if !sources.is_empty() {
-        let _infallible = writeln!(out, "see {}", sources.join(", "));
-    }
-    out
+    out + &see(sources)
 }
 
 /// The row of the master's `byte`-th received byte: bytes that were lost on the last link have rows
@@ -73,7 +71,7 @@ fn beside(difference: &ByteDifference) -> String {
     }
     for index in from..to {
         let expected = difference.expected.get(index).map(|e| e.to_string());
-        let received = difference.received.get(index).map(|r| show(*r));
+        let received = difference.received.get(index).map(Received::to_string);
         let (expected, received) = match (expected, received) {
             (None, None) => break,
             (expected, received) => (

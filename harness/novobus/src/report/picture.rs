@@ -9,6 +9,7 @@ use super::walk::SenderState;
 use harness_bench::counted::counted;
 use harness_bench::html::{Attribute, Html};
 use harness_bench::report::pcapng::name;
+use harness_bench::shown::RowPlacing;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -20,16 +21,6 @@ use std::ops::Range;
 pub(crate) const MAX_ROWS: usize = 4_000;
 /// Maximum number of areas of a picture: with the text of each, it stays well below 2 MB.
 pub(crate) const MAX_AREAS: usize = 6_500;
-
-/// How rows are placed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RowPlacing {
-    /// Row n is the n-th byte of each link.
-    #[default]
-    Index,
-    /// A byte is placed at its time.
-    Time,
-}
 
 /// Where the columns begin.
 pub(crate) const LEFT: usize = 64;

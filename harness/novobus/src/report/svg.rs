@@ -3,22 +3,18 @@
 //! A tooltip gives the meaning of a byte, its rule and section. There are no scripts; colours follow the reader's light or dark scheme. A long
 //! run is cut, and the picture says so.
 
-pub use super::picture::RowPlacing;
-
 use super::picture::{LEFT, MAX_AREAS, RingPicture};
 use harness_bench::html::{Attribute, Html};
+use harness_bench::shown::RowPlacing;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 use std::ops::Range;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug)]
-pub struct SvgOptions<'o> {
+pub(crate) struct SvgOptions<'o> {
     /// The heading; any text.
     pub title: &'o str,
-    /// In front of the names of the picture's parts, where several stand in one page: letters and digits.
-    pub id: &'o str,
-    /// How rows are placed.
     pub scale: RowPlacing,
     /// The rate of the line.
     pub rate: Rate,
@@ -43,7 +39,7 @@ path.x{stroke:#ff8a80}path.y{fill:#ff8a80}}";
 
 /// One or two rings of a run, each a picture of its own, one below the other.
 #[must_use]
-pub fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
+pub(crate) fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
     let most = MAX_AREAS / traces.len().max(1);
     let placing = (options.scale, options.rate);
     let pictures: Vec<_> = traces
@@ -61,9 +57,6 @@ pub fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
     let width = widths.max().unwrap_or(0).max(640);
     let height = HEAD + rings + LINE * legend.len() + 8;
 
-    let id = plain(options.id);
-    let (title_id, description_id) = (format!("{id}-title"), format!("{id}-desc"));
-    let named = format!("{title_id} {description_id}");
     let view = format!("0 0 {width} {height}");
     let attributes: [Attribute<'_>; 7] = [
         ("xmlns", &"http://www.w3.org/2000/svg"),
@@ -72,13 +65,13 @@ pub fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
         ("viewBox", &view),
         ("width", &width),
         ("height", &height),
-        ("aria-labelledby", &named),
+        ("aria-labelledby", &"ring-title ring-desc"),
     ];
     let mut html = Html::new();
     html.element("svg", &attributes, |html| {
-        html.line("title", &[("id", &title_id)], options.title);
+        html.line("title", &[("id", &"ring-title")], options.title);
         let described: Vec<_> = pictures.iter().map(RingPicture::description).collect();
-        html.line("desc", &[("id", &description_id)], described.join(" "));
+        html.line("desc", &[("id", &"ring-desc")], described.join(" "));
         html.own("style", STYLE);
         let whole: [Attribute<'_>; 3] =
             [("class", &"page"), ("width", &"100%"), ("height", &"100%")];
@@ -118,17 +111,4 @@ fn key(html: &mut Html, class: char, y: usize) {
         _ => format!("M12 {y}h12v12h-12z"),
     };
     html.shape("path", &[("class", &class), ("d", &path)]);
-}
-
-/// Letters, digits, `-` and `_`: what a name of a part may hold.
-fn plain(id: &str) -> String {
-    let kept = id
-        .chars()
-        .filter(|c| c.is_ascii_alphanumeric() || "-_".contains(*c));
-    let kept: String = kept.take(60).collect();
-    if kept.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        kept
-    } else {
-        format!("nb{kept}")
-    }
 }

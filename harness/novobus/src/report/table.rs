@@ -4,15 +4,15 @@
 //! A link on which something happened has a column of its own, headed `wire`: what its receiver read,
 //! where that differs from what was sent (`--` for nothing, `~` behind a byte marked bad).
 
+use harness_bench::shown::TablePart;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
-use std::ops::Range;
 
 /// The legend of the marks, in the manual's words.
-pub const LEGEND: &str = "\
+pub(crate) const LEGEND: &str = "\
 >: answer byte (contents of the memory cell)   +: new check sum   !: the drive detects an error
 *: it detects that the preceding drive is in error mode   #: the 17th sent zero byte
 @: the first byte of the check sequence   wire: what arrived where it differs (-- nothing, ~ marked bad)
@@ -31,25 +31,11 @@ const SIGNS: [(Marks, char); 6] = [
 /// A run of drives shorter than this is not folded.
 const FOLD: usize = 4;
 
-/// What part of a table is wanted.
-#[derive(Clone, Debug, Default)]
-pub struct TablePart {
-    /// The rows, counted from 0; all where `None`.
-    pub rows: Option<Range<usize>>,
-    /// A row that is pointed at, counted from 0; what the master received there stands in brackets.
-    pub pointed: Option<usize>,
-    /// Rows shown at most; of a longer table the middle is left out.
-    pub at_most: Option<usize>,
-    /// Columns shown at most; of a wider table the middle is left out.
-    pub columns_at_most: Option<usize>,
-}
-
 /// Default number of rows shown of a table.
 const ROWS: usize = 20_000;
 
-/// A trace as a table.
 #[must_use]
-pub fn table(trace: &Trace, part: &TablePart) -> String {
+pub(crate) fn table(trace: &Trace, part: &TablePart) -> String {
     let rows = rows(trace, part);
     let mut columns = columns(trace, &rows);
     if let Some(pointed) = rows
@@ -284,7 +270,7 @@ fn difference(left: &Column, right: &Column) -> Option<Vec<u8>> {
 
 /// What happened on the wires, a line each.
 #[must_use]
-pub fn wires(trace: &Trace, at_most: usize) -> String {
+pub(crate) fn wires(trace: &Trace, at_most: usize) -> String {
     let mut out = String::new();
     let mut more = 0usize;
     let name = |end: Option<u8>| end.map_or("master".to_owned(), |k| k.to_string());

@@ -8,7 +8,7 @@ use harness_sim::record::{Channel, Remark, Trace};
 
 /// What the sender of a byte was doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SenderState {
+pub(crate) enum SenderState {
     /// It passed on SYNCO or PAUSE.
     Idle,
     /// It passed on a telegram for another drive.
@@ -27,7 +27,7 @@ pub enum SenderState {
 
 impl SenderState {
     /// All of them, in the order of a legend.
-    pub const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Idle,
         Self::Forwarding,
         Self::Addressed,
@@ -39,7 +39,7 @@ impl SenderState {
 
     /// The text in a legend.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Idle => "normal: SYNCO or PAUSE",
             Self::Forwarding => "forwarding a telegram",
@@ -54,7 +54,7 @@ impl SenderState {
 
 /// What a byte is, and what its sender was doing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ByteSeen<'t> {
+pub(crate) struct ByteSeen<'t> {
     /// What it is to its receiver.
     pub meaning: Meaning,
     /// The meaning of the byte to its sender; the same as for the receiver if nothing more is known.
@@ -66,7 +66,7 @@ pub struct ByteSeen<'t> {
 }
 
 /// Reads one link of a trace byte by byte: its bytes, and what its sender remarked.
-pub struct Reader<'t> {
+pub(crate) struct Reader<'t> {
     observer: Observer,
     /// Reads what was sent; a trace that knows what drives remarked knows that as well.
     sender: Observer,
@@ -81,7 +81,7 @@ pub struct Reader<'t> {
 
 impl<'t> Reader<'t> {
     /// For every link of a trace.
-    pub fn all(trace: &'t Trace) -> Vec<Self> {
+    pub(crate) fn all(trace: &'t Trace) -> Vec<Self> {
         let known = !trace.remarks.is_empty();
         let links = trace.channels.iter();
         links
@@ -102,7 +102,7 @@ impl<'t> Reader<'t> {
     }
 
     /// Reads the next byte.
-    pub fn see(&mut self, byte: &LineByte) -> ByteSeen<'t> {
+    pub(crate) fn see(&mut self, byte: &LineByte) -> ByteSeen<'t> {
         let mut meaning = self.observer.see(byte.received, byte.error);
         let mut shown: Option<&Remark> = None;
         let mut leaves = false;

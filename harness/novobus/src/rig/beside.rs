@@ -10,7 +10,7 @@ use harness_proto::time::Span;
 
 /// What an attempt on rings has beside its outcome.
 #[derive(Clone, Debug)]
-pub struct BesideTwin {
+pub(crate) struct BesideTwin {
     /// The conversations, those of the health check and of what is set up before among them.
     pub conversations: Vec<Conversation>,
     /// How they compare with the twin's.
@@ -31,7 +31,7 @@ static NOTHING: BesideTwin = BesideTwin {
 
 impl BesideTwin {
     /// The same, compared with drives of these choices.
-    pub fn with(self, assumed: Option<Explanation>) -> Self {
+    pub(crate) fn with(self, assumed: Option<Explanation>) -> Self {
         match assumed {
             None => self,
             Some(found) => Self {
@@ -44,7 +44,7 @@ impl BesideTwin {
 }
 
 /// An attempt on rings.
-pub trait OnRings {
+pub(crate) trait OnRings {
     /// What it has beside its outcome.
     fn beside(&self) -> &BesideTwin;
 

@@ -12,7 +12,7 @@ use harness_proto::nd21::io::Input;
 
 /// What must hold; `None` only where the file was not checked.
 #[must_use]
-pub fn condition(interlock: &Interlock) -> Option<InterlockCondition> {
+pub(crate) fn condition(interlock: &Interlock) -> Option<InterlockCondition> {
     if let Some(name) = &interlock.input {
         return Some(InterlockCondition::Input {
             input: Input::from_name(name)?,
@@ -33,10 +33,9 @@ pub fn condition(interlock: &Interlock) -> Option<InterlockCondition> {
 
 /// What an interlock looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum InterlockCondition {
+pub(crate) enum InterlockCondition {
     /// The value of a cell stays within bounds, in the unit of its scale.
     Cell {
-        /// The cell.
         cell: &'static Cell,
         /// The least.
         min: Option<f64>,
@@ -45,9 +44,7 @@ pub enum InterlockCondition {
     },
     /// An input stays at a level.
     Input {
-        /// The input.
         input: Input,
-        /// Its level.
         level: Level,
     },
 }

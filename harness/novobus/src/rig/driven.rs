@@ -18,7 +18,7 @@ const WRONG: &str =
 
 /// What the driver did in an attempt.
 #[derive(Clone, Debug)]
-pub struct Driven {
+pub(crate) struct Driven {
     plan: Plan,
     events: Vec<LinkEvent>,
     way: Way,
@@ -31,7 +31,7 @@ pub struct Driven {
 
 impl Driven {
     /// An attempt at a plan, as it was recorded; `None` where the driver had no part in it.
-    pub fn new(
+    pub(crate) fn new(
         plan: &Plan,
         events: &[LinkEvent],
         way: &Way,
@@ -52,7 +52,7 @@ impl Driven {
     }
 
     /// Whether the master was right. If it was not, the attempt is the bench's fault.
-    pub fn judge(&self, outcome: &mut Outcome) -> bool {
+    pub(crate) fn judge(&self, outcome: &mut Outcome) -> bool {
         let right = self.is_explained_by(None);
         if !right {
             outcome.verdict = Verdict::RigError;
@@ -63,7 +63,7 @@ impl Driven {
 
     /// Whether a master with this deviation, or the right one, would do and report what was recorded.
     #[must_use]
-    pub fn is_explained_by(&self, master: Option<&'static MasterDeviation>) -> bool {
+    pub(crate) fn is_explained_by(&self, master: Option<&'static MasterDeviation>) -> bool {
         let mut plan = self.plan.clone();
         plan.master = master;
         let drives = plan.rings.iter().map(|ring| ring.drives()).collect();

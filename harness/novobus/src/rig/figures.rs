@@ -3,14 +3,15 @@
 use super::line_test::{self, RingPace};
 use super::open::stated_rate;
 use super::shared::Shared;
-pub use super::wrong_parity::WrongParity;
+pub(crate) use super::wrong_parity::WrongParity;
 use super::wrong_parity::try_wrong_parity;
-use crate::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut, State};
+use crate::driver::{self, Axis, COUNT, Identity, OpenRings, SpelledOut};
 use crate::rig::Session;
 use harness_bench::link::{Line as _, Octets};
 use harness_bench::rig::End;
 use harness_bench::rig::Rig;
 use harness_proto::line::Rate;
+use harness_proto::nd21::State;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 
@@ -23,7 +24,7 @@ const SIDE_BY_SIDE: usize = 25;
 
 /// What was measured on a ring.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RingFigures {
+pub(crate) struct RingFigures {
     /// How many drives answer.
     pub size: RingSize,
     /// The rate at which SYNCO without a gap comes back (ND21 8.3, 9.2).
@@ -54,8 +55,7 @@ impl RingFigures {
 
 /// A drive as it shows itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DriveFigures {
-    /// Which.
+pub(crate) struct DriveFigures {
     pub axis: Axis,
     /// Its identity in its EEPROM (14.8).
     pub identity: Identity,
@@ -67,7 +67,7 @@ pub struct DriveFigures {
 
 /// The properties of a rig.
 #[derive(Clone, Debug)]
-pub struct Figures {
+pub(crate) struct Figures {
     /// Its rings, in order.
     pub rings: Vec<RingFigures>,
     /// Its drives, in order.
@@ -80,7 +80,7 @@ pub struct Figures {
 
 /// Measures a rig in use and gives it back with its drives as they are, or, where one does not answer, in its safe state. `told`
 /// hears of every drive that has been read.
-pub fn measure(
+pub(crate) fn measure(
     mut session: Session,
     told: &mut dyn FnMut(Axis),
 ) -> (Result<Figures, driver::Error>, Option<End>) {

@@ -16,11 +16,10 @@ const SHOWN: usize = 8;
 
 /// What is wrong with a ring.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unhealthy {
+pub(crate) enum Unhealthy {
     /// Bytes come although the bench sends nothing.
     #[error("{} came although nothing was sent ({bytes})", counted(*.count, "byte"))]
     Talking {
-        /// How many.
         count: usize,
         /// The first of them.
         bytes: String,
@@ -77,7 +76,7 @@ pub enum Unhealthy {
 
 /// What a healthy ring showed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RingHealth {
+pub(crate) struct RingHealth {
     /// How many drives each ring has.
     pub rings: Vec<RingSize>,
     /// Drives that reported a fault before the ring was brought back: ring and drive.
@@ -123,7 +122,6 @@ pub(crate) fn examine(
     Ok(health)
 }
 
-/// One ring, once.
 fn examine_once(link: &mut dyn Link, ring: usize, stated: RingSize) -> Result<Recovery, Unhealthy> {
     let recovery = recover(link, ring);
     if let Some(trouble) = link.trouble() {

@@ -216,6 +216,40 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_conditions_of_the_example() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../rigs/examples/serial.toml"
+        );
+        let text = std::fs::read_to_string(path).expect("an example");
+        let rig = parse(&source(&text)).expect("a rig");
+        let conditions = rig.file.interlock.iter();
+        let conditions: Vec<_> = conditions
+            .map(|own| condition(own).expect("checked"))
+            .collect();
+        let [first, second] = &conditions[..] else {
+            panic!("two of them: {conditions:?}");
+        };
+        let InterlockCondition::Cell {
+            min: None,
+            max: Some(max),
+            ..
+        } = first
+        else {
+            panic!("{first:?}");
+        };
+        assert!((max - 75.0).abs() < 1e-9, "{max}");
+        let is_high = matches!(
+            second,
+            InterlockCondition::Input {
+                level: Level::High,
+                ..
+            }
+        );
+        assert!(is_high, "{second:?}");
+    }
+
     /// A drive may be silent on purpose while a scenario is played. Between scenarios one that does not answer is not known to be safe.
     #[test]
     fn a_silent_drive_trips_between_scenarios_only() {

@@ -19,8 +19,7 @@ use harness_sim::novobus::deviation;
 const MOST_ADOPTED: usize = 8;
 
 /// What is known of an attempt besides its outcome.
-pub struct AttemptFacts<'h> {
-    /// The rig.
+pub(crate) struct AttemptFacts<'h> {
     pub rig: &'h Rig,
     /// The scenario.
     pub plan: &'h Plan,
@@ -42,7 +41,7 @@ pub struct AttemptFacts<'h> {
 /// deviation is known. Where no byte differs, what the scenario found stands, unless the drive's own state, a known deviation or the
 /// computer's time explains it. Returns the choices of the manual with which the drives were compared instead of the model's defaults, if
 /// they show before the scenario begins.
-pub fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<Explanation> {
+pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<Explanation> {
     let mut assumed = None;
     let comparisons = || facts.comparisons.iter();
     for adopted in comparisons().flat_map(|c| &c.adopted).take(MOST_ADOPTED) {
@@ -332,7 +331,7 @@ fn of_the_drive<'h>(finding: &Mismatch, facts: &AttemptFacts<'h>) -> Option<&'h 
 }
 
 /// The known deviations of a rig that the simulator has.
-pub fn known(rig: &Rig) -> Header {
+pub(crate) fn known(rig: &Rig) -> Header {
     let of_entry = |entry: &Deviation| -> Vec<Setup> {
         let Some(deviation) = deviation::deviation(&entry.name) else {
             return Vec::new();

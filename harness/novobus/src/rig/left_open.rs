@@ -19,7 +19,7 @@ const SMALL: u8 = 16;
 const TIME_OUT: &str = "time-out";
 
 /// Choices that explain every byte of an attempt.
-pub struct Explanation {
+pub(crate) struct Explanation {
     /// They, in words.
     pub(crate) words: String,
     /// What makes simulated drives behave so.

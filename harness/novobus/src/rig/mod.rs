@@ -7,38 +7,38 @@ mod busy;
 mod cause;
 mod condition;
 mod driven;
-pub mod figures;
+pub(crate) mod figures;
 pub(crate) mod health;
 mod held_session;
 pub(crate) mod interlock;
-pub mod judge;
+pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
-pub mod open;
+pub(crate) mod open;
 mod permitted;
 mod put_back;
 mod reach;
 mod ring_judge;
 mod ring_run;
-pub mod run;
+pub(crate) mod run;
 pub(crate) mod session;
-pub mod shared;
-pub mod sim;
-pub mod wrong_parity;
+pub(crate) mod shared;
+pub(crate) mod sim;
+pub(crate) mod wrong_parity;
 
 pub(crate) use beside::PlayedOnRings;
-pub use beside::{BesideTwin, OnRings};
-pub use condition::{InterlockCondition, condition};
-pub use driven::Driven;
+pub(crate) use beside::{BesideTwin, OnRings};
+pub(crate) use condition::condition;
+pub(crate) use driven::Driven;
 pub(crate) use health::examine;
-pub use health::{RingHealth, Unhealthy};
-pub use permitted::limits;
+pub(crate) use permitted::limits;
 pub(crate) use ring_judge::RingJudge;
 pub(crate) use ring_run::RingRun;
-pub use run::{Run, Way, play_one};
-pub use session::Session;
-pub use sim::RINGS;
-pub use sim::RigOfRings;
+pub(crate) use run::Run;
+#[cfg(test)]
+pub(crate) use run::{Way, play_one};
+pub(crate) use session::Session;
+pub(crate) use sim::RINGS;
 
 /// Reads the file of a rig with rings.
 #[cfg(test)]

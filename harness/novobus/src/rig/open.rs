@@ -81,7 +81,7 @@ pub(crate) struct Opened {
 }
 
 /// The rate of a rig's line.
-pub fn line_rate(rig: &Rig) -> Rate {
+pub(crate) fn line_rate(rig: &Rig) -> Rate {
     let simulated = rig.is_simulated().then(|| rig.plan().ok()).flatten();
     simulated.map_or_else(|| stated_rate(rig), |plan| plan.rate)
 }

@@ -5,7 +5,7 @@ use harness_bench::rig::Rig;
 use harness_proto::novobus::guard::Limits;
 
 /// What a rig's file and the command line allow together.
-pub fn limits(rig: &Rig, allow_motion: bool) -> Limits {
+pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let own = &rig.file.limits;
     let motion = own.allow_motion && (allow_motion || rig.is_simulated());
     let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);

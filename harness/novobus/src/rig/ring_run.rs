@@ -23,7 +23,6 @@ use harness_proto::line::Rate;
 /// A ring in use.
 pub(crate) struct RingRun {
     run: Run<'static>,
-    /// Of a qualification.
     qualification: Option<Qualification>,
     obstacles: Result<Vec<String>, SessionError>,
 }

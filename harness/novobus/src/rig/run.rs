@@ -39,7 +39,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const LATEST: Span = Span::from_millis(250);
 
 /// A rig that scenarios are played on, and its twin.
-pub struct Run<'s> {
+pub(crate) struct Run<'s> {
     session: HeldSession<'s>,
     twin: Twin,
     exactness: Exactness,
@@ -60,7 +60,6 @@ pub struct Run<'s> {
     master: Option<&'static MasterDeviation>,
 }
 
-/// The model of a rig.
 pub(super) struct RigModel {
     twin: Twin,
     master: Option<&'static MasterDeviation>,
@@ -82,7 +81,7 @@ impl<'s> Run<'s> {
     ///
     /// # Errors
     /// Known deviations of the rig's file that make no ring.
-    pub fn new(session: &'s mut Session) -> Result<Self, Problems> {
+    pub(crate) fn new(session: &'s mut Session) -> Result<Self, Problems> {
         let model = RigModel::of(session.rig())?;
         Ok(Self::on(HeldSession::Lent(session), model))
     }
@@ -121,7 +120,7 @@ impl<'s> Run<'s> {
 
     /// What the rig can be asked, with what only a simulated one shows left out.
     #[must_use]
-    pub fn capabilities(&mut self) -> Vec<Capability> {
+    pub(crate) fn capabilities(&mut self) -> Vec<Capability> {
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let recording = Recording::new(self.session.link(), &mut forgotten);
         recording.capabilities().to_vec()
@@ -129,12 +128,12 @@ impl<'s> Run<'s> {
 
     /// How exactly the twin is compared.
     #[must_use]
-    pub fn exactness(&self) -> Exactness {
+    pub(crate) fn exactness(&self) -> Exactness {
         self.exactness
     }
 
     /// The rig.
-    pub fn session(&mut self) -> &mut Session {
+    pub(crate) fn session(&mut self) -> &mut Session {
         &mut self.session
     }
 
@@ -142,7 +141,7 @@ impl<'s> Run<'s> {
     ///
     /// # Errors
     /// The header has mistakes.
-    pub fn twin_with(&self, header: &Header) -> Result<Twin, Problems> {
+    pub(crate) fn twin_with(&self, header: &Header) -> Result<Twin, Problems> {
         self.alive();
         twin(self.session.rig(), header)
     }
@@ -158,7 +157,7 @@ impl<'s> Run<'s> {
     ///
     /// # Errors
     /// The rig fails its health check, so nothing more can be played.
-    pub fn play(
+    pub(crate) fn play(
         &mut self,
         plan: &Plan,
         mut keeper: Option<&mut dyn Keeper>,
@@ -279,7 +278,7 @@ impl<'s> Run<'s> {
 
     /// How attempts go on this rig.
     #[must_use]
-    pub fn way(&self) -> Way {
+    pub(crate) fn way(&self) -> Way {
         Way {
             rings: self.session.rings().to_vec(),
             attempts: self.session.rig().examinations(),
@@ -293,13 +292,13 @@ impl<'s> Run<'s> {
     }
 
     /// Whether a scenario is played on the model first, and skipped where the guard denies a byte of it there. By default it is.
-    pub fn rehearse(&mut self, rehearses: bool) {
+    pub(crate) fn rehearse(&mut self, rehearses: bool) {
         self.rehearses = rehearses;
     }
 
     /// Plays from now on what does not pass once more at least, where time is real: what a busy computer has caused does not come
     /// again.
-    pub fn repeat(&mut self) {
+    pub(crate) fn repeat(&mut self) {
         self.repeats = true;
     }
 
@@ -423,8 +422,7 @@ impl<'s> Run<'s> {
 
 /// How an attempt goes.
 #[derive(Clone, Debug)]
-pub struct Way {
-    /// The rings.
+pub(crate) struct Way {
     pub rings: Vec<RingSize>,
     /// How often a ring is examined before it counts as ill; `None` where it is not examined.
     pub attempts: Option<u8>,
@@ -435,7 +433,7 @@ pub struct Way {
 impl Way {
     /// Examines the rings before an attempt that follows a denial, whatever the rig's file says: the drives may be in the middle of a
     /// telegram. The attempt's record holds the recovery, so that the twin follows it.
-    pub fn examine_after_denial(&mut self, rig: &Rig) {
+    pub(crate) fn examine_after_denial(&mut self, rig: &Rig) {
         self.attempts = Some(rig.file.health.attempts);
     }
 
@@ -456,7 +454,7 @@ impl Way {
 
     /// How exactly an attempt is compared. Only a reset puts the programs of the drives and of the twin at the same place in their cycle.
     #[must_use]
-    pub fn exactness(&self, rig: Exactness) -> Exactness {
+    pub(crate) fn exactness(&self, rig: Exactness) -> Exactness {
         Exactness {
             knows_cells: rig.knows_cells && self.anew,
             ..rig
@@ -466,7 +464,7 @@ impl Way {
     /// The conversations to compare, and whether to compare them with a fresh twin. If drives are reset, what real ones did
     /// before does not matter, and how a ring leaves the error mode in real time is a race (9.9).
     #[must_use]
-    pub fn compared(
+    pub(crate) fn compared(
         &self,
         mut all: Vec<Conversation>,
         exactness: Exactness,
@@ -491,7 +489,12 @@ impl Way {
 
 /// How the bytes received before the reset of the drives compare with those of a ring at rest; `None` where these are judged with the
 /// rest. No verdict depends on it: it makes the record of an attempt complete.
-pub fn opening(rig: &Rig, way: &Way, all: &[Conversation], exactness: Exactness) -> Option<String> {
+pub(crate) fn opening(
+    rig: &Rig,
+    way: &Way,
+    all: &[Conversation],
+    exactness: Exactness,
+) -> Option<String> {
     let before = &all[..way.before_the_reset(all, exactness)];
     if before.is_empty() {
         return None;
@@ -507,7 +510,7 @@ pub fn opening(rig: &Rig, way: &Way, all: &[Conversation], exactness: Exactness)
 }
 
 /// Why a scenario is not played on rings of these sizes; `None` where it is, unless the rig's limits deny it.
-pub fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<Skip> {
+pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<Skip> {
     // The size first: a link of another ring may have the number of one that there is.
     match plan.rings == rings {
         true => lacks(plan, link),
@@ -532,7 +535,7 @@ pub fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<Sk
 ///
 /// # Errors
 /// Returns the ring that fails the health check.
-pub fn play_one(
+pub(crate) fn play_one(
     link: &mut dyn Link,
     plan: &Plan,
     way: &Way,
@@ -596,7 +599,7 @@ impl Sink for Both<'_> {
 }
 
 /// A fresh twin of a rig's drives, set up as its file and this header say.
-pub fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
+pub(crate) fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
     let mut model = rig.clone();
     // A simulated drive that is wrong on purpose is compared with one that is not.
     sim::set_up(&mut model, &sim::setup(rig).without_deviations());

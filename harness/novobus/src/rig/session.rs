@@ -41,7 +41,7 @@ const LONGEST_ROUND: Span = Span::from_millis(1_000);
 
 /// A rig in use.
 #[derive(Debug)]
-pub struct Session {
+pub(crate) struct Session {
     rig: Rig,
     link: Guarded<Ends>,
     rings: Vec<RingSize>,
@@ -71,7 +71,7 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
-    pub fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
+    pub(crate) fn open(rig: &Rig, options: &UseOptions) -> Result<Self, SessionError> {
         match Self::open_as_stated(rig, options) {
             Ok(session) => {
                 if !session.damages_ff {
@@ -236,21 +236,19 @@ impl Session {
         Ok(session)
     }
 
-    /// The rig.
     #[must_use]
-    pub fn rig(&self) -> &Rig {
+    pub(crate) fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// Its rings.
     #[must_use]
-    pub fn rings(&self) -> &[RingSize] {
+    pub(crate) fn rings(&self) -> &[RingSize] {
         &self.rings
     }
 
     /// Its drives, ring after ring.
     #[must_use]
-    pub fn axes(&self) -> Vec<Axis> {
+    pub(crate) fn axes(&self) -> Vec<Axis> {
         let rings = self.rings.iter().enumerate();
         let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
         drives.filter_map(|(ring, k)| Axis::new(ring, k)).collect()
@@ -258,7 +256,7 @@ impl Session {
 
     /// What its file and the command line allow together.
     #[must_use]
-    pub fn limits(&self) -> Limits {
+    pub(crate) fn limits(&self) -> Limits {
         limits(&self.rig, self.allow_motion)
     }
 
@@ -270,35 +268,34 @@ impl Session {
 
     /// The result of the health check at opening; `None` if there was none, or if a ring failed it.
     #[must_use]
-    pub fn opening(&self) -> Option<&RingHealth> {
+    pub(crate) fn opening(&self) -> Option<&RingHealth> {
         self.opening.as_ref()
     }
 
     /// Its guarded link, to look at.
     #[must_use]
-    pub fn guarded(&self) -> &Guarded<Ends> {
+    pub(crate) fn guarded(&self) -> &Guarded<Ends> {
         &self.link
     }
 
-    /// Its guarded link.
-    pub fn link(&mut self) -> &mut Guarded<Ends> {
+    pub(crate) fn link(&mut self) -> &mut Guarded<Ends> {
         &mut self.link
     }
 
     /// Its ports' link, if it has ports: for what was measured there.
-    pub fn ports(&mut self) -> Option<&mut dyn PortLink> {
+    pub(crate) fn ports(&mut self) -> Option<&mut dyn PortLink> {
         self.link.inner_mut().ports_mut()
     }
 
     /// Whether it has been used for longer than its file allows.
     #[must_use]
-    pub fn overdue(&self) -> bool {
+    pub(crate) fn overdue(&self) -> bool {
         let now = Instant::now();
         self.deadline.is_some_and(|deadline| deadline <= now)
     }
 
     /// Ends the work if it has been used for longer than its file allows.
-    pub fn end_if_overdue(&mut self) {
+    pub(crate) fn end_if_overdue(&mut self) {
         self.link.set_deadline(self.deadline);
         self.link.end_if_overdue();
     }
@@ -529,7 +526,7 @@ impl Session {
 
     /// Looks at every interlock; one that does not hold, or whose drive does not answer, is [trouble](harness_bench::link::Trouble::Interlock) of the
     /// link from then on. Nothing is under way.
-    pub fn look_at_interlocks(&mut self) {
+    pub(crate) fn look_at_interlocks(&mut self) {
         self.ask_interlocks();
         self.link.begin();
     }

@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A rig in use. Its [line](Self::line) goes to a driver, and behind the driver the rig is given back. Clones are handles of the
 /// same rig.
 #[derive(Clone, Debug)]
-pub struct Shared {
+pub(crate) struct Shared {
     session: Arc<Mutex<Option<Session>>>,
 }
 
 /// The guarded line of a [`Shared`] rig. Behind the rig's end it carries nothing.
 #[derive(Debug)]
-pub struct SharedLine {
+pub(crate) struct SharedLine {
     session: Arc<Mutex<Option<Session>>>,
     /// That of its first port, for when the rig has been given back.
     medium: Medium,
@@ -32,15 +32,14 @@ fn lock(session: &Mutex<Option<Session>>) -> MutexGuard<'_, Option<Session>> {
 impl Shared {
     /// Shares a rig.
     #[must_use]
-    pub fn new(session: Session) -> Self {
+    pub(crate) fn new(session: Session) -> Self {
         Self {
             session: Arc::new(Mutex::new(Some(session))),
         }
     }
 
-    /// Its line.
     #[must_use]
-    pub fn line(&self) -> SharedLine {
+    pub(crate) fn line(&self) -> SharedLine {
         let medium = lock(&self.session)
             .as_mut()
             .map_or(Rate::default().into(), |session| session.link().medium(0));
@@ -52,12 +51,12 @@ impl Shared {
     }
 
     /// Does something with the rig; `None` where it has been given back.
-    pub fn with<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
+    pub(crate) fn with<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
         lock(&self.session).as_mut().map(act)
     }
 
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
-    pub fn close(&self, error: bool) -> Option<End> {
+    pub(crate) fn close(&self, error: bool) -> Option<End> {
         let session = lock(&self.session).take()?;
         Some(match error {
             true => session.close_with_error(),
@@ -66,7 +65,7 @@ impl Shared {
     }
 
     /// Gives the rig back with its drives as they are.
-    pub fn release(&self) -> Option<End> {
+    pub(crate) fn release(&self) -> Option<End> {
         Some(lock(&self.session).take()?.release())
     }
 }

@@ -13,8 +13,7 @@ use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
 use harness_bench::scenario::source::{Source, line_number};
 use harness_sim::nd21::Stimulus;
 
-/// A rig with rings.
-pub trait RigOfRings {
+pub(crate) trait RigOfRings {
     /// The setup of a simulated rig, as `novobus::simulate::bench` takes it: whole ND21s where its file names
     /// no model.
     ///
@@ -82,13 +81,13 @@ pub(crate) fn sizes(file: &RigFile) -> Vec<u8> {
 }
 
 /// What the lines of `[sim]` say; they were read when the rig was.
-pub fn setup(rig: &Rig) -> Header {
+pub(crate) fn setup(rig: &Rig) -> Header {
     let lines = rig.file.sim.iter().flat_map(|sim| &sim.setup);
     read(lines)
 }
 
 /// Sets simulated drives up like this in place of what the lines of `[sim]` say.
-pub fn set_up(rig: &mut Rig, header: &Header) {
+pub(crate) fn set_up(rig: &mut Rig, header: &Header) {
     rig.file.sim.get_or_insert_default().setup = header.lines();
 }
 
@@ -107,7 +106,7 @@ fn header(file: &RigFile, profile: Option<&[String]>, own: &Header) -> Header {
 }
 
 /// What the files of rigs ask of rings.
-pub const RINGS: RingRow = RingRow {
+pub(crate) const RINGS: RingRow = RingRow {
     profile: |text| Ok(Profile::<Header>::parse(text)?.header().lines()),
     mistakes,
     interlock: condition::check,

@@ -26,7 +26,7 @@ const WRONG: Flips = Flips {
 
 /// What became of a byte with a wrong parity bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WrongParity {
+pub(crate) enum WrongParity {
     /// The first drive has noticed it.
     Noticed,
     /// The ring has taken it for a good one.
@@ -109,7 +109,7 @@ fn noticed(heard: &[u8]) -> Option<WrongParity> {
 ///
 /// # Errors
 /// A ring does not leave the error mode.
-pub fn obstacles(session: &mut Session) -> Result<Vec<String>, SessionError> {
+pub(crate) fn obstacles(session: &mut Session) -> Result<Vec<String>, SessionError> {
     let mut all = Vec::new();
     for ring in 0..session.rings().len() {
         let found = try_wrong_parity(session, ring)?;

@@ -13,7 +13,7 @@ impl Server {
     /// Does a line of control at once: a fault (`! 98->97: flip 0`), something that happens to drives from outside the bus
     /// (`drive 3 input GPIN5 high`), or a check that looks at drives (`? drive 3 nist = 0rpm +-5rpm`). `state 3` asks what a drive
     /// shows outside the bus, `state 2:3 nist FF08:2` for cells of it, in hexadecimal digits. `None` for an empty line or a comment. Bytes and times in a fault are counted from the server's start.
-    pub fn control(&mut self, line: &str) -> Option<ControlAnswer> {
+    pub(crate) fn control(&mut self, line: &str) -> Option<ControlAnswer> {
         let said = line.split('#').next().unwrap_or_default().trim();
         if said.is_empty() {
             return None;

@@ -6,4 +6,4 @@ pub(super) mod recorder;
 mod server;
 mod state;
 
-pub use server::Server;
+pub(crate) use server::Server;

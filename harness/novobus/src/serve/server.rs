@@ -47,7 +47,7 @@ const UNREAD: usize = 64 << 10;
 
 /// Simulated rings with seats for clients: first the master's place of each ring, then the inner links.
 #[derive(Clone, Debug)]
-pub struct Server {
+pub(crate) struct Server {
     pub(super) plan: Plan,
     pub(super) link: SimulatedLink,
     pace: Pace,
@@ -122,7 +122,7 @@ impl Server {
     /// With marks, as of [`harness_proto::marks`], a byte with an error of the client's reaches the first drive with a parity error, a 00
     /// with an error as a break.
     #[must_use]
-    pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: ErrorMarks) -> Self {
+    pub(crate) fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: ErrorMarks) -> Self {
         link.stop_recording();
         link.run_until(link.now() + SETTLED);
         Self {
@@ -140,7 +140,7 @@ impl Server {
     }
 
     /// Adds a seat at an inner link, behind the existing ones. A link that is cut is open from now on, with or without a client.
-    pub fn add(&mut self, inner: Inner) {
+    pub(crate) fn add(&mut self, inner: Inner) {
         match inner.role {
             ClientRole::Tap => self.link.tap(inner.ring, inner.link),
             ClientRole::Cut | ClientRole::Upstream | ClientRole::Downstream => {
@@ -152,19 +152,19 @@ impl Server {
 
     /// How many rings there are: one or two.
     #[must_use]
-    pub fn rings(&self) -> usize {
+    pub(crate) fn rings(&self) -> usize {
         self.plan.rings.len()
     }
 
     /// How many drives ring `ring` has, rings counted from 0.
     #[must_use]
-    pub fn drives(&self, ring: usize) -> u8 {
+    pub(crate) fn drives(&self, ring: usize) -> u8 {
         self.link.drives(ring)
     }
 
     /// The time in the rings: ahead of the clock by what leaps have gained.
-    #[must_use]
-    pub fn time(&self) -> Instant {
+    #[cfg(test)]
+    pub(crate) fn time(&self) -> Instant {
         self.link.now()
     }
 

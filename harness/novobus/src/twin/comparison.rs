@@ -8,7 +8,7 @@ use std::fmt;
 
 /// How exact a comparison is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exactness {
+pub(crate) struct Exactness {
     /// Maximum difference of times.
     pub tolerance: Span,
     /// Whether the link shows line errors at their bytes.
@@ -21,7 +21,7 @@ pub struct Exactness {
 
 /// Bits of a cell that decide a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DecidingBits {
+pub(crate) struct DecidingBits {
     /// The address of the byte.
     pub address: u16,
     /// The bits.
@@ -31,7 +31,7 @@ pub struct DecidingBits {
 /// How a ring differs from what is expected. In a file it is a name; folders of older versions hold the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Symptom {
+pub(crate) enum Symptom {
     /// Another value.
     #[serde(alias = "another value")]
     Value,
@@ -64,7 +64,7 @@ pub enum Symptom {
 impl Symptom {
     /// A short description.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Value => "another value",
             Self::LineStatus => "another line status",
@@ -81,7 +81,7 @@ impl Symptom {
 
 /// The first byte that differs from the model.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Divergence {
+pub(crate) struct Divergence {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// Which byte received in this conversation, counted from 1.
@@ -105,7 +105,7 @@ pub struct Divergence {
 impl Divergence {
     /// Whether another conversation differed at the same place and in the same way, and equally late or early within the tolerance.
     #[must_use]
-    pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
+    pub(crate) fn is_like(&self, other: &Self, tolerance: Span) -> bool {
         let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
         let apart = self.late_by().abs_diff(other.late_by());
         place(self) == place(other)
@@ -152,10 +152,9 @@ impl fmt::Display for Divergence {
 
 /// A cell whose content the model did not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Adopted {
+pub(crate) struct Adopted {
     /// In which ring, counted from 0.
     pub ring: usize,
-    /// Of which drive.
     pub drive: u8,
     /// Which cell.
     pub address: u16,
@@ -166,14 +165,13 @@ pub struct Adopted {
 /// A received byte with bits that are the drive's choice: of a cell that it writes itself, of a cell that was not written since the
 /// attempt began, or the checking byte of such data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OwnByte {
+pub(crate) struct OwnByte {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// When it was received.
     pub at: Instant,
     /// The place of the byte sent that it answers, counted from 0.
     pub place: usize,
-    /// The drive.
     pub drive: u8,
     /// The cell of the data or of its checking byte; `None` for process data of an unknown cell.
     pub address: Option<u16>,
@@ -185,7 +183,7 @@ pub struct OwnByte {
 
 /// The first byte in a conversation that a drive sent unasked (ND21 9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unasked {
+pub(crate) struct Unasked {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// When it was received, or was due.
@@ -214,7 +212,7 @@ impl Comparison {
 
 /// The result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// How many bytes were compared.
     pub compared: u64,
     /// How many were not compared, because the drive measures their data itself.

@@ -20,7 +20,7 @@ const SLACK: Span = Span::from_millis(1);
 
 /// What the bench did to a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Done {
+pub(crate) enum Done {
     /// It sent a byte, whose start bit was due at this time.
     Sent(Instant, u8),
     /// It came to the step at this place of the scenario's text.
@@ -31,7 +31,7 @@ pub enum Done {
 
 /// One conversation as the master's end of the rings saw it. Times are the conversation's own.
 #[derive(Clone, Debug, Default)]
-pub struct Conversation {
+pub(crate) struct Conversation {
     /// What the bench did, each with its ring, in order.
     pub done: Vec<(usize, Done)>,
     /// Bytes received: ring, when, and the byte.
@@ -44,7 +44,7 @@ impl Conversation {
     /// The conversations of a record; `byte_time` is that of its line. What SYNCO and answers of a probe were is part of
     /// the conversation, but a simulated link probes a copy of itself (`probes_a_copy`).
     #[must_use]
-    pub fn all(events: &[LinkEvent], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
+    pub(crate) fn all(events: &[LinkEvent], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
         let mut all = Vec::new();
         let mut open = Self::default();
         for event in events {
@@ -183,7 +183,7 @@ impl TwinBytes {
 
 /// A simulated ring that gets the same bytes as a real one.
 #[derive(Clone, Debug)]
-pub struct Twin {
+pub(crate) struct Twin {
     link: SimulatedLink,
     sizes: Vec<RingSize>,
     knowledge: Knowledge,
@@ -192,7 +192,7 @@ pub struct Twin {
 impl Twin {
     /// A twin with these rings, which have just been switched on.
     #[must_use]
-    pub fn new(link: SimulatedLink, sizes: &[RingSize]) -> Self {
+    pub(crate) fn new(link: SimulatedLink, sizes: &[RingSize]) -> Self {
         Self {
             link,
             sizes: sizes.to_vec(),
@@ -202,12 +202,16 @@ impl Twin {
 
     /// The simulated ring of a twin to which nothing has been sent.
     #[must_use]
-    pub fn into_link(self) -> SimulatedLink {
+    pub(crate) fn into_link(self) -> SimulatedLink {
         self.link
     }
 
     /// Plays a conversation and compares the bytes received with those of the twin.
-    pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
+    pub(crate) fn follow(
+        &mut self,
+        conversation: &Conversation,
+        exactness: Exactness,
+    ) -> Comparison {
         self.follow_rings(conversation, exactness, &BTreeSet::new())
     }
 
@@ -272,7 +276,7 @@ impl Twin {
     /// Plays conversations one after another. In real time no model knows the state of a ring after drives have sent unasked bytes (9.9),
     /// because these race with the master's bytes. Unless a check sequence has ended the race, the ring is not compared any more after
     /// that conversation, and the second value says that another twin is needed.
-    pub fn follow_all(
+    pub(crate) fn follow_all(
         &mut self,
         conversations: &[Conversation],
         exactness: Exactness,

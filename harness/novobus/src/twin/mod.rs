@@ -16,10 +16,11 @@ mod rows;
 mod unasked;
 
 pub(crate) use compare::unknowable;
-pub use comparison::{
-    Adopted, Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
+pub(crate) use comparison::{
+    Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
 };
-pub use follow::{Conversation, Done, Twin};
-pub use harness_proto::novobus::role::Role;
+pub(crate) use follow::{Conversation, Done, Twin};
+#[cfg(test)]
+pub(crate) use harness_proto::novobus::role::Role;
 pub(crate) use places::{answered, answering, what_of};
 pub(crate) use unasked::{EARLIEST_TIME_OUT, SILENCED, Sent};

@@ -2,6 +2,8 @@
 //!
 //! The manual gives each code a name and no other meaning; what the names say is here in English.
 
+use alloc::format;
+use alloc::string::String;
 use core::fmt;
 
 /// One row a code, under the section that lists it: the variant, the code, the name as printed, the
@@ -269,6 +271,15 @@ pub const fn display_digits(code: u16) -> Option<[u8; 3]> {
         return None;
     }
     Some([high, low >> 4, low & 0xF])
+}
+
+/// An error code with its printed name.
+#[must_use]
+pub fn in_words(code: u16) -> String {
+    match (ErrorCode::from_code(code), display_digits(code)) {
+        (Some(error), _) => format!("{error}: {}", error.meaning()),
+        (None, _) => format!("{code:04X}"),
+    }
 }
 
 impl fmt::Display for ErrorCode {

@@ -13,10 +13,12 @@ pub mod io;
 pub mod own;
 pub mod position;
 pub mod s_ramp;
+mod state;
 pub mod units;
 
 pub use cells::ram;
 pub use eeprom::ee;
+pub use state::State;
 
 /// What is written to `errorcode` to confirm an error (ND21 14.10.1).
 pub const CONFIRM_ERROR: u8 = 0xAF;

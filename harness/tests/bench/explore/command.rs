@@ -1,10 +1,8 @@
 //! The commands as processes: exit codes, what is kept, and that a killed run goes on.
 
-use super::about;
-use super::findings::empty_checkout;
 use crate::program::{ended, findings, name};
-use harness::buses::novobus::explore::{LogLine, RingSetup};
-use harness::explore::{FuzzRecord, RECORD};
+use harness::explore::RECORD;
+use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -13,6 +11,17 @@ pub(crate) fn drivebench(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
     command.args(arguments).stdin(Stdio::null());
     command.output().expect("the program")
+}
+
+/// A checkout with nothing in it.
+pub(crate) fn empty_checkout(folder: &Path) {
+    for inner in [
+        "corpora/scenarios/novobus",
+        "corpora/fuzz/ring",
+        "snapshots/scenarios/novobus",
+    ] {
+        std::fs::create_dir_all(folder.join(inner)).expect("room");
+    }
 }
 
 /// The names of their files.
@@ -24,20 +33,17 @@ pub(crate) fn names(folder: &Path) -> Vec<std::ffi::OsString> {
 }
 
 /// What a record holds but for how often the progress was written.
-pub(crate) fn settled(folder: &Path) -> Vec<LogLine> {
+pub(crate) fn settled(folder: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(folder.join(RECORD)).expect("a record");
     let lines = text
         .lines()
         .map(|line| serde_json::from_str(line).expect("a line"));
-    let all: Vec<LogLine> = lines.collect();
-    let last = all
-        .iter()
-        .rev()
-        .find(|line| matches!(line, LogLine::Progress(_)));
+    let all: Vec<Value> = lines.collect();
+    let last = all.iter().rev().find(|line| line["kind"] == "progress");
     let last = last.cloned();
     let mut kept: Vec<_> = all
         .into_iter()
-        .filter(|line| !matches!(line, LogLine::Progress(_)))
+        .filter(|line| line["kind"] != "progress")
         .collect();
     kept.extend(last);
     kept
@@ -104,6 +110,9 @@ fn from_a_seed_to_a_scenario() {
         "the drives with the finding fail it",
     );
     ended(&drivebench(&promote), 2, "is there already");
+    let table = top.join("snapshots/scenarios/novobus/10.3-and.snap");
+    let table = std::fs::read_to_string(table).expect("a table");
+    assert!(table.contains("passed after"), "{table}");
     let scenario = top.join("corpora/scenarios/novobus/10.3-and.scn");
     ended(&drivebench(&["run", name(&scenario)]), 0, "1 passed");
     // The same conversation with the drive that it was found on.
@@ -333,7 +342,17 @@ fn nothing_judged_has_not_passed() {
 fn one_at_a_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("run");
-    let held = FuzzRecord::create(&out, &about(&RingSetup::default(), 1)).expect("room");
+    let run = ["fuzz", "run", "--cases", "20", "--out", name(&out)];
+    ended(&drivebench(&run), 0, "20 cases");
+    // A record of a version that knew no spices.
+    let record = out.join(RECORD);
+    let text = std::fs::read_to_string(&record).expect("a record");
+    let (first, rest) = text.split_once('\n').expect("lines");
+    let mut about: Value = serde_json::from_str(first).expect("a line");
+    about["spices"] = Value::Array(Vec::new());
+    std::fs::write(&record, format!("{about}\n{rest}")).expect("room");
+    let held = std::fs::File::open(&record).expect("a record");
+    held.lock().expect("a lock");
     let resume = ["fuzz", "run", "--cases", "60", "--resume", name(&out)];
     ended(&drivebench(&resume), 2, "another process works on the run");
     drop(held);

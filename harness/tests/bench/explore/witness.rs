@@ -1,84 +1,7 @@
-//! Whole ND21s without a model beside them: the witnesses find nothing where nothing is wrong, and most of what is.
+//! The commands on whole ND21s.
 
 use super::command::drivebench;
-use super::{Heard, about, bounds, repeat, scope, seed};
 use crate::program::{ended, findings, name};
-use harness::buses::novobus::explore::{Finding, FuzzRun, OnSim, RingSetup, Spice, scenario};
-use harness::explore::Planted;
-
-/// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
-fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {
-    let lines = r#"["drive 0..last model nd21", "drive 0..last input GPIN3 GPIN5 high"]"#;
-    let sound = RingSetup {
-        header: serde_json::from_str(lines).expect("a header"),
-        deviates: Vec::new(),
-    };
-    let setup = match hidden {
-        None => sound,
-        Some((drive, name)) => sound.hides(&Planted {
-            ring: 0,
-            drive,
-            name: name.to_owned(),
-        }),
-    };
-    let mut scope = scope(3);
-    scope.spices = Spice::NAMES.iter().map(|(_, spice)| *spice).collect();
-    let mut campaign = FuzzRun::new(about(&setup, seed), scope);
-    let mut heard = Heard::default();
-    let mut target = OnSim::new(setup);
-    let end = campaign.run(&mut target, None, &bounds(cases, 1), &mut heard);
-    end.expect("a simulated ring");
-    (heard.findings, campaign.progress().cases)
-}
-
-/// Drives as the manual has them give no finding.
-#[test]
-fn sound_drives_pass() {
-    for seed in [1, 2, 3, seed()] {
-        let (found, cases) = explore(None, seed, 400);
-        if let Some(finding) = found.first() {
-            let text = scenario(finding, "a finding", &[]).expect("a ring");
-            let again = repeat("sound_drives_pass");
-            panic!("seed {seed}: {:#?}\n{text}\n{again}", finding.difference);
-        }
-        assert_eq!(cases, 400);
-    }
-}
-
-/// Every rule of a witness has deviations that it finds, blamed on the drive and with the section (`fuzz power --whole` shows all).
-#[test]
-fn deviating_drives_are_found() {
-    for (hidden, rule) in [
-        ("passes-pause-on", "9.1, answer"),
-        ("checksum-wrong", "9.1, answer"),
-        ("position-one-increment-off", "9.1, answer"),
-        ("counts-9-zeros", "9.7, error mode"),
-        ("checksum-zero-accepted", "9.7, error mode"),
-        ("writes-ignored", "10.2, contents of a cell"),
-        ("and-is-or", "10.3, contents of a cell"),
-        ("outputs-exchanged", "10.4, contents of a cell"),
-        ("process-data-in-swapped", "9.4, contents of a cell"),
-        ("reset-keeps-parameters", "10.5, contents of a cell"),
-        ("reports-parity-as-framing", "14.11.14, contents of a cell"),
-        ("next-drive-is-same-drive", "14.2.1, contents of a cell"),
-        ("eeprom-not-written", "14.10.5, EEPROM controller"),
-        ("forwards-without-delay", "8.2, answer"),
-        ("time-out-after-25ms", "9.9, time-out"),
-        ("no-zeros-unasked", "9.9, zeros"),
-        ("zeros-5ms-after-a-time-out", "9.9, zeros"),
-    ] {
-        let (found, _) = explore(Some((2, hidden)), 1, 3_000);
-        let finding = found.first();
-        let finding = finding.unwrap_or_else(|| panic!("{hidden} is not found"));
-        let signature = finding.difference.signature();
-        let blamed = signature.starts_with("drive 2: ");
-        let expected = format!("(ND21 {rule})");
-        assert!(
-            blamed && signature.ends_with(&expected),
-            "{hidden}: {signature}"
-        );
-    }
-}
 
 /// The same finding is made by the same seed, and is made small like any other.
 #[test]
@@ -93,11 +16,23 @@ fn the_commands_on_whole_drives() {
     ended(&drivebench(&run), 0, "300 cases");
     let power = ["fuzz", "power", "and-is-or", "--whole", "--seeds", "2"];
     ended(&drivebench(&power), 0, "1 of 1 found within 10000 cases");
-    // What is made small is a finding of a run.
-    let (found, _) = explore(Some((0, "and-is-or")), 1, 3_000);
+    // What is found is made small like any other.
     let out = folder.path().join("found");
-    std::fs::create_dir(&out).expect("room");
-    found[0].write(&out, "finding-000001").expect("room");
+    let run = [
+        "fuzz",
+        "run",
+        "--whole",
+        "--cases",
+        "3000",
+        "--findings",
+        "1",
+    ];
+    let run = [
+        &run[..],
+        &["--deviates", "0=and-is-or", "--out", name(&out)],
+    ]
+    .concat();
+    ended(&drivebench(&run), 1, "1 found");
     let output = drivebench(&["shrink", name(&findings(&out)[0])]);
     ended(&output, 0, "nothing more can be taken away");
     ended(&output, 0, "ring    1\n");

@@ -2,14 +2,21 @@
 
 use super::tty::{Seen, Tty};
 use crate::ring::Served;
-use harness::buses::novobus::top::FORM;
 use harness::port::PortAddress;
-use harness::top::{Heading, Screen, Top};
+use harness::top::{Heading, Screen, Top, TopColumn, TopForm};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Stdio};
+
+/// A table of any bus.
+static FORM: TopForm = TopForm {
+    drive: "drive",
+    columns: &[TopColumn::numbers("drive", 5), TopColumn::words("state", 5)],
+    give_way: &[],
+    states: &["error"],
+};
 
 /// `setsid` of util-linux makes the terminal the program's own, so that no output goes to the tester's terminal.
 pub(crate) fn in_session(program: &Path, arguments: &[&str]) -> Command {

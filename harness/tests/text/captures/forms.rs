@@ -1,10 +1,9 @@
 //! The forms: small examples as snapshots, the picture's XML and size, the rules of each form.
 
-use super::{DAMAGED, built_in, root, run};
-use harness::buses::novobus::report::csv;
-use harness::buses::novobus::report::svg::{RowPlacing, SvgOptions, svg};
-use harness::buses::novobus::report::vcd;
+use super::{DAMAGED, built_in, root, run, status, written};
 use harness::capture::Capture;
+use harness::report::vcd::Signals;
+use harness::shown::{FileForm, RowPlacing};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
@@ -13,25 +12,18 @@ const SMALL: &str = "title small\nring 2\ndrive 1 memory FE13 = 88\n! 1->0 byte 
     > 88 FF C0 13 FE D1\n> 80*4 81\n+5ms > 80\n";
 
 fn picture(capture: &Capture, title: &str, scale: RowPlacing) -> String {
-    let options = SvgOptions {
-        title,
-        id: "test",
-        scale,
-        rate: capture.rate,
-        rows: None,
-    };
-    svg(&capture.traces, &options)
+    text(written(capture, FileForm::Svg(scale, None), title))
 }
 
-fn waves(capture: &Capture, signals: vcd::Signals) -> String {
-    let mut bytes = Vec::new();
-    vcd::write(&capture.traces, capture.rate, signals, &mut bytes).expect("a Vec");
-    String::from_utf8(bytes).expect("text")
+fn waves(capture: &Capture, signals: Signals) -> String {
+    text(written(capture, FileForm::Vcd(signals), ""))
 }
 
 fn rows(capture: &Capture) -> String {
-    let mut bytes = Vec::new();
-    csv::write(&capture.traces, &mut bytes).expect("a Vec");
+    text(written(capture, FileForm::Csv, ""))
+}
+
+fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).expect("text")
 }
 
@@ -50,7 +42,7 @@ fn snapshot(name: &str, text: &str) {
 fn small_examples() {
     let capture = run(SMALL);
     snapshot("small.csv", &rows(&capture));
-    snapshot("small.vcd", &waves(&capture, vcd::Signals::All));
+    snapshot("small.vcd", &waves(&capture, Signals::All));
     snapshot("small.svg", &picture(&capture, "small", RowPlacing::Index));
     snapshot(
         "small-by-time.svg",
@@ -153,14 +145,6 @@ fn hostile_titles_stay_text() {
     let (_, title) = all.iter().find(|(name, _)| name == "title").expect("one");
     assert!(title.starts_with("&lt;/title&gt;&lt;script&gt;"), "{title}");
     assert!(!picture.contains('\u{0}') && !picture.contains('\u{1b}'));
-    let options = SvgOptions {
-        title: "",
-        id: "x\"><script>",
-        scale: RowPlacing::Index,
-        rate: capture.rate,
-        rows: None,
-    };
-    assert!(!svg(&capture.traces, &options).contains("<script"));
 }
 
 /// However long a run is, its picture stays small, and says what it leaves out.
@@ -183,7 +167,7 @@ fn a_long_run_is_cut() {
 #[test]
 fn the_dump_of_a_line_is_read_back() {
     let capture = run(DAMAGED);
-    let text = waves(&capture, vcd::Signals::Lines);
+    let text = waves(&capture, Signals::Lines);
     assert!(!text.contains("\nb"), "no vectors");
     let code = text
         .lines()
@@ -208,7 +192,7 @@ fn the_dump_of_a_line_is_read_back() {
     let expected: Vec<_> = arrived
         .map(|byte| {
             // A line does not show that its receiver was slow.
-            let status = Some(csv::status(byte)).filter(|status| *status != "overrun");
+            let status = Some(status(byte)).filter(|status| *status != "overrun");
             (byte.received.expect("arrived"), status.unwrap_or("ok"))
         })
         .collect();

@@ -1,12 +1,13 @@
 //! Damaged, cut and hostile captures: a capture, or a reason with its place; never a panic.
 
-use super::{DAMAGED, built_in, json, pcapng, run};
+use super::{DAMAGED, built_in, pcapng, run, written};
 use harness::capture::{CaptureError, read};
+use harness::shown::FileForm;
 
 fn small() -> [Vec<u8>; 2] {
     let text = "title small\nring 2, 1\n> 88 FE C0 13 FE D1\n2> 80*3\n! 1->0 byte 3: flip 1\n";
     let capture = run(text);
-    [pcapng(&capture), json(&capture)]
+    [pcapng(&capture), written(&capture, FileForm::Json, "")]
 }
 
 /// Cut off anywhere it is whole up to there, or says where it ends.
@@ -45,7 +46,12 @@ fn flipped_bits() {
     };
     let damaged = run(DAMAGED);
     let [small, text] = small();
-    let files = [small, text, pcapng(&damaged), json(&damaged)];
+    let files = [
+        small,
+        text,
+        pcapng(&damaged),
+        written(&damaged, FileForm::Json, ""),
+    ];
     for case in 0..3_000 {
         let mut file = files[case % files.len()].clone();
         for _ in 0..=random(4) {
@@ -77,7 +83,7 @@ fn kept_inputs() {
     assert!(played > 1);
     for capture in [built_in("9.8-two-check-sequences"), run(DAMAGED)] {
         harness::fuzz::capture(&pcapng(&capture));
-        harness::fuzz::capture(&json(&capture));
+        harness::fuzz::capture(&written(&capture, FileForm::Json, ""));
     }
 }
 

@@ -4,20 +4,20 @@ mod empty;
 mod forms;
 mod frames;
 mod hostile;
-mod judged;
-mod portions;
 mod program;
 mod round_trip;
 mod routes;
 mod telegrams;
 mod tools;
 
-use harness::buses::novobus::simulate::simulated;
+use harness::buses::novobus::BUS;
 use harness::capture::Capture;
 use harness::library::Entry;
-use harness::link::Link;
-use harness::scenario::run::{AtMismatch, play};
+use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
+use harness::shown::{FileForm, ShownRun};
+use harness_proto::line::LineError;
+use harness_sim::record::LineByte;
 
 use std::path::{Path, PathBuf};
 
@@ -36,11 +36,11 @@ fn file(name: &str) -> PathBuf {
 fn run(text: &str) -> Capture {
     let source = Source::from_bytes("test.scn".to_owned(), text.into()).expect("a text");
     let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}\n{text}", p.all()));
-    let plan = entry.plan.expect("novobus");
-    let mut link = simulated(&plan);
-    play(&plan, &mut link, AtMismatch::GoOn);
-    let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
-    let rate = plan.rate;
+    let rate = entry.rate();
+    let plan = &entry.settled;
+    let mut link = plan.simulate();
+    plan.play(&mut *link, AtMismatch::GoOn);
+    let traces = (0..plan.ports()).map(|ring| link.trace(ring)).collect();
     Capture {
         rate,
         traces,
@@ -66,10 +66,29 @@ fn pcapng(capture: &Capture) -> Vec<u8> {
     bytes
 }
 
-fn json(capture: &Capture) -> Vec<u8> {
+/// The same in this form, with this title.
+fn written(capture: &Capture, form: FileForm, title: &str) -> Vec<u8> {
+    let run = ShownRun {
+        title,
+        traces: &capture.traces,
+        records: &[],
+        rate: capture.rate,
+    };
     let mut bytes = Vec::new();
-    harness::buses::novobus::report::json::write(&capture.traces, &[], &mut bytes).expect("a Vec");
+    BUS.report.write(&run, form, &mut bytes).expect("a Vec");
     bytes
+}
+
+/// What the receiver of a byte noticed.
+fn status(byte: &LineByte) -> &'static str {
+    match (byte.received, byte.error) {
+        (None, _) => "dropped",
+        (Some(_), None) => "ok",
+        (Some(_), Some(LineError::Parity)) => "parity",
+        (Some(_), Some(LineError::Framing)) => "framing",
+        (Some(_), Some(LineError::Break)) => "break",
+        (Some(_), Some(LineError::Overrun)) => "overrun",
+    }
 }
 
 /// Every kind of damage on the link between two drives, every byte a telegram of its own.

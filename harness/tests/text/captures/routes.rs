@@ -1,8 +1,9 @@
 //! The commands that messages advise for formats which are not read: each is run as it is printed, and what it gives is read.
 
-use super::{built_in, file};
+use super::{built_in, file, written};
 use crate::{debian, python};
-use harness::buses::novobus::report::vcd::{self, Signals};
+use harness::report::vcd::Signals;
+use harness::shown::FileForm;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -84,8 +85,7 @@ fn every_advised_command_leads_to_a_capture() {
     let can = python::with("can", "commands that messages advise");
     let can = can.as_deref().and_then(Path::parent);
     let capture = built_in("10.1-read-byte");
-    let mut levels = Vec::new();
-    vcd::write(&capture.traces, capture.rate, Signals::Lines, &mut levels).expect("a Vec");
+    let levels = written(&capture, FileForm::Vcd(Signals::Lines), "");
     for (ending, program, make, left) in ROUTES {
         let there = match program {
             "can_logconvert" => can.is_some(),

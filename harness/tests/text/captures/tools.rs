@@ -1,10 +1,10 @@
 //! What we write, read by programs that we did not write: sigrok-cli and tshark.
 
-use super::{DAMAGED, built_in, file, pcapng, root, run};
+use super::{DAMAGED, built_in, file, pcapng, root, run, status, written};
 use crate::debian::has;
-use harness::buses::novobus::report::csv::{self, status};
-use harness::buses::novobus::report::vcd::{self, Signals};
 use harness::capture::{Capture, read};
+use harness::report::vcd::Signals;
+use harness::shown::FileForm;
 use std::collections::BTreeMap;
 use std::process::Command;
 
@@ -29,8 +29,7 @@ fn output(program: &str, arguments: &[&str]) -> Option<String> {
 #[test]
 fn what_sigrok_writes_is_read() {
     let capture = built_in("10.1-read-byte");
-    let mut lines = Vec::new();
-    vcd::write(&capture.traces, capture.rate, Signals::Lines, &mut lines).expect("a Vec");
+    let lines = written(&capture, FileForm::Vcd(Signals::Lines), "");
     let ours = file("sigrok.vcd");
     std::fs::write(&ours, &lines).expect("room");
     for form in ["vcd", "csv"] {
@@ -102,8 +101,7 @@ fn sigrok_reads_the_lines() {
     ];
     for (name, capture) in captures {
         let path = file(&format!("{name}.vcd"));
-        let mut dump = Vec::new();
-        vcd::write(&capture.traces, capture.rate, Signals::Lines, &mut dump).expect("a Vec");
+        let dump = written(&capture, FileForm::Vcd(Signals::Lines), "");
         std::fs::write(&path, dump).expect("a file");
         // Of a large ring some links are enough.
         let links = &capture.traces[0].channels;
@@ -173,8 +171,7 @@ fn dissected(name: &str, capture: &Capture) -> Option<Vec<String>> {
 /// The same rows from our own reading; a capture that was read back has no marks, as the dissector has none.
 fn own(capture: &Capture) -> Vec<String> {
     let capture = read(&pcapng(capture), None).expect("a capture");
-    let mut rows = Vec::new();
-    csv::write(&capture.traces, &mut rows).expect("a Vec");
+    let rows = written(&capture, FileForm::Csv, "");
     let text = String::from_utf8(rows).expect("text");
     let mut own = Vec::new();
     let mut lost: BTreeMap<String, usize> = BTreeMap::new();

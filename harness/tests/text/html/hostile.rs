@@ -3,8 +3,8 @@
 use super::devtools::Browser;
 use super::parser::{Element, parse, sound};
 use super::{folder, played};
-use harness::report::pages::{Head, ScenarioView, run, section};
 use harness::scenario::run::AtMismatch;
+use harness::shown::{Head, ScenarioView, run, section};
 use serde_json::json;
 
 /// What would be something else than text in HTML, in an attribute, in a script, in XML, in a comment, or to a reader's eye.
@@ -44,7 +44,7 @@ fn page() -> String {
             text: &own,
             outcome: &outcome,
             traces: &traces,
-            report: None,
+            report: super::BUS.report,
             rate: harness_proto::line::Rate::default(),
             again: text,
         };
@@ -150,9 +150,8 @@ fn a_hostile_title_of_a_file() {
         let Ok(entry) = harness::library::Entry::new(source, None) else {
             continue;
         };
-        let plan = entry.plan.as_ref().expect("novobus");
-        let mut link = harness::buses::novobus::simulate::simulated(plan);
-        let outcome = harness::scenario::run::play(plan, &mut link, AtMismatch::Stop);
+        let mut link = entry.settled.simulate();
+        let outcome = entry.settled.play(&mut *link, AtMismatch::Stop);
         assert_eq!(outcome.verdict.name(), "passed");
         sound(&parse(&super::page(&[("own", scenario)])));
     }

@@ -9,12 +9,11 @@ mod pages;
 mod parser;
 mod program;
 
-use harness::buses::novobus::simulate::simulated;
+use harness::buses::novobus::BUS;
 use harness::library::Entry;
-use harness::link::Link;
-use harness::report::pages::{Head, ScenarioView, ShownScenario, run, section};
-use harness::scenario::run::{AtMismatch, Outcome, play};
+use harness::scenario::run::{AtMismatch, Outcome};
 use harness::scenario::source::Source;
+use harness::shown::{Head, ScenarioView, ShownScenario, run, section};
 use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 
@@ -39,10 +38,10 @@ fn text(name: &str) -> String {
 fn played(name: &str, text: &str) -> (Entry, Outcome, Vec<Trace>) {
     let source = Source::from_bytes(format!("{name}.scn"), text.into()).expect("a text");
     let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}\n{text}", p.all()));
-    let plan = entry.plan.clone().expect("novobus");
-    let mut link = simulated(&plan);
-    let outcome = play(&plan, &mut link, AtMismatch::Stop);
-    let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    let plan = &entry.settled;
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, AtMismatch::Stop);
+    let traces = (0..plan.ports()).map(|ring| link.trace(ring)).collect();
     (entry, outcome, traces)
 }
 
@@ -64,8 +63,8 @@ fn shown(number: usize, name: &str, text: &str) -> ShownScenario {
         text,
         outcome: &outcome,
         traces: &traces,
-        report: entry.report(),
-        rate: entry.plan.as_ref().expect("novobus").rate,
+        report: entry.report,
+        rate: entry.rate(),
         again: "drivebench trace it",
     };
     section(number, &own)

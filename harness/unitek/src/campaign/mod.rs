@@ -11,7 +11,8 @@ pub(crate) use converse::{Conversation, JobEnd};
 pub(crate) use file::{CampaignStep, FrameCampaignFile};
 
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::OutcomeClass;
+use harness_bench::campaign::line::{LineCampaign, LineOutcome, PlayedLine, case_of};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};
 use std::fmt;
@@ -47,26 +48,26 @@ impl FrameClass {
 }
 
 /// The classes, in order.
-const CLASSES: [LineClass; 4] = [
-    LineClass {
+const CLASSES: [OutcomeClass; 4] = [
+    OutcomeClass {
         name: "answered",
         about: "every job ended as without the fault",
         letter: '.',
         gravity: 0,
     },
-    LineClass {
+    OutcomeClass {
         name: "retried",
         about: "every job ended as without the fault, after a repeated request",
         letter: 'R',
         gravity: 2,
     },
-    LineClass {
+    OutcomeClass {
         name: "noticed",
         about: "the master reported the fault",
         letter: 'N',
         gravity: 4,
     },
-    LineClass {
+    OutcomeClass {
         name: "unnoticed",
         about: "the master reported nothing, and a result or what the drive holds is wrong",
         letter: 'U',

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::language::Unitek;
-use harness_bench::campaign::line::{replayed, table};
+use harness_bench::campaign::PlayedCampaign as _;
+use harness_bench::campaign::line::replayed;
 
 /// The page with the figures.
 const PAGE: &str = include_str!("../../../../corpora/campaigns/README.md");
@@ -30,7 +31,7 @@ fn built_in_campaigns_have_the_figures_that_they_pin() {
         let pinned = FrameClass::ALL.map(|class| expect.of(class).expect("every class is pinned"));
         assert_eq!(expect.cases, Some(pinned.iter().sum()), "{name}");
         let played = campaign.run(&|_| {});
-        assert_eq!(played.differs(), [], "{}", table(&played));
+        assert_eq!(played.differs(), [], "{}", played.table());
         let figures = pinned.map(|figure| figure.to_string()).join(" | ");
         let row = format!("| `{name}` | {} | {figures} |", expect.cases.unwrap_or(0));
         assert!(PAGE.contains(&row), "corpora/campaigns/README.md: {row}");

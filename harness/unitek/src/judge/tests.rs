@@ -4,7 +4,7 @@ use super::{HeardFrames, judge};
 use crate::language::Unitek;
 use harness_bench::scenario::files::sources;
 use harness_bench::scenario::run::AtMismatch;
-use harness_bench::scenario::settled::settle;
+use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -51,7 +51,7 @@ type Drives = Vec<(u8, (u16, u16))>;
 fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) {
     let text = source.text.replace(BUS, &format!("{BUS}{lines}"));
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
-    let found = settle::<Unitek>(&source, None);
+    let found = settle::<Unitek>(&source, BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{:#?}", p.all()));
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);

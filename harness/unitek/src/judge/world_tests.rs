@@ -5,7 +5,7 @@ use super::tests::{of_all, scenarios};
 use crate::language::Unitek;
 use harness_bench::qualify::worlds::{Dialogue, Judged, Timed, judge};
 use harness_bench::scenario::run::AtMismatch;
-use harness_bench::scenario::settled::settle;
+use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
@@ -37,7 +37,7 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
     let [drive] = &setup.drives[..] else {
         return None;
     };
-    let (_, plan) = settle::<Unitek>(&wrong, None).expect("a scenario");
+    let (_, plan) = settle::<Unitek>(&wrong, BenchSize::Own).expect("a scenario");
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     let frames = link.trace(0).channels[0].frames().to_vec();

@@ -13,7 +13,6 @@ pub(crate) use write::identifier;
 
 use self::plan::{Act, Planner, WantedFrame};
 use self::syntax::{FrameStep, Header, Message};
-use crate::report::FrameReport;
 use crate::simulate;
 use harness_bench::bus_name::BusName;
 use harness_bench::link::Link;
@@ -25,7 +24,6 @@ use harness_bench::scenario::run::outcome::{Mismatch, Stop};
 use harness_bench::scenario::run::player::Runner;
 use harness_bench::scenario::scanner::Scanner;
 use harness_bench::scenario::syntax::Scenario;
-use harness_bench::traffic::SegmentReport;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 
@@ -52,10 +50,6 @@ impl Language for Unitek {
     type Received = Frame;
     type State = State;
     type Planner = Planner;
-
-    fn report() -> Option<&'static dyn SegmentReport> {
-        Some(&FrameReport)
-    }
 
     fn comment(line: &str) -> Option<usize> {
         parse::comment(line)

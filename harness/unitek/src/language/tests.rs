@@ -5,7 +5,7 @@ use harness_bench::bus_name::BusName;
 use harness_bench::fuzz::written;
 use harness_bench::scenario::files::sources;
 use harness_bench::scenario::parse::{bus, parse};
-use harness_bench::scenario::settled::settle;
+use harness_bench::scenario::settled::{BenchSize, settle};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
@@ -22,7 +22,7 @@ fn source(text: &str) -> Source {
 
 /// The verdict of these lines behind the common header, and what was wrong.
 fn played(lines: &str) -> (Verdict, String) {
-    let found = settle::<Unitek>(&source(&format!("{HEADER}{lines}")), None);
+    let found = settle::<Unitek>(&source(&format!("{HEADER}{lines}")), BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
@@ -43,7 +43,7 @@ fn fails(lines: &str, with: &str) {
 /// The first mistake: what stands there, the message, the help.
 fn mistake(lines: &str) -> (String, String, String) {
     let source = source(&format!("{HEADER}{lines}"));
-    let found = settle::<Unitek>(&source, None).expect_err(lines);
+    let found = settle::<Unitek>(&source, BenchSize::Own).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
     let said = format!("{}; {}", first.message, first.expected);
@@ -304,7 +304,7 @@ fn several_drives() {
 fn a_full_bus_ends() {
     let lines = "rate 100\ndrive 1\nfor k in 1..8\n> 201 3D (k) 01\nend\n> 201 3D 01 FF\n? quiet\n";
     let source = source(&format!("{HEADER}{lines}"));
-    let (_, plan) = settle::<Unitek>(&source, None).expect("a scenario");
+    let (_, plan) = settle::<Unitek>(&source, BenchSize::Own).expect("a scenario");
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Failed);
@@ -384,7 +384,7 @@ fn damaged_scenarios() {
         if let Ok(scenario) = parse::<Unitek>(&source) {
             written(&scenario);
         }
-        match settle::<Unitek>(&source, None) {
+        match settle::<Unitek>(&source, BenchSize::Own) {
             Ok((_, plan)) => {
                 let mut link = plan.simulate();
                 plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::GoOn);

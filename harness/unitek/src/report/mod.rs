@@ -11,7 +11,9 @@ mod tests;
 use harness_bench::bus_name::BusName;
 use harness_bench::html::Html;
 use harness_bench::report::pcapng_frames;
-use harness_bench::traffic::{SegmentReport, SharedForm, drawn};
+use harness_bench::shown::{
+    FileForm, SegmentReport, ShownRun, TablePart, TraceView, drawn, no_form,
+};
 use harness_proto::can::Frame;
 use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::register::Unit;
@@ -20,7 +22,6 @@ use harness_proto::unitek::words::{Bit, ERRORS, IO, MODE, STATUS, set_bits};
 use harness_proto::unitek::{Data, Register, Reply, Request};
 use harness_sim::record::Trace;
 use std::io::{Error, Write};
-use std::ops::Range;
 
 /// How frames are shown.
 #[derive(Clone, Copy, Debug)]
@@ -31,23 +32,28 @@ impl SegmentReport for FrameReport {
         "frames of CAN"
     }
 
-    fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
-        table::table(trace, wanted, at_most)
+    fn rows(&self, trace: &Trace, part: &TablePart) -> String {
+        table::table(trace, part.rows.clone(), part.at_most)
     }
 
-    fn pictures(&self, trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+    fn pictures(&self, view: &TraceView<'_>) -> Vec<(String, Html)> {
+        let TraceView {
+            trace, id, title, ..
+        } = *view;
         drawn(
             |html| sequence::sequence(html, id, title, trace),
             |html| curves::curves(html, id, trace),
         )
     }
 
-    fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
+    fn write(&self, run: &ShownRun<'_>, form: FileForm, out: &mut dyn Write) -> Result<(), Error> {
+        let traces = run.traces;
         match form {
-            SharedForm::Json => json::write(BusName::Unitek, traces, out),
-            SharedForm::Candump => json::candump(traces, out),
-            SharedForm::Csv => csv::write(traces, out),
-            SharedForm::Pcapng => pcapng_frames::write(traces, out),
+            FileForm::Json => json::write(BusName::Unitek, traces, out),
+            FileForm::Candump => json::candump(traces, out),
+            FileForm::Csv => csv::write(traces, out),
+            FileForm::Pcapng => pcapng_frames::write(traces, out),
+            FileForm::Vcd(_) | FileForm::Svg(..) => Err(no_form(self.carries(), &form)),
         }
     }
 }

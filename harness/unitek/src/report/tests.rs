@@ -2,7 +2,7 @@
 
 use super::FrameReport;
 use harness_bench::capture::{Capture, read};
-use harness_bench::traffic::{SegmentReport as _, SharedForm};
+use harness_bench::shown::{FileForm, SegmentReport as _, ShownRun};
 use harness_proto::can::{BitRate, CanError, Frame};
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
@@ -52,9 +52,15 @@ fn every_kind() -> Capture {
     }
 }
 
-fn written(capture: &Capture, form: SharedForm) -> Vec<u8> {
+fn written(capture: &Capture, form: FileForm) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let written = FrameReport.write(&capture.traces, form, &mut bytes);
+    let run = ShownRun {
+        title: "",
+        traces: &capture.traces,
+        records: &[],
+        rate: capture.rate,
+    };
+    let written = FrameReport.write(&run, form, &mut bytes);
     written.expect("a Vec");
     bytes
 }
@@ -62,14 +68,14 @@ fn written(capture: &Capture, form: SharedForm) -> Vec<u8> {
 #[test]
 fn json_survives() {
     let capture = every_kind();
-    let bytes = written(&capture, SharedForm::Json);
+    let bytes = written(&capture, FileForm::Json);
     assert_eq!(read(&bytes, None), Ok(capture));
 }
 
 #[test]
 fn a_candump_log_survives_but_for_what_it_cannot_hold() {
     let capture = every_kind();
-    let again = read(&written(&capture, SharedForm::Candump), None).expect("a capture");
+    let again = read(&written(&capture, FileForm::Candump), None).expect("a capture");
     let frames = |own: &Capture| own.traces[0].channels[0].frames().to_vec();
     let good = frames(&capture)
         .into_iter()

@@ -10,7 +10,7 @@ const WORST: usize = 100;
 
 /// A campaign as a section; `number` counts the sections of the page from 1.
 #[must_use]
-pub fn section(number: usize, played: &PlayedLine) -> Section {
+pub(crate) fn section(number: usize, played: &PlayedLine) -> Section {
     let name = &played.name;
     let mut html = Html::new();
     html.line("p", &[], &played.title);

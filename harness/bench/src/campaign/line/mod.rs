@@ -3,27 +3,13 @@
 //! What is disturbed, and which classes of outcomes there are, only the bus knows. What came of a campaign is data in no bus's words, and
 //! this module shows it.
 
-pub mod html;
-pub mod report;
+mod html;
+mod report;
 
-pub use html::section;
-pub use report::{json, only, table};
-
+use super::{Campaign, CaseFailure, OutcomeClass, PlayedCampaign};
+use crate::report::html::Section;
 use harness_proto::time::Instant;
 use std::fmt::Debug;
-
-/// A class of outcomes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LineClass {
-    /// Its name in files and tables.
-    pub name: &'static str,
-    /// What it means.
-    pub about: &'static str,
-    /// A letter, for readers who see no colours.
-    pub letter: char,
-    /// How serious it is, as pages count the classes of all campaigns: 0 to 6.
-    pub gravity: u8,
-}
 
 /// From this gravity on a case stands among the worst.
 const SERIOUS: u8 = 4;
@@ -63,7 +49,7 @@ pub struct PlayedLine {
     /// The heading above what was disturbed.
     pub heading: &'static str,
     /// The classes, the least serious first.
-    pub classes: &'static [LineClass],
+    pub classes: &'static [OutcomeClass],
     /// The figures that its file pins: of a class, or of all `cases`.
     pub expect: Vec<(&'static str, u64)>,
     /// Every case, in order.
@@ -98,7 +84,7 @@ impl PlayedLine {
             .collect()
     }
 
-    fn of(&self, outcome: &LineOutcome) -> &'static LineClass {
+    fn of(&self, outcome: &LineOutcome) -> &'static OutcomeClass {
         &self.classes[outcome.class]
     }
 
@@ -141,6 +127,88 @@ pub trait LineCampaign: Debug {
     fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine;
 }
 
+impl<C: LineCampaign> Campaign for C {
+    fn name(&self) -> &str {
+        LineCampaign::name(self)
+    }
+
+    fn texts(&self) -> Vec<&str> {
+        vec![self.text()]
+    }
+
+    fn names(&self) -> Vec<String> {
+        LineCampaign::names(self)
+    }
+
+    fn pinned(&self) -> Vec<(&'static str, u64)> {
+        LineCampaign::pinned(self)
+    }
+
+    fn keep(&mut self, at: &dyn Fn(usize) -> bool) {
+        LineCampaign::keep(self, at);
+    }
+
+    fn cases(&self) -> usize {
+        LineCampaign::cases(self)
+    }
+
+    fn scenario(&self, case: &str) -> Result<String, CaseFailure> {
+        LineCampaign::scenario(self, case).map_err(CaseFailure::Unknown)
+    }
+
+    fn run(
+        &self,
+        _: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Box<dyn PlayedCampaign>, String> {
+        Ok(Box::new(LineCampaign::run(self, progress)))
+    }
+}
+
+impl PlayedCampaign for PlayedLine {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn classes(&self) -> &'static [OutcomeClass] {
+        self.classes
+    }
+
+    fn count(&self, class: usize) -> u64 {
+        Self::count(self, class)
+    }
+
+    fn cases(&self) -> u64 {
+        self.outcomes.len() as u64
+    }
+
+    fn differs(&self) -> Vec<(&'static str, u64, u64)> {
+        Self::differs(self)
+    }
+
+    fn size(&self) -> [(String, u64); 2] {
+        let (first, rest) = self.units.split_at(1);
+        let units = first.to_uppercase() + rest;
+        [("Drives".to_owned(), 1), (units, self.count as u64)]
+    }
+
+    fn table(&self) -> String {
+        report::table(self)
+    }
+
+    fn lines(&self, class: usize) -> String {
+        report::only(self, class)
+    }
+
+    fn json(&self, class: Option<usize>) -> serde_json::Value {
+        report::json(self, class)
+    }
+
+    fn section(&self, number: usize) -> Section {
+        html::section(number, self)
+    }
+}
+
 /// The case of this name among those of a campaign.
 ///
 /// # Errors
@@ -163,7 +231,7 @@ pub fn case_of<C: Copy>(
 pub fn header_of_case(
     (campaign, case): (&str, &str),
     source_and_drive: &str,
-    class: &LineClass,
+    class: &OutcomeClass,
     happened: &str,
 ) -> String {
     let campaign = campaign.trim_end_matches(".toml");
@@ -187,9 +255,10 @@ pub fn time_of_case(at: Instant) -> String {
 pub fn replayed<L: crate::scenario::language::Language>(
     campaign: &dyn LineCampaign,
     case: &str,
-    class: LineClass,
+    class: OutcomeClass,
 ) -> (String, harness_sim::record::Trace) {
     use crate::scenario::run::AtMismatch;
+    use crate::scenario::settled::{BenchSize, settle};
     use crate::scenario::verdict::Verdict;
     let text = campaign.scenario(case).expect("a case");
     assert!(text.contains(&format!("\n# {}: ", class.name)), "{text}");
@@ -197,7 +266,7 @@ pub fn replayed<L: crate::scenario::language::Language>(
         name: case.to_owned(),
         text: text.clone().into(),
     };
-    let settled = crate::scenario::settled::settle::<L>(&source, None);
+    let settled = settle::<L>(&source, BenchSize::Own);
     let (_, plan) = settled.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
     let mut link = plan.simulate();
     let played = plan.play(&mut *link, AtMismatch::Stop);

@@ -10,7 +10,7 @@ const WORST: usize = 10;
 
 /// How many cases there are of each class, what differs from the file, and the worst cases.
 #[must_use]
-pub fn table(played: &PlayedLine) -> String {
+pub(crate) fn table(played: &PlayedLine) -> String {
     let all = played.outcomes.len() as u64;
     let (name, title) = (&played.name, &played.title);
     let (count, units) = (played.count, played.units);
@@ -49,7 +49,7 @@ pub fn table(played: &PlayedLine) -> String {
 
 /// The cases of a class, one a line.
 #[must_use]
-pub fn only(played: &PlayedLine, class: usize) -> String {
+pub(crate) fn only(played: &PlayedLine, class: usize) -> String {
     let own = played.outcomes.iter().filter(|own| own.class == class);
     let line = |own: &LineOutcome| {
         let (
@@ -68,7 +68,7 @@ pub fn only(played: &PlayedLine, class: usize) -> String {
 
 /// A campaign for tools.
 #[must_use]
-pub fn json(played: &PlayedLine, only: Option<usize>) -> Value {
+pub(crate) fn json(played: &PlayedLine, only: Option<usize>) -> Value {
     let unit = played.units.trim_end_matches('s');
     let case = |outcome: &LineOutcome| {
         json!({

@@ -12,7 +12,7 @@ use crate::explore::{
 use crate::rig::{Rig, UseOptions};
 use crate::scenario::language::Language;
 use crate::scenario::run::AtMismatch;
-use crate::scenario::settled::settle;
+use crate::scenario::settled::{BenchSize, settle};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -195,7 +195,7 @@ fn verdict<L: Language>(text: &str, line: &str, under: &[String]) -> (Verdict, S
         name: "finding".to_owned(),
         text: text.clone().into(),
     };
-    let found = settle::<L>(&source, None);
+    let found = settle::<L>(&source, BenchSize::Own);
     let (_, plan) = found.unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
     let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
     (

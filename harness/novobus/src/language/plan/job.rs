@@ -390,7 +390,6 @@ fn scale_of(place: &CellPlace, width: usize) -> Result<Scale, Problem> {
     })
 }
 
-/// Whether a command reaches a cell.
 pub(crate) fn reaches(command: &Command, place: &CellPlace) -> Result<(), Problem> {
     if memory::in_range(command.kind(), place.address) {
         return Ok(());

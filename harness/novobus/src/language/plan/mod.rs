@@ -13,7 +13,7 @@ pub(crate) use planner::Planner;
 pub(crate) use planner::plan_header;
 pub(crate) use setup::{in_memory, number_bytes};
 pub(crate) use types::CellTest;
-pub use types::{
+pub(crate) use types::{
     LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
     PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct, asks_the_driver,
 };
@@ -23,10 +23,6 @@ use super::Novobus;
 use harness_bench::scenario::plan;
 
 /// A scenario of rings, settled.
-pub type Plan = plan::Plan<Novobus>;
+pub(crate) type Plan = plan::Plan<Novobus>;
 
-/// A step of it.
-pub type PlannedStep = plan::PlannedStep<Novobus>;
-
-/// What such a step does.
-pub type PlannedAction = plan::PlannedAction<Novobus>;
+pub(crate) type PlannedStep = plan::PlannedStep<Novobus>;

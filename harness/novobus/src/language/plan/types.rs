@@ -23,7 +23,7 @@ use std::ops::RangeInclusive;
 
 /// How often the bench looks at cells while it waits for one: a quarter of the cycle of the drive's
 /// regulators (ND21 4.1).
-pub const LOOK: Span = Span::from_micros(108);
+pub(crate) const LOOK: Span = Span::from_micros(108);
 
 /// What a bench is before anything is sent: the header of a scenario, settled for rings of given sizes.
 #[derive(Clone, Debug)]
@@ -117,9 +117,7 @@ impl Influence {
 /// A step of this bus, settled.
 #[derive(Clone, Debug)]
 pub enum RingAct {
-    /// A fault.
     Fault(usize, PlacedFault, Moment),
-    /// A check.
     Check(PlannedCheck),
     /// A telegram and its answer, and what the number in the answer must be.
     Telegram(usize, Vec<u8>, Vec<Expected>, Option<NumberCheck>),
@@ -153,9 +151,7 @@ pub struct NumberCheck {
 pub struct PlannedDriveCheck {
     /// In which ring, counted from 0.
     pub ring: usize,
-    /// Which drives.
     pub drives: RangeInclusive<u8>,
-    /// What.
     pub condition: PlannedCondition,
 }
 
@@ -177,7 +173,6 @@ pub enum PlannedCondition {
 pub struct PlannedCell {
     /// Its name as written.
     pub name: String,
-    /// Its address.
     pub address: u16,
     /// How many bytes.
     pub size: usize,
@@ -211,7 +206,6 @@ pub enum CellTest {
         scale: Scale,
         /// How it is compared.
         relation: Relation,
-        /// With what.
         expected: Quantity,
         /// How far it may be off; without one the nearest raw value is meant.
         tolerance: Option<Tolerance>,
@@ -250,11 +244,9 @@ pub enum PlannedCall {
 pub struct PlannedRecord {
     /// In which ring, counted from 0.
     pub ring: usize,
-    /// Of which drives.
     pub drives: RangeInclusive<u8>,
     /// Its name as written.
     pub name: String,
-    /// Its address.
     pub address: u16,
     /// How many bytes.
     pub size: usize,
@@ -304,7 +296,7 @@ pub enum PlannedCheck {
 
 /// Whether the bench's own master has a part in it.
 #[must_use]
-pub fn asks_the_driver(plan: &Plan) -> bool {
+pub(crate) fn asks_the_driver(plan: &Plan) -> bool {
     let asks = |step: &PlannedStep| matches!(step.action, PlannedAction::Own(RingAct::Master(..)));
     plan.steps.iter().any(asks)
 }

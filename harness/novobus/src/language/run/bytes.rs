@@ -4,7 +4,6 @@ use harness_bench::scenario::pattern::Expected;
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::Instant;
-use std::fmt::Write as _;
 
 /// Whether a received byte is what is expected.
 pub(crate) fn matches(expected: Expected, received: Received) -> bool {
@@ -28,15 +27,4 @@ pub(crate) fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Exp
         }
         known => known,
     }
-}
-
-/// A received byte as reports show it: `88`, or `12 (parity)`.
-#[must_use]
-pub(crate) fn show(received: Received) -> String {
-    let mut text = format!("{:02X}", received.byte);
-    if let Some(error) = received.error {
-        // Writing to a String cannot fail.
-        let _infallible = write!(text, " ({error})");
-    }
-    text
 }

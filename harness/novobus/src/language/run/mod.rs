@@ -6,7 +6,7 @@ pub(crate) mod drives;
 pub(crate) mod look;
 pub(crate) mod master;
 pub(crate) mod now;
-pub mod over_bus;
+pub(crate) mod over_bus;
 pub(crate) mod record;
 pub(crate) mod state;
 pub(crate) mod tapped;

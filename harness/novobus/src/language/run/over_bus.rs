@@ -187,7 +187,7 @@ pub(crate) fn read_byte(
 }
 
 /// Plays a plan on drives that are accessible only over their bus. Cells of the header are set before the plan and restored after it.
-pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+pub(crate) fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
     }
@@ -218,7 +218,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) 
 /// Why a drive is not ready: which of its cells, and what of it is wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
-pub struct NotReady {
+pub(crate) struct NotReady {
     /// In what way.
     pub unready: Unready,
     /// The manual lets the drive change the cell by itself, or leaves open whether it does.
@@ -239,7 +239,7 @@ impl NotReady {
 
     /// The outcome of a scenario whose drives could not be made ready. A drive must answer and hold what was written to it. The manual
     /// leaves open only the contents of cells that the drive writes by itself.
-    pub fn judged(self, link: &dyn Link) -> Outcome {
+    pub(crate) fn judged(self, link: &dyn Link) -> Outcome {
         if let Some(trouble) = link.trouble() {
             return Outcome::trouble(trouble);
         }
@@ -271,7 +271,7 @@ const QUIET: Span = Span::from_millis(250);
 ///
 /// # Errors
 /// The first drive that does not come back, in a sentence.
-pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), NotReady> {
+pub(crate) fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), NotReady> {
     let drives = |(ring, size): (usize, &RingSize)| (0..size.drives()).map(move |k| (ring, k));
     let all: Vec<_> = rings.iter().enumerate().flat_map(drives).collect();
     reset_drives(link, &all)

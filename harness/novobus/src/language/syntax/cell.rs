@@ -12,7 +12,6 @@ use harness_proto::nd21::units::Scale;
 pub struct CellPlace {
     /// The name or the address as written.
     pub name: String,
-    /// The address.
     pub address: u16,
     /// How much higher the address is, as in `FE10+i`.
     pub offset: Option<Box<Located>>,
@@ -61,7 +60,6 @@ impl CellPlace {
 /// A value as written.
 #[derive(Clone, Debug)]
 pub enum Written {
-    /// Bytes.
     Bytes(Pattern),
     /// A number with a unit.
     Number(Quantity),
@@ -122,13 +120,11 @@ impl Relation {
 /// What must hold of a cell: `nist = 1500rpm +-1%`, `Flags2 & E0 = 00`, `nist < 100rpm`.
 #[derive(Clone, Debug)]
 pub struct CellCheck {
-    /// Which cell.
     pub place: CellPlace,
     /// The bits that count; all where `None`.
     pub mask: Option<Pattern>,
     /// How it is compared.
     pub relation: Relation,
-    /// With what.
     pub value: Written,
     /// How far it may be off.
     pub tolerance: Option<Tolerance>,

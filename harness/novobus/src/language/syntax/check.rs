@@ -15,7 +15,6 @@ use harness_sim::nd21::Mode;
 pub enum Check {
     /// The ring spells out the drive that saw the fault (ND21 9.7), after a limited number of zeros.
     Located {
-        /// Which drive.
         drive: DriveRange,
         /// Maximum number of zeros; any number if `None`.
         within: Option<Located>,
@@ -28,7 +27,6 @@ pub enum Check {
     Error {
         /// The cause.
         error: BusError,
-        /// Which drive.
         drive: DriveRange,
     },
     /// This number of check sequences came back whole.
@@ -41,7 +39,6 @@ pub enum Check {
         broken: bool,
         /// The place of the link in the text.
         link: Located,
-        /// Its ends.
         ends: LinkEnds,
     },
     /// The commands of the driver's last job have ended so.
@@ -50,7 +47,6 @@ pub enum Check {
     RulesKept(usize),
     /// This number of bytes was sent since the last check, in this time.
     Sent {
-        /// How many.
         bytes: Located,
         /// How long, to the last digit written.
         time: Option<Duration>,
@@ -92,9 +88,7 @@ impl Ending {
 /// What must hold of drives.
 #[derive(Clone, Debug)]
 pub struct DriveCheck {
-    /// Which drives.
     pub drives: DriveRange,
-    /// What.
     pub condition: Condition,
     /// Where it stands.
     pub span: TextSpan,

@@ -173,9 +173,7 @@ impl Header {
 /// The sizes of ring that a scenario can be played on.
 #[derive(Clone, Debug)]
 pub struct RingRange {
-    /// The smallest.
     pub smallest: u8,
-    /// The largest.
     pub largest: u8,
     /// The one to take where nothing else is asked for.
     pub default: u8,
@@ -216,7 +214,6 @@ impl RingRange {
 pub struct DriveRange {
     /// Which ring, counted from 0.
     pub ring: usize,
-    /// From.
     pub from: Located,
     /// To; `None` for a single drive.
     pub to: Option<Located>,
@@ -250,9 +247,7 @@ impl DriveRange {
 /// What drives hold or how they behave before anything is sent.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Which drives.
     pub drives: DriveRange,
-    /// What.
     pub what: SetupKind,
     /// Where it stands.
     pub span: TextSpan,

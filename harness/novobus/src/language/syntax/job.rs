@@ -14,7 +14,6 @@ pub enum JobStep {
     Recover(usize),
     /// `exchange K SEND = RECEIVE`: process data (ND21 9.4).
     Exchange {
-        /// Which drive.
         drive: DriveRange,
         /// What is sent.
         send: Pattern,
@@ -25,7 +24,6 @@ pub enum JobStep {
     Command {
         /// Which command.
         kind: JobKind,
-        /// Which drive.
         drive: DriveRange,
         /// The cell, where the command has one.
         place: Option<CellPlace>,

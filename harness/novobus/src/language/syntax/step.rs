@@ -38,9 +38,7 @@ impl From<RingStep> for Step<Novobus> {
 /// A cell that is recorded: `record drive 0 nist every 10ms`.
 #[derive(Clone, Debug)]
 pub struct CellRecording {
-    /// Of which drives.
     pub drives: DriveRange,
-    /// Which cell.
     pub place: CellPlace,
     /// When it is looked at.
     pub looks: Looks,
@@ -62,7 +60,6 @@ pub enum Looks {
 pub struct FaultStep {
     /// Which ring, counted from 0.
     pub ring: usize,
-    /// Where and what.
     pub what: FaultKind,
     /// At which byte, counted from 1.
     pub byte: Option<Located>,
@@ -86,15 +83,12 @@ impl FaultStep {
 /// Where a fault happens, and what.
 #[derive(Clone, Debug)]
 pub enum FaultKind {
-    /// On a link.
     Link(Located, LinkEnds, LinkFaultKind),
-    /// In a drive.
     Drive(Located, DriveFault),
     /// The drive's own monitoring reports an error.
     Error(Located, ErrorCode),
 }
 
-/// The ends of a link.
 #[derive(Clone, Debug)]
 pub struct LinkEnds {
     /// The transmitter; `None` for the master.

@@ -19,7 +19,6 @@ pub(crate) fn header(header: &Header) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// All lines of a header.
 pub(crate) fn lines(header: &Header) -> Vec<String> {
     let words = self::header(header).into_iter();
     let words = words.map(|(word, value)| format!("{word} {value}"));

@@ -14,7 +14,7 @@ use std::io::Write as _;
 impl Session {
     /// Takes the rig to its safe state and gives it back.
     #[must_use]
-    pub fn close(mut self) -> End {
+    pub(crate) fn close(mut self) -> End {
         self.end(false)
     }
 
@@ -27,7 +27,7 @@ impl Session {
     /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn. Where trouble has ended
     /// that, they are taken to their safe state all the same.
     #[must_use]
-    pub fn release(mut self) -> End {
+    pub(crate) fn release(mut self) -> End {
         if let Some(trouble) = self.link.trouble().filter(|_| !self.ended) {
             let error = trouble.is_of_the_bench();
             return self.end(error);

@@ -1,0 +1,120 @@
+//! Campaigns on rings, as the commands on campaigns of every bus see them.
+
+use super::class::{CaseClass, OUTCOMES};
+use super::fault::CaseFaults;
+use super::file::ExpectedCounts;
+use super::html::section;
+use super::replay::scenario;
+use super::report::{json, line, table};
+use super::run::{Campaign, PlayedCampaign};
+use harness_bench::campaign::pairs::FaultPairs;
+use harness_bench::campaign::{self, CaseFailure, OutcomeClass};
+use harness_bench::report::html::Section;
+
+impl campaign::Campaign for Campaign {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn texts(&self) -> Vec<&str> {
+        self.texts().to_vec()
+    }
+
+    fn names(&self) -> Vec<String> {
+        let drives = self.shape.drives;
+        self.cases.iter().map(|own| own.name(drives)).collect()
+    }
+
+    fn pinned(&self) -> Vec<(&'static str, u64)> {
+        let pinned = self.file.expect;
+        let all = pinned.cases.map(|count| ("cases", count));
+        let classes = CaseClass::ALL.iter();
+        let classes = classes.filter_map(|own| Some((own.name(), pinned.of(*own)?)));
+        all.into_iter().chain(classes).collect()
+    }
+
+    fn keep(&mut self, at: &dyn Fn(usize) -> bool) {
+        let mut places = 0..;
+        self.cases.retain(|_| places.next().is_some_and(at));
+        self.file.expect = ExpectedCounts::default();
+    }
+
+    fn cases(&self) -> usize {
+        self.cases.len()
+    }
+
+    fn scenario(&self, case: &str) -> Result<String, CaseFailure> {
+        let case = CaseFaults::from_name(case, self.shape.drives).map_err(CaseFailure::Unknown)?;
+        scenario(self, &case).map_err(|defect| CaseFailure::Defect(defect.to_string()))
+    }
+
+    fn run(
+        &self,
+        threads: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Box<dyn campaign::PlayedCampaign>, String> {
+        match self.run(threads, progress) {
+            Ok(played) => Ok(Box::new(played)),
+            Err(contradiction) => Err(contradiction.to_string()),
+        }
+    }
+
+    fn pairs(&self) -> Option<&dyn FaultPairs> {
+        Some(self)
+    }
+}
+
+fn class(place: usize) -> CaseClass {
+    CaseClass::ALL[place]
+}
+
+impl campaign::PlayedCampaign for PlayedCampaign {
+    fn name(&self) -> &str {
+        self.name.trim_end_matches(".toml")
+    }
+
+    fn classes(&self) -> &'static [OutcomeClass] {
+        &OUTCOMES
+    }
+
+    fn count(&self, place: usize) -> u64 {
+        self.count(class(place))
+    }
+
+    fn cases(&self) -> u64 {
+        self.outcomes.len() as u64
+    }
+
+    fn differs(&self) -> Vec<(&'static str, u64, u64)> {
+        let all = self.differs().into_iter();
+        let named = all.map(|own| {
+            let name = own.class.map_or("cases", CaseClass::name);
+            (name, own.expected, own.found)
+        });
+        named.collect()
+    }
+
+    fn size(&self) -> [(String, u64); 2] {
+        [
+            ("Drives".to_owned(), self.drives.into()),
+            ("Bytes".to_owned(), self.bytes),
+        ]
+    }
+
+    fn table(&self) -> String {
+        table(self)
+    }
+
+    fn lines(&self, place: usize) -> String {
+        let own = self.outcomes.iter().filter(|own| own.class == class(place));
+        own.map(|outcome| line(outcome, self.drives)).collect()
+    }
+
+    fn json(&self, place: Option<usize>) -> serde_json::Value {
+        json(self, place.map(class))
+    }
+
+    fn section(&self, number: usize) -> Section {
+        section(number, self)
+    }
+}
