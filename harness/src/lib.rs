@@ -35,8 +35,8 @@ pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 #[doc(hidden)]
 pub use harness_bench::{
     bus, bus_name, campaign, capture, explore, file, frames, guard, html, link, listen, manual,
-    medium, partition, port, qualify, regular, rig, scenario, serve, shown, signals, top, trouble,
-    web,
+    medium, partition, port, qualify, regular, report, rig, scenario, serve, shown, signals, top,
+    trouble, web,
 };
 use harness_proto::counted;
 #[doc(inline)]
@@ -57,5 +57,3 @@ pub mod evidence;
 pub mod fuzz;
 #[doc(hidden)]
 pub mod library;
-#[doc(hidden)]
-pub mod report;

@@ -10,7 +10,9 @@ pub use harness_nordac as nordac;
 pub use harness_novobus as novobus;
 pub use harness_unitek as unitek;
 
-use crate::bus::{Bus, SharedLine};
+pub(crate) use crate::bus::Bus;
+
+use crate::bus::SharedLine;
 use crate::bus_name::BusName;
 use crate::capture::Carries;
 use crate::command::drive::DriveCommand;

@@ -2,8 +2,8 @@
 
 use crate::command::play::play_entry;
 use crate::library::Entry;
-use crate::report::finding::explain;
-use crate::report::page::page;
+use crate::library::finding::explain;
+use crate::library::page::page;
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::BenchSize;
 use crate::scenario::source::Source;

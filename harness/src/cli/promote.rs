@@ -8,7 +8,7 @@ use crate::command::output::Output;
 use crate::command::play::{PlayedOnce, play_entry};
 use crate::explore::{ExploreError, bus_of};
 use crate::library::Entry;
-use crate::report::page::page;
+use crate::library::page::page;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;

@@ -4,7 +4,7 @@ use super::Error;
 use crate::command::play::{PlayedOnce, play_entry};
 use crate::counted::counted;
 use crate::library::Entry;
-use crate::report::page::page;
+use crate::library::page::page;
 use crate::scenario::files::sources;
 use crate::scenario::run::AtMismatch;
 use crate::scenario::source::{Source, line_number};

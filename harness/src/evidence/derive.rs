@@ -13,7 +13,7 @@ use super::verify::{Judged, Opened, is_name, scenarios};
 use crate::buses::report_of;
 use crate::capture::{MAX_FILE, read};
 use crate::library::Entry;
-use crate::report::finding::{class, explain};
+use crate::library::finding::{class, explain};
 use crate::scenario::problem;
 use crate::scenario::run::{Mismatch, Outcome};
 use crate::scenario::source::Source;

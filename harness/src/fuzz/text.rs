@@ -1,7 +1,6 @@
 //! The bodies of the fuzz targets for texts: scenarios and rig files.
 
-use crate::bus::Bus;
-use crate::buses::named;
+use crate::buses::{Bus, named};
 use crate::scenario::parse::bus;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::settled::BenchSize;

@@ -4,7 +4,7 @@
 //! with the print, cell by cell, and take the `.new` away (`INSTA_UPDATE=always` writes it in place).
 
 use harness::library::Entry;
-use harness::report::page::page;
+use harness::library::page::page;
 use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;

@@ -73,9 +73,7 @@ pub(crate) enum RawCommand {
         data: u8,
     },
     /// 10.4.
-    WriteIo {
-        code: u8,
-    },
+    WriteIo { code: u8 },
     /// 10.5.
     Reset,
 }

@@ -43,10 +43,7 @@ pub(crate) enum InterlockCondition {
         max: Option<f64>,
     },
     /// An input stays at a level.
-    Input {
-        input: Input,
-        level: Level,
-    },
+    Input { input: Input, level: Level },
 }
 
 /// A bound of an interlock, in the unit of its cell's scale.

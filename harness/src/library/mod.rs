@@ -1,7 +1,9 @@
-//! A scenario of any bus, read and settled.
+//! A scenario of any bus, read and settled; and texts of what came of it.
 
-use crate::bus::Bus;
-use crate::buses::named;
+pub mod finding;
+pub mod page;
+
+use crate::buses::{Bus, named};
 use crate::scenario::files;
 use crate::scenario::parse;
 use crate::scenario::problem::Problems;
