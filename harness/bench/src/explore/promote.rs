@@ -164,7 +164,7 @@ fn snapshot((verdict, why, page): (Verdict, String, String)) -> Result<String, E
         )));
     }
     Ok(format!(
-        "---\nsource: harness/tests/files/scenarios.rs\n---\n{}\n",
+        "---\nsource: harness/drivebench/tests/files/scenarios.rs\n---\n{}\n",
         page.trim_end_matches('\n')
     ))
 }

@@ -1,5 +1,5 @@
 //! Tests of the table and of the gate: what is denied, and where doubt begins, each seen by itself. What drives would make of
-//! all of it is the property's business (`harness/tests/bus/guard`).
+//! all of it is the property's business (`harness/novobus/src/tests/guard`).
 
 use super::{Cause, DriveAct, Guard, Limits, Need};
 use crate::nd21::ram;

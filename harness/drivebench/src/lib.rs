@@ -27,7 +27,7 @@
 #![doc = include_str!("../examples/serve_a_ring.rs")]
 //! ```
 //!
-//! The three stand in `harness/examples`; `cargo run --example play_scenario` runs one. The modules of the bench itself are not shown here
+//! The three stand in `harness/drivebench/examples`; `cargo run --example play_scenario` runs one. The modules of the bench itself are not shown here
 //! and may change with every version; `ARCHITECTURE.md` describes them, and `cargo doc --document-private-items` shows them.
 #![forbid(unsafe_code)]
 

@@ -43,7 +43,7 @@ fn pyprofibus_turns_the_motor() {
         let device = sim.address();
         let script = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/harness/tests/served/dp_master.py"
+            "/harness/drivebench/tests/served/dp_master.py"
         );
         let mut command = Command::new(&python);
         let output = command
@@ -169,7 +169,7 @@ fn profirust_turns_the_motor() {
     let address = first.rsplit(' ').next().expect("a word");
     let turned = profibus_master::turn(address);
     assert_eq!(turned.expect("it turns"), (0x0F37, 0x2000));
-    let page = include_str!("../../docs/profibus-master.md");
+    let page = include_str!("../../../docs/profibus-master.md");
     let program = include_str!("../../examples/profibus_master.rs");
     let shown = page
         .split("```rust\n")

@@ -115,7 +115,10 @@ fn imports_go_one_way() {
             ],
         ),
         ("harness/bench/src/report", &["crate::link"]),
-        ("harness/src/library", &["crate::link", "crate::cli"]),
+        (
+            "harness/drivebench/src/library",
+            &["crate::link", "crate::cli"],
+        ),
         ("harness/novobus/src/report", &["crate::link", "crate::cli"]),
     ];
     for (place, words) in forbidden {
@@ -179,7 +182,7 @@ const ROOMS: [&str; 35] = [
 #[test]
 fn rooms_import_from_rooms_in_front_of_them() {
     let mut seen = BTreeSet::new();
-    let all = ["harness/bench/src", "harness/src"].map(|top| {
+    let all = ["harness/bench/src", "harness/drivebench/src"].map(|top| {
         let base = root().join(top);
         files(top, "rs")
             .into_iter()
@@ -227,7 +230,11 @@ fn the_page_on_a_fourth_bus_holds() {
     let page = read(&root().join("CONTRIBUTING.md"));
     let start = page.find("## A fourth bus").expect("the page");
     let page = page[start..].split("\n## ").next().expect("its end");
-    let sources = ["harness/src", "harness/bench/src", "harness/sim/src"];
+    let sources = [
+        "harness/drivebench/src",
+        "harness/bench/src",
+        "harness/sim/src",
+    ];
     let sources = sources.into_iter().flat_map(|top| files(top, "rs"));
     let sources: String = sources.map(|path| read(&path)).collect();
     let rows = page.lines().filter(|line| line.starts_with("| ")).skip(1);
@@ -541,7 +548,7 @@ const TELL_TALE: [(&str, usize); 12] = [
 
 #[test]
 fn prose_is_plain() {
-    let own = ["harness/tests/text/tidy.rs"].map(|path| root().join(path));
+    let own = ["harness/drivebench/tests/text/tidy.rs"].map(|path| root().join(path));
     let sources = ["harness", "fuzz/src", "fuzz/fuzz_targets"]
         .iter()
         .flat_map(|top| files(top, "rs"));

@@ -17,11 +17,11 @@ fn main() {
 const TEXTS: [(&str, &str); 2] = [
     (
         "9.7-parity-error",
-        include_str!("../../corpora/scenarios/novobus/9.7-parity-error.scn"),
+        include_str!("../../../corpora/scenarios/novobus/9.7-parity-error.scn"),
     ),
     (
         "9.8-check-sequence",
-        include_str!("../../corpora/scenarios/novobus/9.8-check-sequence.scn"),
+        include_str!("../../../corpora/scenarios/novobus/9.8-check-sequence.scn"),
     ),
 ];
 

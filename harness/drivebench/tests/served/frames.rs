@@ -56,7 +56,7 @@ fn python_can_talks_to_a_drive() {
     ] {
         let script = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/harness/tests/served/python_can.py"
+            "/harness/drivebench/tests/served/python_can.py"
         );
         let mut command = Command::new(&python);
         let output = command.args([script, interface, &channel]).output();

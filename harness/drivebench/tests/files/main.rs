@@ -9,7 +9,7 @@ mod scenarios;
 
 datatest_stable::harness! {
     { test = scenarios::snapshot, root = "corpora/scenarios", pattern = r"\.scn$" },
-    { test = guide::refused, root = "harness/tests/files/guide/wrong", pattern = r"\.md$" },
+    { test = guide::refused, root = "harness/drivebench/tests/files/guide/wrong", pattern = r"\.md$" },
     { test = guide::commands, root = "harness/docs", pattern = r"\.md$" },
     { test = guide::options, root = "harness/docs", pattern = r"\.md$" },
     { test = guide::links, root = "harness/docs", pattern = r"\.md$" },

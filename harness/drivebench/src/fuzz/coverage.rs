@@ -18,7 +18,7 @@ use std::path::Path;
 static CORPUS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/fuzz");
 
 /// What was reached on hardware.
-const HARDWARE: &str = include_str!("../../../corpora/fuzz/hardware.toml");
+const HARDWARE: &str = include_str!("../../../../corpora/fuzz/hardware.toml");
 
 /// The largest input file that is read, in bytes.
 const MAX_SIZE: u64 = 1 << 20;

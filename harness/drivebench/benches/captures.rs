@@ -151,7 +151,7 @@ fn hundred() -> Vec<Trace> {
     use harness::library::Entry;
     use harness::scenario::run::AtMismatch;
     use harness::scenario::source::Source;
-    let text = include_str!("../../corpora/scenarios/novobus/9.8-check-sequence.scn");
+    let text = include_str!("../../../corpora/scenarios/novobus/9.8-check-sequence.scn");
     let source = Source::from_bytes("9.8".to_owned(), text.into()).expect("a text");
     let entry = Entry::new(source, None).expect("a scenario");
     let plan = &entry.settled;
