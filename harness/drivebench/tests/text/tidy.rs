@@ -261,7 +261,7 @@ fn a_name_is_one_type() {
     let mut declared: BTreeMap<String, BTreeMap<&str, BTreeSet<PathBuf>>> = BTreeMap::new();
     let tests = ["tests.rs", "_test.rs", "reference.rs"];
     let folders = [
-        "src",
+        "drivebench/src",
         "bench/src",
         "unitek/src",
         "nordac/src",

@@ -78,7 +78,7 @@ fn perform(command: &DriveCommand, output: &mut Output) -> Result<Exit, Failure>
 /// The exit code of an error: caused by a drive, by the bench or by the user.
 fn exit(error: &driver::Error) -> Exit {
     match error {
-        driver::Error::DriveError { .. }
+        driver::Error::InErrorMode { .. }
         | driver::Error::InReset { .. }
         | driver::Error::Interrupted { .. }
         | driver::Error::NotSet { .. }

@@ -62,7 +62,7 @@ impl OpenRings<'_> {
         }
         if byte & status::ERROR != 0 {
             let code = self.read_word(axis, ram::ERRORCODE)?;
-            return Err(Error::DriveError { axis, code });
+            return Err(Error::InErrorMode { axis, code });
         }
         Ok(())
     }

@@ -35,7 +35,7 @@ pub enum Error {
     NoSuchOrder,
     /// The drive is in error mode.
     #[error("drive {axis} is in error mode: {}", in_words(*code))]
-    DriveError {
+    InErrorMode {
         /// The drive.
         axis: Axis,
         /// Its error code.

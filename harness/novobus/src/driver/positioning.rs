@@ -24,7 +24,7 @@ impl OpenRings<'_> {
     /// The motor turns.
     ///
     /// # Errors
-    /// [`Error::InReset`], [`Error::DriveError`]; [`Error::Interrupted`] by a stop or a block, then `ps_v0` is as
+    /// [`Error::InReset`], [`Error::InErrorMode`]; [`Error::Interrupted`] by a stop or a block, then `ps_v0` is as
     /// before, where the line permits it; others see [`Error`].
     #[doc(alias = "NB_Referenzfahrt")]
     pub(crate) fn reference(&self, axis: Axis) -> Result<(), Error> {
@@ -201,7 +201,7 @@ impl OpenRings<'_> {
     /// Starts the positioning that has been calculated (13.2.3). The motor turns.
     ///
     /// # Errors
-    /// [`Error::DriveError`] where the calculation ended in an error (13.4); others see [`Error`].
+    /// [`Error::InErrorMode`] where the calculation ended in an error (13.4); others see [`Error`].
     #[doc(alias = "NB_StartPS")]
     pub(crate) fn start_ps(&self, axis: Axis) -> Result<(), Error> {
         // Step 1.

@@ -43,7 +43,8 @@ fn run(campaign: &Campaign) -> PlayedCampaign {
 
 fn snapshot(name: &str, page: &str) {
     insta::with_settings!({
-        snapshot_path => root().join("snapshots/campaigns"),
+        // As the list of snapshots that were used has it.
+        snapshot_path => root().canonicalize().expect("a folder").join("snapshots/campaigns"),
         prepend_module_to_snapshot => false,
         omit_expression => true,
     }, {
