@@ -13,8 +13,8 @@ pub(crate) use converse::{Conversation, StepEnd};
 pub(crate) use file::{CampaignStep, TelegramCampaignFile};
 
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::OutcomeClass;
-use harness_bench::campaign::line::{LineCampaign, LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::line::{LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::{Campaign, CaseFailure, OutcomeClass, PlayedCampaign};
 use harness_proto::nordac::PpoType;
 use harness_sim::octet_segment::{LineFault, LineFaultAt};
 use include_dir::{Dir, include_dir};
@@ -260,13 +260,47 @@ fn times(count: u64) -> String {
     }
 }
 
-impl LineCampaign for TelegramCampaign {
+impl TelegramCampaign {
+    /// Plays every case, in order; `progress` is called behind each.
+    ///
+    /// # Errors
+    /// A case cannot be played: a defect of the bench.
+    fn played(&self, progress: &dyn Fn(u64)) -> Result<PlayedLine, String> {
+        let play = |case: &TelegramCase| {
+            let outcome = self.outcome(case);
+            progress(1);
+            outcome.ok_or_else(|| self.defect(case))
+        };
+        let outcomes: Result<Vec<_>, _> = self.cases.iter().map(play).collect();
+        Ok(PlayedLine {
+            name: self.name.trim_end_matches(".toml").to_owned(),
+            bus: BusName::Nordac.name(),
+            title: self.file.title.clone(),
+            units: "telegrams",
+            count: self.telegrams(),
+            heading: "First octets",
+            classes: &CLASSES,
+            expect: self.pinned(),
+            outcomes: outcomes?,
+        })
+    }
+
+    fn defect(&self, case: &TelegramCase) -> String {
+        format!(
+            "{}: the case {} cannot be played; please report it",
+            self.name,
+            case.name()
+        )
+    }
+}
+
+impl Campaign for TelegramCampaign {
     fn name(&self) -> &str {
         &self.name
     }
 
-    fn text(&self) -> &str {
-        &self.text
+    fn texts(&self) -> Vec<&str> {
+        vec![&self.text]
     }
 
     fn names(&self) -> Vec<String> {
@@ -289,30 +323,19 @@ impl LineCampaign for TelegramCampaign {
         self.cases.len()
     }
 
-    fn scenario(&self, case: &str) -> Result<String, String> {
+    fn scenario(&self, case: &str) -> Result<String, CaseFailure> {
         let case = case_of(&self.cases, case, TelegramCase::name)?;
         let played = self.outcome(&case).zip(self.play(case));
         let (outcome, (_, conversation)) =
-            played.ok_or_else(|| "the case cannot be played".to_owned())?;
+            played.ok_or_else(|| CaseFailure::Defect(self.defect(&case)))?;
         Ok(case::scenario(self, (&case, &outcome), &conversation))
     }
 
-    fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine {
-        let play = |case: &TelegramCase| {
-            let outcome = self.outcome(case);
-            progress(1);
-            outcome
-        };
-        PlayedLine {
-            name: self.name.trim_end_matches(".toml").to_owned(),
-            bus: BusName::Nordac.name(),
-            title: self.file.title.clone(),
-            units: "telegrams",
-            count: self.telegrams(),
-            heading: "First octets",
-            classes: &CLASSES,
-            expect: self.pinned(),
-            outcomes: self.cases.iter().filter_map(play).collect(),
-        }
+    fn run(
+        &self,
+        _: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Box<dyn PlayedCampaign>, String> {
+        Ok(Box::new(self.played(progress)?))
     }
 }

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::language::Nordac;
-use harness_bench::campaign::PlayedCampaign as _;
 use harness_bench::campaign::line::replayed;
 
 /// The page with the figures.
@@ -41,7 +40,7 @@ fn have_the_figures_that_they_pin<'n>(names: impl IntoIterator<Item = &'n String
         let expect = &campaign.file.expect;
         let pinned = CLASSES.map(|class| *expect.get(class.name).expect("every class is pinned"));
         assert_eq!(expect.get("cases"), Some(&pinned.iter().sum()), "{name}");
-        let played = campaign.run(&|_| {});
+        let played = campaign.played(&|_| {}).expect("every case");
         if !played.differs().is_empty() {
             wrong.push_str(&played.table());
         }
@@ -88,7 +87,7 @@ fn cases_are_scenarios(step: usize) {
 /// The class of the only case that has this name.
 fn class(steps: &str, faults: &str, more: &str, name: &str) -> &'static str {
     let campaign = TelegramCampaign::new("a", &text(steps, faults, more)).expect("a campaign");
-    let played = campaign.run(&|_| {});
+    let played = campaign.played(&|_| {}).expect("every case");
     let mut found = played.outcomes.iter().filter(|own| own.case == name);
     CLASSES[found.next().expect("a case of this name").class].name
 }

@@ -11,8 +11,8 @@ pub(crate) use converse::{Conversation, JobEnd};
 pub(crate) use file::{CampaignStep, FrameCampaignFile};
 
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::OutcomeClass;
-use harness_bench::campaign::line::{LineCampaign, LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::line::{LineOutcome, PlayedLine, case_of};
+use harness_bench::campaign::{Campaign, CaseFailure, OutcomeClass, PlayedCampaign};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};
 use std::fmt;
@@ -260,13 +260,35 @@ impl FrameOutcome {
     }
 }
 
-impl LineCampaign for FrameCampaign {
+impl FrameCampaign {
+    /// Plays every case, in order; `progress` is called behind each.
+    fn played(&self, progress: &dyn Fn(u64)) -> PlayedLine {
+        let play = |case: &FrameCase| {
+            let outcome = self.play(*case).line();
+            progress(1);
+            outcome
+        };
+        PlayedLine {
+            name: self.name.trim_end_matches(".toml").to_owned(),
+            bus: BusName::Unitek.name(),
+            title: self.file.title.clone(),
+            units: "frames",
+            count: self.frames(),
+            heading: "As candump writes it",
+            classes: &CLASSES,
+            expect: self.pinned(),
+            outcomes: self.cases.iter().map(play).collect(),
+        }
+    }
+}
+
+impl Campaign for FrameCampaign {
     fn name(&self) -> &str {
         &self.name
     }
 
-    fn text(&self) -> &str {
-        &self.text
+    fn texts(&self) -> Vec<&str> {
+        vec![&self.text]
     }
 
     fn names(&self) -> Vec<String> {
@@ -291,28 +313,17 @@ impl LineCampaign for FrameCampaign {
         self.cases.len()
     }
 
-    fn scenario(&self, case: &str) -> Result<String, String> {
+    fn scenario(&self, case: &str) -> Result<String, CaseFailure> {
         let case = case_of(&self.cases, case, ToString::to_string)?;
         Ok(case::scenario(self, &self.play(case)))
     }
 
-    fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine {
-        let play = |case: &FrameCase| {
-            let outcome = self.play(*case).line();
-            progress(1);
-            outcome
-        };
-        PlayedLine {
-            name: self.name.trim_end_matches(".toml").to_owned(),
-            bus: BusName::Unitek.name(),
-            title: self.file.title.clone(),
-            units: "frames",
-            count: self.frames(),
-            heading: "As candump writes it",
-            classes: &CLASSES,
-            expect: self.pinned(),
-            outcomes: self.cases.iter().map(play).collect(),
-        }
+    fn run(
+        &self,
+        _: usize,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Box<dyn PlayedCampaign>, String> {
+        Ok(Box::new(self.played(progress)))
     }
 }
 

@@ -6,10 +6,9 @@
 mod html;
 mod report;
 
-use super::{Campaign, CaseFailure, OutcomeClass, PlayedCampaign};
+use super::{CaseFailure, OutcomeClass, PlayedCampaign};
 use crate::report::html::Section;
 use harness_proto::time::Instant;
-use std::fmt::Debug;
 
 /// From this gravity on a case stands among the worst.
 const SERIOUS: u8 = 4;
@@ -97,74 +96,6 @@ impl PlayedLine {
     }
 }
 
-/// A campaign that was read, and whose conversation was played without a fault.
-pub trait LineCampaign: Debug {
-    /// Its name, for messages: a path, or the name of a built-in one.
-    fn name(&self) -> &str;
-
-    /// The text of its file.
-    fn text(&self) -> &str;
-
-    /// The names of its cases, in order.
-    fn names(&self) -> Vec<String>;
-
-    /// The figures that its file pins: of a class, or of all `cases`.
-    fn pinned(&self) -> Vec<(&'static str, u64)>;
-
-    /// Keeps only the cases at the places for which this is true, and no pinned figure, as these are of all cases.
-    fn keep(&mut self, at: &dyn Fn(usize) -> bool);
-
-    /// How many cases it has.
-    fn cases(&self) -> usize;
-
-    /// The scenario that replays the case of this name: the fault, what the master sent in this case, and what it received.
-    ///
-    /// # Errors
-    /// There is no such case, in a sentence with the remedy.
-    fn scenario(&self, case: &str) -> Result<String, String>;
-
-    /// Plays every case, in order; `progress` is called behind each.
-    fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine;
-}
-
-impl<C: LineCampaign> Campaign for C {
-    fn name(&self) -> &str {
-        LineCampaign::name(self)
-    }
-
-    fn texts(&self) -> Vec<&str> {
-        vec![self.text()]
-    }
-
-    fn names(&self) -> Vec<String> {
-        LineCampaign::names(self)
-    }
-
-    fn pinned(&self) -> Vec<(&'static str, u64)> {
-        LineCampaign::pinned(self)
-    }
-
-    fn keep(&mut self, at: &dyn Fn(usize) -> bool) {
-        LineCampaign::keep(self, at);
-    }
-
-    fn cases(&self) -> usize {
-        LineCampaign::cases(self)
-    }
-
-    fn scenario(&self, case: &str) -> Result<String, CaseFailure> {
-        LineCampaign::scenario(self, case).map_err(CaseFailure::Unknown)
-    }
-
-    fn run(
-        &self,
-        _: usize,
-        progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Box<dyn PlayedCampaign>, String> {
-        Ok(Box::new(LineCampaign::run(self, progress)))
-    }
-}
-
 impl PlayedCampaign for PlayedLine {
     fn name(&self) -> &str {
         &self.name
@@ -217,13 +148,13 @@ pub fn case_of<C: Copy>(
     cases: &[C],
     name: &str,
     named: impl Fn(&C) -> String,
-) -> Result<C, String> {
+) -> Result<C, CaseFailure> {
     let found = cases.iter().find(|own| named(own) == name);
     found.copied().ok_or_else(|| {
         let such = cases.first().map(named).unwrap_or_default();
-        format!(
+        CaseFailure::Unknown(format!(
             "there is no case `{name}`; a name that --format json lists expected, such as `{such}`"
-        )
+        ))
     })
 }
 
@@ -253,7 +184,7 @@ pub fn time_of_case(at: Instant) -> String {
 /// Plays the scenario of a case, which a right drive must meet and which states its class: the text, and what the line carried.
 #[cfg(any(test, feature = "trials"))]
 pub fn replayed<L: crate::scenario::language::Language>(
-    campaign: &dyn LineCampaign,
+    campaign: &dyn super::Campaign,
     case: &str,
     class: OutcomeClass,
 ) -> (String, harness_sim::record::Trace) {
