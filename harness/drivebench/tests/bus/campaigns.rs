@@ -1,25 +1,8 @@
 //! `drivebench campaign` as a stranger uses it.
 
+use crate::typed::{drivebench, stderr, stdout};
 use serde_json::Value;
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("text")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).expect("text")
-}
 
 /// Two bits of one byte of process data, on one link.
 fn file(test: &str, more: &str) -> PathBuf {

@@ -1,28 +1,8 @@
 //! The program as a stranger uses it: streams, exit codes, messages.
 
+use crate::typed::{code, drivebench, stderr, stdout};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().expect("the program ended by itself")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("text")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).expect("text")
-}
+use std::process::{Command, Stdio};
 
 /// A file in a folder of this test's own.
 fn file(test: &str, name: &str, text: impl AsRef<[u8]>) -> PathBuf {

@@ -1,10 +1,11 @@
 //! What helps a user who starts: `--help`, suggestions, completions, counts, and terminals without colours.
 
+use crate::typed::{drivebench, stderr, stdout};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 use std::io::Read as _;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
@@ -13,18 +14,6 @@ fn command(arguments: &[&str]) -> Command {
         .current_dir(std::env::temp_dir())
         .stdin(Stdio::null());
     command
-}
-
-fn drivebench(arguments: &[&str]) -> Output {
-    command(arguments).output().expect("the program starts")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]

@@ -20,4 +20,6 @@ mod python;
 mod reports;
 mod rig;
 mod tidy;
+#[path = "../common/typed.rs"]
+mod typed;
 mod unitek;

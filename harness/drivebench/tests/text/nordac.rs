@@ -1,20 +1,7 @@
 //! Scenarios of NORDAC inverters as a stranger plays them: commands, traces, reports, evidence.
 
+use crate::typed::run;
 use std::path::Path;
-use std::process::{Command, Stdio};
-
-/// The exit code, standard output and standard error.
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(env!("CARGO_TARGET_TMPDIR"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    let code = output.status.code().expect("it ended by itself");
-    (code, text(output.stdout), text(output.stderr))
-}
 
 fn json(arguments: &[&str]) -> serde_json::Value {
     let (code, text, complaint) = run(arguments);

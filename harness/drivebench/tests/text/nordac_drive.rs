@@ -1,21 +1,7 @@
 //! Commands on simulated NORDAC inverters as people use them.
 
+use crate::typed::run;
 use std::path::Path;
-use std::process::{Command, Stdio};
-
-/// The exit code, standard output and standard error.
-#[track_caller]
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(env!("CARGO_TARGET_TMPDIR"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    let code = output.status.code().expect("it ended by itself");
-    (code, text(output.stdout), text(output.stderr))
-}
 
 /// A command on `sim:nordac` that succeeds; what it prints.
 #[track_caller]

@@ -1,24 +1,7 @@
 //! Scenarios of UNITEK drives as a stranger plays them: commands, traces, reports, evidence.
 
+use crate::typed::run;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(env!("CARGO_TARGET_TMPDIR"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
-}
-
-/// The exit code, standard output and standard error.
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = drivebench(arguments);
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    let code = output.status.code().expect("it ended by itself");
-    (code, text(output.stdout), text(output.stderr))
-}
 
 /// The form that the language's core fixes: times in microseconds, an identifier, `#`, data.
 #[test]

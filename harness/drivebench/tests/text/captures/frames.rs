@@ -1,29 +1,9 @@
 //! Captures of a CAN bus: written in every form, read back, compared, and read by tshark with the dissector.
 
-use super::file;
+use super::{ended, file, plain, said};
 use crate::debian::has;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
-    command.args(arguments).output().expect("the program")
-}
-
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-#[track_caller]
-fn ended(output: &Output, code: i32) -> String {
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{errors}{}", text(output));
-    format!("{}{errors}", text(output))
-}
-
-fn plain(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
+use crate::typed::drivebench;
+use std::process::Command;
 
 /// Requests, replies, writes, a cycle, an event, every unit, and lengths that the manual does not print.
 const EVERY_KIND: &str = "\
@@ -85,7 +65,7 @@ fn frames_are_written_read_and_compared() {
         ended(&written, 0);
         path
     });
-    let table = text(&drivebench(&["trace", plain(&scenario)]));
+    let table = said(&drivebench(&["trace", plain(&scenario)]));
     for capture in [&pcapng, &candump, &json] {
         let same = drivebench(&[
             "diff",
@@ -183,7 +163,7 @@ fn tshark_reads_frames_of_drives() {
     ];
     command.args(fields.iter().flat_map(|field| ["-e", field]));
     let output = command.output().expect("it is there");
-    let rows = text(&output);
+    let rows = said(&output);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(
         !rows.contains("Lua Error") && !errors.contains("Lua:"),

@@ -20,6 +20,7 @@ use harness_proto::line::LineError;
 use harness_sim::record::LineByte;
 
 use std::path::{Path, PathBuf};
+use std::process::Output;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -96,3 +97,20 @@ const DAMAGED: &str = "title damage\nring 2\n\
     ! 1->0 byte 3: flip 2\n! 1->0 byte 5: flip p\n! 1->0 byte 7: flip s\n! 1->0 byte 9: break 300us\n\
     ! 1->0 byte 12: overrun\n! 1->0 byte 14: drop\n! 1->0 byte 16: insert 55\n! 1->0 byte 18: replace 81\n\
     ! 1->0 byte 20: duplicate\n> 80*30\n";
+
+/// On standard output.
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// It ended with this exit code; what it said on both streams.
+#[track_caller]
+fn ended(output: &Output, code: i32) -> String {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{errors}{}", said(output));
+    format!("{}{errors}", said(output))
+}
+
+fn plain(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}

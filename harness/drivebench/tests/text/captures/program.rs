@@ -1,28 +1,8 @@
 //! The commands as a stranger uses them.
 
 use super::file;
+use crate::typed::{code, drivebench, stderr, stdout};
 use std::process::{Command, Output, Stdio};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().expect("the program ended by itself")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 #[test]
 fn every_form_goes_into_a_file_and_comes_back() {

@@ -1,29 +1,10 @@
 //! Captures of PROFIBUS: written, read back, compared, made into a scenario, and read by tshark with the dissector.
 
-use super::file;
+use super::{ended, file, plain, said};
 use crate::debian::has;
+use crate::typed::drivebench;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn drivebench(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
-    command.args(arguments).output().expect("the program")
-}
-
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-#[track_caller]
-fn ended(output: &Output, code: i32) -> String {
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{errors}{}", text(output));
-    format!("{}{errors}", text(output))
-}
-
-fn plain(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
+use std::process::Command;
 
 /// FDL status, every service of a start, PPO1 and PPO4, tasks and refusals, Global_Control, a token, a repetition, and telegrams that are none:
 /// a lost byte, a wrong FCS, a wrong parity bit, lengths that differ, an end that is missing.
@@ -255,7 +236,7 @@ fn dissected(capture: &Path, options: &[&str], fields: &[&str]) -> Vec<String> {
     command.args(options);
     command.args(fields.iter().flat_map(|field| ["-e", field]));
     let output = command.output().expect("it is there");
-    let rows = text(&output);
+    let rows = said(&output);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(
         output.status.success() && !rows.contains("Lua Error") && !errors.contains("Lua:"),
