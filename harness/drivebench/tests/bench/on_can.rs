@@ -5,10 +5,11 @@ use crate::edits;
 use crate::program::{Desk, ended, said};
 use std::process::{Command, Output};
 
-const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n";
+pub(crate) const ALL: &str =
+    "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n";
 
 /// A rig with one simulated drive, set up by a line.
-fn desk(setup: &str, limits: &str) -> Desk {
+pub(crate) fn desk(setup: &str, limits: &str) -> Desk {
     let setup = match setup {
         "" => String::new(),
         line => format!("\"drive 1 {line}\""),

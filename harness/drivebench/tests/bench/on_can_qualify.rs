@@ -1,22 +1,9 @@
 //! Qualifications of simulated UNITEK drives: a correct drive is not blamed and its open points are settled, a wrong one is named, and the
 //! record bears both out.
 
+use crate::on_can::{ALL, desk};
 use crate::program::{Desk, ended, said};
 use std::process::Output;
-
-const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n";
-
-/// A rig with one simulated drive, set up by a line.
-fn desk(setup: &str, limits: &str) -> Desk {
-    let setup = match setup {
-        "" => String::new(),
-        line => format!("\"drive 1 {line}\""),
-    };
-    Desk::of_file(&format!(
-        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n\
-         [sim]\nbus = \"unitek\"\nsetup = [{setup}]\n[limits]\n{limits}"
-    ))
-}
 
 /// Qualifies by the scenarios of example 2, and by the conversations.
 fn qualify(desk: &Desk) -> Output {
