@@ -26,7 +26,7 @@ pub fn page(all: &[Box<dyn PlayedCampaign>]) -> String {
         html.line(
             "p",
             &[],
-            "A case is a conversation played with one fault, or two. A map shows the gravest class of all cases at a place.",
+            "Each case is the conversation with one fault or two. A map shows the most serious class of the cases at a place.",
         );
         for bus in &buses {
             letters(html, bus[0].1.classes());

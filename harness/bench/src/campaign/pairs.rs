@@ -221,7 +221,7 @@ fn interval(part: u64, sample: u64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::interval;
+    use super::{PlayedPairs, interval};
 
     /// Figures of Wilson's interval as tables print them.
     #[test]
@@ -237,5 +237,26 @@ mod tests {
         close(interval(10, 10), (0.7225, 1.0));
         close(interval(0, 0), (0.0, 1.0));
         close(interval(81, 263), (0.2553, 0.3662));
+    }
+
+    /// Counts of a file that are in another order, or of which one is missing, are no pairs: they would be taken for those of other classes.
+    #[test]
+    fn names_of_pairs_are_all_there_in_their_order() {
+        let names = ["one byte", "one link", "two links"].map(|apart| {
+            let classes = ["located", "corrupted"].into_iter();
+            classes.map(move |class| format!("{class}, {apart}"))
+        });
+        let names: Vec<String> = names.into_iter().flatten().collect();
+        let named: Vec<(&str, u64)> = names.iter().map(String::as_str).zip(1..).collect();
+        let (classes, counts) = PlayedPairs::of_named(&named).expect("pairs");
+        assert_eq!(classes, ["located", "corrupted"]);
+        assert_eq!(counts, [[1, 2], [3, 4], [5, 6]]);
+        for (one, other) in [(0, 1), (2, 3), (1, 5)] {
+            let mut exchanged = named.clone();
+            exchanged.swap(one, other);
+            assert_eq!(PlayedPairs::of_named(&exchanged), None, "{one} and {other}");
+        }
+        assert_eq!(PlayedPairs::of_named(&named[..5]), None);
+        assert_eq!(PlayedPairs::of_named(&[]), None);
     }
 }

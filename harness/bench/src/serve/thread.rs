@@ -28,7 +28,12 @@ impl ServedThread {
     ) -> Result<Self, ServeError> {
         let (handle, ending) = EndRequest::by_handle().map_err(ServeError::Wait)?;
         let (told, lines) = channel();
-        let count = options.places.len();
+        // A place that is nowhere has no line.
+        let told_of = options
+            .places
+            .iter()
+            .filter(|own| **own != ServedAt::Nowhere);
+        let count = told_of.count();
         let thread =
             spawn(move || serve_until(ending, server, &options, &mut Teller(told)).map(|_end| ()));
         let mut places = Vec::new();

@@ -40,16 +40,24 @@ fn conversations(plan: &Plan, link: &mut dyn Link) -> Vec<Conversation> {
     Conversation::all(&events, byte_time, true)
 }
 
+/// The built-in scenarios for rings of ten drives at most.
+fn short_rings() -> impl Iterator<Item = (String, Plan)> {
+    let read = |source: Source| {
+        let name = source.name.clone();
+        (
+            name,
+            RingScenario::new(source, None).expect("no mistakes").plan,
+        )
+    };
+    let all = built_in_sources().map(read);
+    all.filter(|(_, plan)| plan.rings[0].drives() <= 10)
+}
+
 /// ND21 9 and 10: every built-in scenario that needs nothing but the bus, on a ring that is its own model.
 #[test]
 fn a_ring_is_its_own_twin() {
     let mut compared = 0;
-    for source in built_in_sources() {
-        let name = source.name.clone();
-        let plan = RingScenario::new(source, None).expect("no mistakes").plan;
-        if plan.rings[0].drives() > 10 {
-            continue;
-        }
+    for (name, plan) in short_rings() {
         let mut link = bench(&plan);
         let mut events: Vec<LinkEvent> = Vec::new();
         if lacks(&plan, &Recording::new(&mut link, &mut events)).is_some() {
@@ -98,12 +106,7 @@ fn drives_that_are_silent_in_their_self_test_are_reset() {
 #[test]
 fn a_record_is_played_again() {
     let mut played = 0;
-    for source in built_in_sources() {
-        let name = source.name.clone();
-        let plan = RingScenario::new(source, None).expect("no mistakes").plan;
-        if plan.rings[0].drives() > 10 {
-            continue;
-        }
+    for (name, plan) in short_rings() {
         let mut link = bench(&plan);
         let mut events: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut events);

@@ -69,3 +69,17 @@ fn wire(address: &PortAddress, marks: bool) -> Wire {
     };
     open(&settings).unwrap_or_else(|error| panic!("{address}: {error}"))
 }
+
+/// A ring that only a page shows has no place that is waited for.
+#[test]
+fn a_ring_that_is_served_nowhere_has_no_place() {
+    let source = Source::from_bytes("setup".to_owned(), Vec::new()).expect("a text");
+    let (plan, link) = simulated(&source, Some(&[2])).expect("a setup");
+    let server = Server::new(plan, link, Pace::Line, ErrorMarks::None);
+    let options = ServeOptions {
+        places: vec![ServedAt::Nowhere],
+        ..ServeOptions::default()
+    };
+    let thread = ServedThread::start(server, options).expect("a thread");
+    assert_eq!(thread.places(), [""; 0]);
+}
