@@ -197,7 +197,7 @@ fn begun_at(tape: &Tape, first: usize, octet: usize) -> Capture {
 
 /// Built-in scenarios of a bus, each `step`th from `first` on, whose captures are not failures when they are whole.
 fn right_captures(bus: &str, first: usize, step: usize) -> Vec<(String, Tape)> {
-    let folder = format!("{}/corpora/scenarios/{bus}", env!("CARGO_MANIFEST_DIR"));
+    let folder = format!("{}/corpora/scenarios/{bus}", env!("TREE"));
     let files = std::fs::read_dir(folder).expect("a folder");
     let mut names: Vec<String> = files
         .map(|own| own.expect("a file").path())
@@ -447,7 +447,7 @@ fn a_restart_takes_its_time() {
     let unitek = "title Wrong\nsource unitek 5.2\nbus unitek\ndrive 1\n\n\
          > 201 3D 1C 00\n< 181 1C 0A 00 xx\n> 201 1C 37 00\n> 201 3D 1C 00\n< 181 1C 37 00 xx\n\
          drive 1 restart\n> 201 3D 1C 00\n< 181 1C 0A 00 xx\n";
-    let folder = format!("{}/corpora/scenarios/nordac", env!("CARGO_MANIFEST_DIR"));
+    let folder = format!("{}/corpora/scenarios/nordac", env!("TREE"));
     let nordac = std::fs::read_to_string(format!("{folder}/nordac-open-reinit-at-power-up.scn"));
     for text in [unitek.to_owned(), nordac.expect("a scenario")] {
         let found = |wait: &str| {

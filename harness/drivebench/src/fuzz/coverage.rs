@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// The inputs that the binary carries.
-static CORPUS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/fuzz");
+static CORPUS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/fuzz");
 
 /// What was reached on hardware.
 const HARDWARE: &str = include_str!("../../../../corpora/fuzz/hardware.toml");

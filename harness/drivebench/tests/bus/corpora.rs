@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpora/fuzz")
+    Path::new(env!("TREE")).join("corpora/fuzz")
 }
 
 #[test]
@@ -85,9 +85,7 @@ fn kept(path: &Path, text: &str) {
 
 /// What a script prints, by lines; it ends well.
 fn script(name: &str, arguments: &[&str]) -> Vec<String> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("scripts")
-        .join(name);
+    let path = Path::new(env!("TREE")).join("scripts").join(name);
     let output = Command::new(path).args(arguments).output();
     let output = output.expect("the script starts");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -172,7 +170,7 @@ fn every_folder_belongs_to_a_target() {
 fn the_corpus_reaches_every_reachable_transition() {
     let coverage = Coverage::of_folder(&folder()).expect("a corpus");
     assert!(coverage.missing().is_empty(), "{}", coverage.sums());
-    let snapshot = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/fuzz/transitions.txt");
+    let snapshot = Path::new(env!("TREE")).join("snapshots/fuzz/transitions.txt");
     kept(&snapshot, &coverage.page());
 }
 

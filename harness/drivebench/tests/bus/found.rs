@@ -36,7 +36,7 @@ struct Found {
 
 impl Deviations {
     fn file(&self) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(self.file)
+        Path::new(env!("TREE")).join(self.file)
     }
 
     fn scenarios(&self) -> BTreeMap<String, Source> {

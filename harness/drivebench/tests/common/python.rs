@@ -6,7 +6,7 @@ use std::process::Command;
 /// A Python that has these modules and pyserial: that of `DRIVEBENCH_PYTHON`, that of `.ci/tools`, or the system's. Without one, prints that
 /// the test `who` is skipped.
 pub(crate) fn with(modules: &str, who: &str) -> Option<PathBuf> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python/bin/python");
+    let own = Path::new(env!("TREE")).join("target/python/bin/python");
     let given = std::env::var_os("DRIVEBENCH_PYTHON").map(PathBuf::from);
     let imports = |python: &PathBuf| {
         let mut command = Command::new(python);

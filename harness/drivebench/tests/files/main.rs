@@ -8,10 +8,10 @@ mod python;
 mod scenarios;
 
 datatest_stable::harness! {
-    { test = scenarios::snapshot, root = "corpora/scenarios", pattern = r"\.scn$" },
-    { test = guide::refused, root = "harness/drivebench/tests/files/guide/wrong", pattern = r"\.md$" },
-    { test = guide::commands, root = "harness/docs", pattern = r"\.md$" },
-    { test = guide::options, root = "harness/docs", pattern = r"\.md$" },
-    { test = guide::links, root = "harness/docs", pattern = r"\.md$" },
-    { test = guide::citations, root = "harness/docs", pattern = r"\.md$" },
+    { test = scenarios::snapshot, root = concat!(env!("TREE"), "/corpora/scenarios"), pattern = r"\.scn$" },
+    { test = guide::refused, root = concat!(env!("TREE"), "/harness/drivebench/tests/files/guide/wrong"), pattern = r"\.md$" },
+    { test = guide::commands, root = concat!(env!("TREE"), "/harness/docs"), pattern = r"\.md$" },
+    { test = guide::options, root = concat!(env!("TREE"), "/harness/docs"), pattern = r"\.md$" },
+    { test = guide::links, root = concat!(env!("TREE"), "/harness/docs"), pattern = r"\.md$" },
+    { test = guide::citations, root = concat!(env!("TREE"), "/harness/docs"), pattern = r"\.md$" },
 }

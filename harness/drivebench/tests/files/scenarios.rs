@@ -22,13 +22,13 @@ pub(crate) fn snapshot(path: &Path) -> datatest_stable::Result<()> {
     let folder = path
         .parent()
         .ok_or("a file in a folder")?
-        .strip_prefix("corpora")?;
+        .strip_prefix(concat!(env!("TREE"), "/corpora"))?;
     let name = path
         .file_stem()
         .and_then(|stem| stem.to_str())
         .ok_or("a name")?;
     insta::with_settings!({
-        snapshot_path => Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots").join(folder),
+        snapshot_path => Path::new(env!("TREE")).join("snapshots").join(folder),
         prepend_module_to_snapshot => false,
         omit_expression => true,
     }, {

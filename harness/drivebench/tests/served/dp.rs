@@ -42,7 +42,7 @@ fn pyprofibus_turns_the_motor() {
         let mut sim = start(&["--pty", terminal, "--setup", &setup]);
         let device = sim.address();
         let script = concat!(
-            env!("CARGO_MANIFEST_DIR"),
+            env!("TREE"),
             "/harness/drivebench/tests/served/dp_master.py"
         );
         let mut command = Command::new(&python);

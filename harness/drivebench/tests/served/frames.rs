@@ -55,7 +55,7 @@ fn python_can_talks_to_a_drive() {
         ("socketcand", socketcand),
     ] {
         let script = concat!(
-            env!("CARGO_MANIFEST_DIR"),
+            env!("TREE"),
             "/harness/drivebench/tests/served/python_can.py"
         );
         let mut command = Command::new(&python);

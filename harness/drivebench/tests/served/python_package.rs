@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 /// The folder of the package.
 fn package() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("harness/python")
+    Path::new(env!("TREE")).join("harness/python")
 }
 
 /// A command of this Python on the package, with the program of this build first on the path.

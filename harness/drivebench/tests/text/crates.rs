@@ -70,3 +70,41 @@ fn a_bus_exports_itself() {
         assert_eq!(exported, ["pub static BUS: Bus = Bus {"], "{name}");
     }
 }
+
+/// The crates that embed folders of this tree, each with these.
+pub(crate) fn embedding() -> Vec<(&'static str, Vec<String>)> {
+    let crates = ["bench", "novobus", "unitek", "nordac", "toy", "drivebench"].into_iter();
+    let folders = crates.map(|name| {
+        let sources = files(&format!("harness/{name}/src"), "rs");
+        let texts: Vec<_> = sources.iter().map(|source| read(source)).collect();
+        let named = texts
+            .iter()
+            .flat_map(|text| text.split("include_dir!(\"$").skip(1));
+        let folders = named.map(|rest| {
+            let path = rest
+                .strip_prefix("CARGO_MANIFEST_DIR/../../")
+                .expect("the tree");
+            path.split('"').next().expect("a path").to_owned()
+        });
+        (name, folders.collect::<Vec<_>>())
+    });
+    folders.filter(|(_, folders)| !folders.is_empty()).collect()
+}
+
+/// A new file in a folder that a crate embeds makes the crate be built again.
+#[test]
+fn embedded_folders_are_watched() {
+    let crates = embedding();
+    assert_eq!(crates.len(), 5, "{crates:?}");
+    for (name, folders) in crates {
+        let script = read(&root().join(format!("harness/{name}/build.rs")));
+        for folder in folders {
+            let watched = script.lines().any(|line| {
+                let path = line.split_once("rerun-if-changed=../../");
+                let path = path.and_then(|(_, rest)| rest.split('"').next());
+                path.is_some_and(|path| std::path::Path::new(&folder).starts_with(path))
+            });
+            assert!(watched, "harness/{name}/build.rs does not watch {folder}");
+        }
+    }
+}

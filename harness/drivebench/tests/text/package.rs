@@ -11,7 +11,7 @@ mod build_script;
 use std::path::Path;
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(env!("TREE"))
 }
 
 fn read(path: &str) -> String {
@@ -50,12 +50,9 @@ fn the_container_gets_all_sources() {
         let path = line.split_once("path = \"")?.1;
         path.split('"').next()
     });
-    let own = read("harness/drivebench/build.rs");
-    let watched = own.lines().filter_map(|line| {
-        let path = line.split_once("rerun-if-changed=")?.1;
-        path.split('"').next()
-    });
-    for path in named.chain(watched) {
+    let embedding = super::crates::embedding();
+    let embedded = embedding.iter().flat_map(|(_, folders)| folders);
+    for path in named.chain(embedded.map(String::as_str)) {
         let top = path.split('/').next().expect("a word");
         assert!(copied.contains(&top), "{path} is not copied");
     }

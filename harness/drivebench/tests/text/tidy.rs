@@ -19,7 +19,7 @@ const PINNED: [&str; 5] = ["8.", "9.", "10.", "13.", "14."];
 const NOT_IN_BYTES: [&str; 2] = ["nd21 13.1.5.1", "nd21 14.3.3 old"];
 
 pub(super) fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(env!("TREE"))
 }
 
 pub(super) fn files(folder: &str, ending: &str) -> Vec<PathBuf> {

@@ -153,7 +153,7 @@ fn what_was_kept_is_replayed() {
         0,
         "0 found",
     );
-    let corpus = concat!(env!("CARGO_MANIFEST_DIR"), "/corpora/fuzz/ring");
+    let corpus = concat!(env!("TREE"), "/corpora/fuzz/ring");
     let replay = ["fuzz", "replay", corpus, "--rig", "sim:3"];
     ended(&drivebench(&replay), 0, "0 found");
 }

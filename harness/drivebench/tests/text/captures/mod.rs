@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(env!("TREE"))
 }
 
 /// A file in a folder of these tests' own.

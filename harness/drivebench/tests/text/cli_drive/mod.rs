@@ -507,7 +507,7 @@ fn every_command_explains_itself() {
 /// The commands on drives that the guide lists run on a simulated ring.
 #[test]
 fn the_commands_of_the_guide_work() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("harness/docs/commands.md");
+    let page = Path::new(env!("TREE")).join("harness/docs/commands.md");
     let page = std::fs::read_to_string(page).expect("the page");
     let section = page.split("## Drives").nth(1).expect("the section");
     let block = section.split("```").nth(1).expect("the commands");

@@ -29,8 +29,7 @@ fn folder(name: &str) -> PathBuf {
 
 /// A built-in scenario's text.
 fn text(name: &str) -> String {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("corpora/scenarios/novobus/{name}.scn"));
+    let path = Path::new(env!("TREE")).join(format!("corpora/scenarios/novobus/{name}.scn"));
     std::fs::read_to_string(path).expect("a scenario")
 }
 

@@ -13,7 +13,7 @@ fn snapshot(name: &str, scenarios: &[(&str, String)]) {
     let parsed = parse(&html);
     sound(&parsed);
     let mut settings = insta::Settings::clone_current();
-    settings.set_snapshot_path(concat!(env!("CARGO_MANIFEST_DIR"), "/snapshots/html"));
+    settings.set_snapshot_path(concat!(env!("TREE"), "/snapshots/html"));
     settings.set_prepend_module_to_snapshot(false);
     settings.set_omit_expression(true);
     settings.bind(|| insta::assert_snapshot!(name, outline(&parsed)));

@@ -224,8 +224,7 @@ fn random_damage() {
         state ^= state << 17;
         usize::try_from(state % most as u64).expect("small")
     };
-    let kept =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("corpora/fuzz/record/read.jsonl");
+    let kept = std::path::Path::new(env!("TREE")).join("corpora/fuzz/record/read.jsonl");
     let text = std::fs::read(kept).expect("a record");
     for case in 0..600 {
         let mut lines: Vec<Vec<u8>> = text

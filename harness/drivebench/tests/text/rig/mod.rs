@@ -17,7 +17,7 @@ mod locks;
 mod port;
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(env!("TREE"))
 }
 
 fn read(text: &str) -> Result<Rig, Vec<String>> {

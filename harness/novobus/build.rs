@@ -1,0 +1,8 @@
+//! A new file in a folder that is embedded makes the crate be built again.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=../../corpora/campaigns");
+    println!("cargo::rerun-if-changed=../../corpora/probes");
+    println!("cargo::rerun-if-changed=../../corpora/qualify");
+}
