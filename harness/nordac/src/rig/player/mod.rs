@@ -135,6 +135,16 @@ pub(crate) struct Player {
     notes: Vec<AttemptNote>,
 }
 
+/// Slaves that are ready for a scenario.
+struct MadeReady {
+    /// Whether settings of the bus were switched for it.
+    switches: bool,
+    /// The scenario with shorter waits, which is played in its place.
+    shorter: Option<Own>,
+    /// Whether a fault came meanwhile.
+    faulted: bool,
+}
+
 impl Player {
     pub(super) fn of(
         slaves: Vec<RigSlave>,
@@ -275,41 +285,18 @@ impl Player {
         if let Err(error) = self.learn(link, again.is_none()) {
             return (AttemptCourse::Unanswered(error), false);
         }
-        if let Err(error) = self.look(own, link) {
-            return (AttemptCourse::Unanswered(error), false);
-        }
-        let begun = match again {
-            Some(switches) => Ok(Begun {
-                switches,
-                moved: BTreeSet::new(),
-                written: BTreeSet::new(),
-            }),
-            None => self.rehearsed(own),
+        let begun = match self.made_ready(own, link, again) {
+            // What the slaves keep of the time before is another thing now.
+            Ok(MadeReady { faulted: true, .. }) => self.made_ready(own, link, again),
+            begun => begun,
         };
-        let switches = match begun {
-            Ok(begun) => match self.other_station(&begun.moved, link) {
-                Ok(None) => {
-                    if again.is_none() {
-                        self.foretell(&begun);
-                    }
-                    begun.switches
-                }
-                Ok(Some(why)) => return (AttemptCourse::Skipped(why.into()), false),
-                Err(error) => return (AttemptCourse::Unanswered(error), false),
-            },
-            Err(why) => {
-                let skip = Skip::from(why).and(self.unlocks(own));
-                return (AttemptCourse::Skipped(skip), false);
-            }
+        let MadeReady {
+            switches, shorter, ..
+        } = match begun {
+            Ok(ready) => ready,
+            Err(gone) => return *gone,
         };
         let real = link.time_tolerance() > Span::ZERO;
-        let shorter = (self.qualifies && real).then(|| self.shortened(own, switches));
-        link.noted.begin_fresh();
-        let ready = self.prepare(own, link, switches);
-        self.before = Some(link.noted.received());
-        if let Err(error) = ready {
-            return (AttemptCourse::Unanswered(error), switches);
-        }
         link.noted.reach(link.now());
         link.begin();
         link.take_late();
@@ -321,6 +308,53 @@ impl Player {
         let plan = shorter.as_ref().map_or(&own.plan, |own| &own.plan);
         let outcome = play(plan, link, at_mismatch);
         (AttemptCourse::Played(Box::new(outcome)), switches)
+    }
+
+    /// Finds out whether right slaves meet a scenario, and makes the slaves of the rig ready for it.
+    ///
+    /// # Errors
+    /// What becomes of the attempt, and whether settings were switched.
+    fn made_ready(
+        &mut self,
+        own: &Own,
+        link: &mut Observed<'_>,
+        again: Option<bool>,
+    ) -> Result<MadeReady, Box<(AttemptCourse, bool)>> {
+        let unanswered = |switches| {
+            move |error: TalkError| Box::new((AttemptCourse::Unanswered(error), switches))
+        };
+        let skipped = |skip: Skip| Box::new((AttemptCourse::Skipped(skip), false));
+        self.look(own, link).map_err(unanswered(false))?;
+        let begun = match again {
+            Some(switches) => Begun {
+                switches,
+                moved: BTreeSet::new(),
+                written: BTreeSet::new(),
+            },
+            None => {
+                let begun = self.rehearsed(own);
+                begun.map_err(|why| skipped(Skip::from(why).and(self.unlocks(own))))?
+            }
+        };
+        let taken = self.other_station(&begun.moved, link);
+        if let Some(why) = taken.map_err(unanswered(false))? {
+            return Err(skipped(why.into()));
+        }
+        if again.is_none() {
+            self.foretell(&begun);
+        }
+        let switches = begun.switches;
+        let real = link.time_tolerance() > Span::ZERO;
+        let shorter = (self.qualifies && real).then(|| self.shortened(own, switches));
+        link.noted.begin_fresh();
+        let ready = self.prepare(own, link, switches);
+        self.before = Some(link.noted.received());
+        let faulted = ready.map_err(unanswered(switches))?;
+        Ok(MadeReady {
+            switches,
+            shorter,
+            faulted,
+        })
     }
 
     /// Reads the slaves, the first time, and `settles` what the manual leaves open.

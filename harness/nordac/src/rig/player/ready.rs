@@ -28,13 +28,15 @@ const FORGET: [u8; 2] = [1, 10];
 const FORGOTTEN: Span = Span::from_millis(150);
 
 impl Player {
-    /// Makes the slaves ready: output off, with the parameters of the header, and without a master, as after power-up.
+    /// Makes the slaves ready: output off, with the parameters of the header, and without a master, as after power-up. Returns whether a fault
+    /// came meanwhile, which the memory of a slave holds since then (5.7): one of a time-out, where the computer stood still before.
     pub(super) fn prepare(
         &self,
         own: &Own,
         link: &mut Observed<'_>,
         switches: bool,
-    ) -> Result<(), TalkError> {
+    ) -> Result<bool, TalkError> {
+        let mut faulted = false;
         let mut talk = Talk::new(Box::new(&mut *link), self.patience);
         for slave in &own.plan.setup.slaves {
             let known = self
@@ -98,6 +100,7 @@ impl Player {
                         talk.start(slave.address, ppo, None)?;
                     }
                     let zsw = idle((slave.address, ppo), &mut talk)?;
+                    faulted |= zsw & zsw::FAULT != 0;
                     self.without_fault((slave.address, ppo), zsw, &mut talk)?;
                     talk.start(slave.address, ppo, Some(FORGET))?;
                 }
@@ -108,7 +111,7 @@ impl Player {
                 }
             }
         }
-        Ok(())
+        Ok(faulted)
     }
 }
 

@@ -301,7 +301,7 @@ impl Player {
         let mut observed = Observed::new(&mut recording);
         let ready = self.prepare(own, &mut observed, other.switches);
         let outcome = match ready {
-            Ok(()) => {
+            Ok(_) => {
                 observed.begin();
                 if let Some(came) = other.came {
                     observed.noted.expect(came, observed.noted.fresh, true);

@@ -331,6 +331,23 @@ fn earlier_faults_accuse_no_slave() {
     assert!(why.contains("fault 10 was its last one (947)"), "{why}");
 }
 
+/// NORDAC 2.5.1, 5.7: where the computer stood still between two scenarios, the time-out comes while the slave is made ready for the second one,
+/// which its fault memory shows then.
+#[test]
+fn a_time_out_that_comes_meanwhile_accuses_no_slave() {
+    let armed = "slave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 STW=047E\n";
+    let counts = "slave 8\nslave 8 parameter 1621 = 2\nslave 8 parameter 1625 = 1s\nstart 8\nexchange 8 STW=047E\nwait 1100ms\n\
+                  read 8 1806.9 = 1\n";
+    for (paused, expected) in [(0, Verdict::Passed), (2_000, Verdict::Skipped)] {
+        let mut desk = Desk::new(0, &[], Limits::unlimited());
+        assert_eq!(verdict(&desk.text(armed)), Verdict::Passed);
+        let until = desk.line.now() + Span::from_millis(paused);
+        desk.line.wait(until);
+        let played = desk.text(counts);
+        assert_eq!(verdict(&played), expected, "{paused} ms: {:?}", played.0);
+    }
+}
+
 /// All scenarios of this bus, one behind another on inverters that are not switched off.
 #[test]
 #[ignore = "takes some minutes; .ci/nightly runs it"]
