@@ -4,4 +4,5 @@
 //! that the real ring gave. Drives of a ring have their own engine, in the folder of NOVOBUS.
 
 pub mod segment;
+pub mod walk;
 pub mod worlds;

@@ -23,6 +23,11 @@ pub trait Attempts {
     /// Its name, section and effect, with the drive.
     fn words(&self, deviation: &Self::Deviation) -> String;
 
+    /// What of the drives was walked and what was not, in lines; nothing where none is.
+    fn walked(&self) -> &str {
+        ""
+    }
+
     /// The attempts that were begun, in order.
     fn attempts(&self) -> Vec<Attempted>;
 
@@ -267,6 +272,7 @@ pub fn qualified<A: Attempts>(
         counted(received, frames),
         counted(settled + open, "open point"),
     ));
+    text.push_str(all.walked());
     if !whole {
         text.push_str("the run ended before everything was played\n");
     }

@@ -12,6 +12,9 @@ use std::sync::Arc;
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
 
+/// How often a scenario is played at most in which the computer was late each time.
+const MOST_LATE: usize = 4;
+
 /// How often a scenario that does not pass is played on a bus of frames in real time: a busy computer moves frames against each other.
 const ON_A_SEGMENT: u8 = 3;
 
@@ -209,7 +212,14 @@ impl Again {
             }
             // A busy computer is late sometimes, a drive at the same byte each time.
             Verdict::Marginal => played < MOST_UNTIMELY,
-            _ => attempts.iter().filter(|own| own.failed()).count() < most,
+            // So is it at a byte that a silence has changed.
+            _ => {
+                let (late, failed): (Vec<_>, Vec<_>) = attempts
+                    .iter()
+                    .filter(|own| own.failed())
+                    .partition(|own| own.outcome.shows_nothing);
+                failed.len() < most && late.len() < most.max(MOST_LATE)
+            }
         }
     }
 }
@@ -294,6 +304,26 @@ mod tests {
         assert_eq!(attempts(again, 2, &late), 4);
         let turns = [(Failed, ""), (Marginal, ""), (Failed, ""), (Marginal, "")];
         assert_eq!(attempts(again, 3, &turns), 4);
+    }
+
+    /// ND21 9.9: drives that monitor time-outs change their bytes behind a silence of the computer.
+    #[test]
+    fn a_late_computer_takes_no_attempt_from_what_fails() {
+        let late = || {
+            let mut own = attempt(Inconclusive, "");
+            own.outcome.shows_nothing = true;
+            own
+        };
+        let mut again = Again::new(true);
+        let mut more = |played: &[Attempt], most| again.after(played, most);
+        assert!(more(&[late()], 1));
+        assert!(more(&[late(), late(), late()], 2));
+        assert!(!more(&[late(), late(), late(), late()], 2));
+        assert!(!more(&[late(), attempt(Failed, "")], 1));
+        assert!(more(&[late(), attempt(Failed, ""), late()], 2));
+        assert!(!more(&[late(), attempt(Passed, "")], 2));
+        let played = vec![late(), late(), attempt(Passed, "")];
+        assert_eq!(PlayedScenario::of(played).outcome.verdict, Passed);
     }
 
     #[test]

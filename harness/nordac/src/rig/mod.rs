@@ -13,6 +13,7 @@ mod run;
 mod session;
 mod settle;
 pub(crate) mod talk;
+mod walk;
 
 pub(crate) use held::HeldBefore;
 pub(crate) use permitted::limits;

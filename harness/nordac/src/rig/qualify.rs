@@ -2,13 +2,16 @@
 
 use super::known::{Known, Values, value_of};
 use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
-use super::{RigSlave, slaves};
+use super::walk::{State, inputs, walk_of, walked};
+use super::{RigSlave, limits, slaves};
 use harness_bench::qualify::segment::{
     Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
 };
+use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
+use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nordac::guard::Limits;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
@@ -164,7 +167,32 @@ pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
         });
         sources.collect::<Vec<_>>()
     };
-    slaves.iter().flat_map(of_slave).collect()
+    let kept = slaves.iter().flat_map(of_slave);
+    let walks = walks(rig).into_iter().flat_map(|(slave, own)| {
+        let parts = own.walk.parts.iter().enumerate();
+        let walked = parts.map(|(place, part)| Source {
+            name: format!("{CONVERSATION}{}", own.name(place)),
+            text: walked(slave, &part.lines).into(),
+        });
+        walked.collect::<Vec<_>>()
+    });
+    kept.chain(walks).collect()
+}
+
+/// The walks of the slaves of a rig, as far as its file permits them.
+fn walks(rig: &Rig) -> Vec<(RigSlave, DriveWalk<State>)> {
+    let slaves = rig.port().map(slaves).unwrap_or_default();
+    let limits = limits(rig, rig.file.limits.allow_motion);
+    let several = slaves.len() > 1;
+    let walk = |slave: &RigSlave| {
+        let drive = match several {
+            true => format!("slave {}", slave.address),
+            false => String::new(),
+        };
+        let walk = walk_of(*slave, &limits)?;
+        Some((*slave, DriveWalk { drive, walk }))
+    };
+    slaves.iter().filter_map(walk).collect()
 }
 
 /// What the attempts of these players come to, one for each part of a qualification.
@@ -183,6 +211,14 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
+    let played = |name: &str| {
+        let mut all = notes.iter().flatten();
+        all.any(|own| {
+            own.name().strip_prefix(CONVERSATION) == Some(name) && own.verdict != Verdict::Skipped
+        })
+    };
+    let walks = walks(rig).into_iter();
+    let walks = walks.map(|(_, own)| own.told(&inputs(), played)).collect();
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
@@ -196,6 +232,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         parts,
         notes,
         repeats,
+        walks,
         behind: RefCell::default(),
     };
     qualified(&notes, profile, "telegram", &named, whole)
@@ -242,6 +279,8 @@ struct AttemptNotes<'n> {
     repeats: Vec<bool>,
     /// Which of them the next one speaks for.
     again: Vec<bool>,
+    /// What of the slaves was walked, and what was not.
+    walks: String,
     /// What parameters of the slave at a place hold in a part, if it has the deviation with this name and that changes what they read.
     behind: RefCell<BTreeMap<(usize, usize, &'static str), Values>>,
 }
@@ -293,6 +332,10 @@ impl Attempts for AttemptNotes<'_> {
             repeats: *repeats || *again,
         });
         attempted.collect()
+    }
+
+    fn walked(&self) -> &str {
+        &self.walks
     }
 
     fn is_right(&self, attempt: usize) -> bool {

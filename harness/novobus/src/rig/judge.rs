@@ -66,6 +66,8 @@ pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<E
             outcome.verdict = Verdict::Marginal;
             outcome.remarks.push(format!("the model: {untimely}"));
         }
+        // A drive in which a silence has ended a telegram does not answer, and shows nothing of a cell.
+        (Verdict::Inconclusive, None, _) if may_be_late(facts) => outcome.shows_nothing = true,
         _ => {}
     }
     // Where its steps send something, each byte that comes back was compared with the twin's.

@@ -11,6 +11,7 @@ mod qualify;
 mod run;
 mod session;
 mod set_back;
+mod walk;
 
 pub(crate) use permitted::limits;
 use permitted::special_register;

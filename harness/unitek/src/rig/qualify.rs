@@ -3,12 +3,16 @@
 use super::Axis;
 use super::known::Known;
 use super::player::{CONVERSATION, DriveIs, Note, Player};
+use super::walk::{State, inputs, walk_of, walked};
+use super::{axes, limits};
 use harness_bench::qualify::segment::{
     Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
 };
+use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
+use harness_bench::scenario::verdict::Verdict;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
@@ -136,8 +140,8 @@ fn free_to_send(axes: &[Axis], axis: Axis) -> u16 {
     sends.filter(|id| !used(id)).nth(place).unwrap_or(axis.tx)
 }
 
-/// The conversations with these drives.
-pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
+/// The conversations with these drives: those that are kept, and those that walk each of them as far as the rig's file permits.
+pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
     let mut files: Vec<_> = CONVERSATIONS.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let of_drive = |axis: &Axis| {
@@ -182,7 +186,29 @@ pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
         });
         sources.collect::<Vec<_>>()
     };
-    axes.iter().flat_map(of_drive).collect()
+    let kept = axes.iter().flat_map(of_drive);
+    let walks = walks(axes, limits).into_iter().flat_map(|(axis, own)| {
+        let parts = own.walk.parts.iter().enumerate();
+        let walked = parts.map(|(place, part)| Source {
+            name: format!("{CONVERSATION}{}", own.name(place)),
+            text: walked(axis, &part.lines).into(),
+        });
+        walked.collect::<Vec<_>>()
+    });
+    kept.chain(walks).collect()
+}
+
+/// The walks of drives, as far as these limits permit them.
+fn walks(axes: &[Axis], limits: &Limits) -> Vec<(Axis, DriveWalk<State>)> {
+    let walk = |axis: &Axis| {
+        let drive = match axes.len() {
+            1 => String::new(),
+            _ => format!("drive {}", axis.node),
+        };
+        let walk = walk_of(*axis, limits);
+        (*axis, DriveWalk { drive, walk })
+    };
+    axes.iter().map(walk).collect()
 }
 
 /// What the attempts of these players come to, one for each part of a qualification.
@@ -201,6 +227,20 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
+    let played = |name: &str| {
+        let mut all = notes.iter().flatten();
+        all.any(|own| {
+            own.name().strip_prefix(CONVERSATION) == Some(name) && own.verdict != Verdict::Skipped
+        })
+    };
+    let walks = walks(
+        &rig.port().map(axes).unwrap_or_default(),
+        &limits(rig, rig.file.limits.allow_motion),
+    );
+    let walks = walks
+        .into_iter()
+        .map(|(_, own)| own.told(&inputs(), played))
+        .collect();
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
@@ -212,6 +252,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
             notes,
             repeats,
             again,
+            walks,
         },
         profile,
         "frame",
@@ -264,6 +305,8 @@ struct Notes<'n> {
     repeats: Vec<bool>,
     /// Which of them the next one speaks for.
     again: Vec<bool>,
+    /// What of the drives was walked, and what was not.
+    walks: String,
 }
 
 /// A deviation of the drive at a place.
@@ -309,6 +352,10 @@ impl Attempts for Notes<'_> {
             repeats: *repeats || *again,
         });
         attempted.collect()
+    }
+
+    fn walked(&self) -> &str {
+        &self.walks
     }
 
     fn is_right(&self, attempt: usize) -> bool {

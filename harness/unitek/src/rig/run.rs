@@ -116,7 +116,8 @@ impl PortPlayer for Player {
     }
 
     fn conversations(rig: &Rig) -> Vec<Source> {
-        conversations(&rig.port().map(axes).unwrap_or_default())
+        let limits = limits(rig, rig.file.limits.allow_motion);
+        conversations(&rig.port().map(axes).unwrap_or_default(), &limits)
     }
 
     fn qualified(parts: &[&Self], rig: &Rig, began: &str, whole: bool) -> Qualified {

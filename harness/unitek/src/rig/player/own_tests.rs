@@ -11,6 +11,7 @@ use harness_bench::rig::{UseOptions, parse};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
+use harness_proto::unitek::guard::Limits;
 use std::collections::BTreeSet;
 
 /// A deviation that shows in a conversation, by conversation.
@@ -34,12 +35,16 @@ const WRONG: [(&str, &str); 17] = [
     ("write-parameters", "answers-twice"),
 ];
 
+/// What the names of walks have in them.
+const WALK: &str = "walk-";
+
 /// The file of a rig with one simulated drive that is set up by lines.
 fn desk(setup: &[&str]) -> Source {
     let text = format!(
         "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n\
          [sim]\nbus = \"unitek\"\nsetup = {setup:?}\n\
-         [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n"
+         [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n\
+         allow_other_identifiers = true\n"
     );
     Source {
         name: "desk.toml".to_owned(),
@@ -68,8 +73,9 @@ fn by_frames() -> Vec<(String, Source)> {
         rx: 0x201,
         tx: 0x181,
     };
-    let all = conversations(&[axis]).into_iter();
-    let own = all.filter(|source| Own::read(source).expect("a conversation").by_frames);
+    let all = conversations(&[axis], &Limits::unlimited()).into_iter();
+    let kept = all.filter(|source| !source.name.contains(WALK));
+    let own = kept.filter(|source| Own::read(source).expect("a conversation").by_frames);
     let named = own.map(|source| {
         let name = source.name.strip_prefix(CONVERSATION);
         (name.unwrap_or_default().to_owned(), source)
@@ -150,5 +156,34 @@ fn what_is_lost_each_time_accuses() {
         (lost(0x31), wrong),
     ] {
         assert_eq!(player.lost_again(&own, shown), expected);
+    }
+}
+
+/// A walk alone finds wrong drives that no line of it describes; a right one passes.
+#[test]
+fn a_walk_finds_wrong_drives() {
+    let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
+    let all = Player::conversations(&rig).into_iter();
+    let walks: Vec<_> = all.filter(|source| source.name.contains(WALK)).collect();
+    let verdicts = |setup: &[&str]| {
+        let mut bench = bench(setup);
+        let verdicts = walks.iter().map(|own| outcome(&mut bench, own).verdict);
+        verdicts.collect::<Vec<_>>()
+    };
+    let right = verdicts(&[]);
+    assert!(
+        right.len() > 3 && right.iter().all(|own| *own == Verdict::Passed),
+        "{right:?}"
+    );
+    for wrong in [
+        "enable-inverted",
+        "hears-29-bits",
+        "ignores-eight-bytes",
+        "lock-ends-cycles",
+        "speed-read-without-sign",
+        "stop-answers",
+    ] {
+        let all = verdicts(&[&format!("drive 1 deviates {wrong}")]);
+        assert!(all.contains(&Verdict::Failed), "{wrong}: {all:?}");
     }
 }

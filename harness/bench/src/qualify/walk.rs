@@ -1,0 +1,381 @@
+//! A walk through the states of a model: each of them with each input, as far as the guard admits it.
+//!
+//! A bus supplies a model with its inputs ([`Walked`]). What is planned depends on the model and on what the rig's file permits, and on
+//! nothing that a drive has sent: a record names the same conversations when it is judged again.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+/// A right drive as it is before the next input, behind the guard that judges what is sent to it.
+pub trait Walked: Clone {
+    /// By what its states differ.
+    type State: Ord + Clone;
+
+    /// The state that it is in.
+    fn state(&self) -> Self::State;
+
+    /// Sends an input, and asks the drive for what shows its effect: the lines of a scenario.
+    ///
+    /// # Errors
+    /// Why it is left out, such as what it needs in the rig's file. The model is of no more use.
+    fn put(&mut self, input: usize) -> Result<Vec<String>, String>;
+
+    /// Milliseconds since its start that its inputs take on the bus.
+    fn millis(&self) -> u64;
+}
+
+/// WalkBounds of a walk.
+#[derive(Clone, Copy, Debug)]
+pub struct WalkBounds {
+    /// Time after which a conversation ends, in ms.
+    pub conversation: u64,
+    /// Time of all conversations together, in ms.
+    pub all: u64,
+}
+
+/// A conversation of a walk, which begins at its start.
+#[derive(Debug)]
+pub struct WalkedPart<S> {
+    /// Its lines.
+    pub lines: Vec<String>,
+    /// Which inputs it puts for the first time, by state.
+    pub walked: BTreeSet<(S, usize)>,
+}
+
+/// A walk.
+#[derive(Debug)]
+pub struct Walk<S> {
+    /// Its conversations.
+    pub parts: Vec<WalkedPart<S>>,
+    /// Which are left out, by the reason.
+    pub denied: BTreeMap<String, BTreeSet<(S, usize)>>,
+    /// Which are not since the time or the ways were not enough.
+    pub left: BTreeSet<(S, usize)>,
+}
+
+/// A walk of a model from where it stands with this number of inputs, to what none of these parts has walked.
+pub fn walk<M: Walked>(
+    start: &M,
+    inputs: usize,
+    bounds: WalkBounds,
+    before: &[WalkedPart<M::State>],
+) -> Walk<M::State> {
+    let before = before.iter().flat_map(|part| part.walked.iter().cloned());
+    let mut walker = Walker {
+        inputs,
+        ways: BTreeMap::new(),
+        walked: before.collect(),
+        walk: Walk {
+            parts: Vec::new(),
+            denied: BTreeMap::new(),
+            left: BTreeSet::new(),
+        },
+    };
+    let mut past = 0;
+    while past < bounds.all {
+        let mut model = start.clone();
+        let most = bounds.conversation.min(bounds.all - past);
+        let part = walker.conversation(&mut model, most);
+        // Ways alone show nothing new.
+        if part.walked.is_empty() {
+            break;
+        }
+        past += model.millis();
+        walker.walk.parts.push(part);
+    }
+    walker.end()
+}
+
+/// Where an input leads from a state; `None` where it is not admitted there.
+type Ways<S> = Vec<Option<S>>;
+
+struct Walker<S> {
+    inputs: usize,
+    ways: BTreeMap<S, Ways<S>>,
+    walked: BTreeSet<(S, usize)>,
+    walk: Walk<S>,
+}
+
+impl<S: Ord + Clone> Walker<S> {
+    /// One conversation; it walks nothing where nothing is left that can be reached.
+    fn conversation<M: Walked<State = S>>(&mut self, model: &mut M, most: u64) -> WalkedPart<S> {
+        let mut part = WalkedPart {
+            lines: Vec::new(),
+            walked: BTreeSet::new(),
+        };
+        while model.millis() < most {
+            let here = model.state();
+            self.explore(model, &here);
+            let Some(input) = self.next(&here) else { break };
+            let put = model.put(input);
+            let there = put.is_ok().then(|| model.state());
+            if let Some(ways) = self.ways.get_mut(&here) {
+                ways[input] = there;
+            }
+            match put {
+                Ok(own) => part.lines.extend(own),
+                // What comes before decides it, which the state does not tell.
+                Err(why) => {
+                    if self.is_new(&here, input) {
+                        self.walk
+                            .denied
+                            .entry(why)
+                            .or_default()
+                            .insert((here, input));
+                    }
+                    break;
+                }
+            }
+            if self.walked.insert((here.clone(), input)) {
+                part.walked.insert((here.clone(), input));
+            }
+        }
+        part
+    }
+
+    /// Finds out where each input leads from a state that the model is in for the first time.
+    fn explore<M: Walked<State = S>>(&mut self, model: &M, here: &S) {
+        if self.ways.contains_key(here) {
+            return;
+        }
+        let ways = (0..self.inputs).map(|input| {
+            let mut there = model.clone();
+            match there.put(input) {
+                Ok(_) => Some(there.state()),
+                Err(why) => {
+                    let denied = self.walk.denied.entry(why).or_default();
+                    denied.insert((here.clone(), input));
+                    None
+                }
+            }
+        });
+        let ways = ways.collect();
+        self.ways.insert(here.clone(), ways);
+    }
+
+    fn is_new(&self, state: &S, input: usize) -> bool {
+        !self.walked.contains(&(state.clone(), input))
+    }
+
+    /// The next input: a new one that leaves the state as it is, then any new one, then the first of the shortest way to one.
+    fn next(&self, here: &S) -> Option<usize> {
+        let ways = self.ways.get(here)?;
+        let new = |stays: bool| {
+            (0..self.inputs).find(|input| {
+                let leads = ways[*input].as_ref();
+                leads.is_some_and(|there| (there == here) == stays) && self.is_new(here, *input)
+            })
+        };
+        new(true).or_else(|| new(false)).or_else(|| self.way(here))
+    }
+
+    /// The first input of the shortest way to a state in which an input is new.
+    fn way(&self, here: &S) -> Option<usize> {
+        let mut seen = BTreeSet::from([here]);
+        let mut reached = VecDeque::from([(here, None)]);
+        while let Some((state, first)) = reached.pop_front() {
+            let Some(ways) = self.ways.get(state) else {
+                return first;
+            };
+            for (input, leads) in ways.iter().enumerate() {
+                let Some(there) = leads else { continue };
+                let first = first.or(Some(input));
+                if self.is_new(state, input) && state != here {
+                    return first;
+                }
+                if seen.insert(there) {
+                    reached.push_back((there, first));
+                }
+            }
+        }
+        None
+    }
+
+    /// The walk, with what it has left out.
+    fn end(mut self) -> Walk<S> {
+        let leads = |state: &S, input: usize| match self.ways.get(state) {
+            Some(ways) => ways[input].is_some(),
+            // Nothing is known of a state that was never reached.
+            None => true,
+        };
+        let reached = self.ways.values().flatten().flatten();
+        let states: BTreeSet<&S> = self.ways.keys().chain(reached).collect();
+        let all = states.into_iter().flat_map(|state| {
+            let inputs = 0..self.inputs;
+            inputs.map(move |input| (state, input))
+        });
+        let left = all.filter(|(state, input)| leads(state, *input) && self.is_new(state, *input));
+        self.walk.left = left.map(|(state, input)| (state.clone(), input)).collect();
+        self.walk
+    }
+}
+
+impl<S: Ord> Walk<S> {
+    /// This walk, and behind it another one, which began where more is permitted.
+    #[must_use]
+    pub fn then(mut self, other: Self) -> Self {
+        self.parts.extend(other.parts);
+        Self {
+            parts: self.parts,
+            ..other
+        }
+    }
+
+    /// The lines that say what was walked and what was not, by the names of the inputs. `played` says whether the part at a place was.
+    #[must_use]
+    pub fn told(&self, names: &[&str], played: impl Fn(usize) -> bool) -> String {
+        let (played, skipped): (Vec<_>, Vec<_>) = self
+            .parts
+            .iter()
+            .enumerate()
+            .partition(|(place, _)| played(*place));
+        let count = |parts: &[(usize, &WalkedPart<S>)]| -> usize {
+            parts.iter().map(|(_, part)| part.walked.len()).sum()
+        };
+        let (walked, skipped) = (count(&played), count(&skipped));
+        let denied: usize = self.denied.values().map(BTreeSet::len).sum();
+        let all = walked + skipped + denied + self.left.len();
+        let mut text = format!("walked: {walked} of {all} pairs of a state and an input\n");
+        for (why, pairs) in &self.denied {
+            let inputs: BTreeSet<_> = pairs.iter().map(|(_, input)| names[*input]).collect();
+            let inputs: Vec<_> = inputs.into_iter().collect();
+            text.push_str(&format!(
+                "  {} left out, {why}: {}\n",
+                pairs.len(),
+                inputs.join(", ")
+            ));
+        }
+        for (number, why) in [
+            (skipped, "in conversations that were not played"),
+            (
+                self.left.len(),
+                "not reached in the time that a walk may take",
+            ),
+        ] {
+            if number > 0 {
+                text.push_str(&format!("  {number} {why}\n"));
+            }
+        }
+        text
+    }
+}
+
+/// The walk of a drive of a rig.
+#[derive(Debug)]
+pub struct DriveWalk<S> {
+    /// The drive as a scenario names it, such as `slave 8`; nothing where it is alone.
+    pub drive: String,
+    /// Its walk.
+    pub walk: Walk<S>,
+}
+
+impl<S: Ord> DriveWalk<S> {
+    /// The name of the conversation at a place, such as `walk-1-slave-8`.
+    #[must_use]
+    pub fn name(&self, place: usize) -> String {
+        let name = format!("walk-{} {}", place + 1, self.drive);
+        name.trim_end().replace(' ', "-")
+    }
+
+    /// The lines that say what was walked and what was not: see [`Walk::told`]. `played` says whether the conversation of a name was.
+    #[must_use]
+    pub fn told(&self, names: &[&str], played: impl Fn(&str) -> bool) -> String {
+        let told = self.walk.told(names, |place| played(&self.name(place)));
+        format!("{} {told}", self.drive).trim_start().to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A door: open, closed or locked. Input 0 looks, 1 opens or closes, 2 turns the key, 3 is never admitted.
+    #[derive(Clone)]
+    struct Door(u8, u64);
+
+    impl Walked for Door {
+        type State = u8;
+
+        fn state(&self) -> u8 {
+            self.0
+        }
+
+        fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
+            self.1 += 10;
+            self.0 = match (self.0, input) {
+                (_, 3) => return Err("needs a hammer".to_owned()),
+                (0, 1) => 1,
+                (1, 1) => 0,
+                (1, 2) => 2,
+                (2, 2) => 1,
+                (state, _) => state,
+            };
+            Ok(vec![format!("{input}")])
+        }
+
+        fn millis(&self) -> u64 {
+            self.1
+        }
+    }
+
+    fn of(bounds: WalkBounds) -> Walk<u8> {
+        walk(&Door(0, 0), 4, bounds, &[])
+    }
+
+    fn walked(walk: &Walk<u8>) -> usize {
+        walk.parts.iter().map(|part| part.walked.len()).sum()
+    }
+
+    #[test]
+    fn every_input_is_put_in_every_state() {
+        let bounds = WalkBounds {
+            conversation: 1_000,
+            all: 10_000,
+        };
+        let own = of(bounds);
+        assert_eq!(walked(&own), 9, "{own:?}");
+        assert_eq!(own.denied["needs a hammer"].len(), 3);
+        assert!(own.left.is_empty(), "{own:?}");
+        assert_eq!(own.parts.len(), 1);
+        // Nothing is new behind it.
+        let again = walk(&Door(0, 0), 4, bounds, &own.parts);
+        assert!(again.parts.is_empty(), "{again:?}");
+    }
+
+    /// Every conversation begins at the start, and what time does not permit is said.
+    #[test]
+    fn what_a_bound_cuts_off_is_left() {
+        let several = of(WalkBounds {
+            conversation: 60,
+            all: 10_000,
+        });
+        assert!(several.parts.len() > 1);
+        assert!(several.left.is_empty(), "{several:?}");
+        let cut = of(WalkBounds {
+            conversation: 60,
+            all: 60,
+        });
+        assert_eq!(cut.parts.len(), 1);
+        assert_eq!(cut.parts[0].lines.len(), 6);
+        assert!(!cut.left.is_empty(), "{cut:?}");
+    }
+
+    #[test]
+    fn what_was_not_walked_is_said() {
+        let own = of(WalkBounds {
+            conversation: 60,
+            all: 10_000,
+        });
+        let names = ["a look", "a push", "a turn of the key", "a blow"];
+        let all = own.told(&names, |_| true);
+        assert_eq!(
+            all,
+            "walked: 9 of 12 pairs of a state and an input\n  3 left out, needs a hammer: a blow\n"
+        );
+        let first = own.told(&names, |place| place == 0);
+        let skipped = 9 - own.parts[0].walked.len();
+        assert!(
+            first.contains(&format!("{skipped} in conversations that were not played")),
+            "{first}"
+        );
+    }
+}

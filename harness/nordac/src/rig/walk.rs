@@ -1,0 +1,346 @@
+//! The conversation that walks a right inverter: each state that control words lead to (NORDAC 3.3), at rest and turning, with each word.
+//!
+//! What comes by itself (faults, time-outs, the watchdog), what writes parameters and what other services do is left to the conversations
+//! in corpora/qualify/nordac.
+
+use super::RigSlave;
+use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, walk};
+use harness_proto::nordac::guard::{Denial, Gate, GuardedSlave, Limits};
+use harness_proto::nordac::pkw::Index;
+use harness_proto::nordac::words::State as InverterState;
+use harness_proto::nordac::{Image, Parameter, Pkw, Task};
+use harness_proto::profibus::dp::Service;
+use harness_proto::profibus::master::Requests;
+use harness_proto::profibus::{BusRate, Telegram};
+use harness_proto::time::{Instant, Span};
+use harness_sim::nordac::inverter::Outputs;
+use harness_sim::nordac::{Inverter, InverterSetup};
+
+/// Times in ms.
+const BOUNDS: WalkBounds = WalkBounds {
+    conversation: 6_000,
+    all: 24_000,
+};
+
+/// How long an exchange takes behind an adapter, at most, in ms (our choice).
+const EXCHANGE: u64 = 4;
+
+/// How often a task is sent: its answer comes with the second reply behind it.
+const ANSWERED: usize = 3;
+
+/// What an exchange brings to an inverter.
+#[derive(Clone, Copy)]
+enum Put {
+    /// A control word.
+    Word(u16),
+    /// A main setpoint; 4000 hex is 100 % (3.2.3).
+    Setpoint(i16),
+    /// A task that reads a parameter (3.4.1).
+    Read(u16),
+}
+
+use Put::{Read, Setpoint, Word};
+
+/// The inputs of a walk: name, and what it is.
+const INPUTS: [(&str, Put); 22] = [
+    ("a read of a ramp", Read(1102)),
+    ("a read of the control word in force", Read(967)),
+    ("a read of the present fault", Read(1800)),
+    ("a read of a parameter that is missing", Read(1001)),
+    ("no setpoint", Setpoint(0)),
+    ("a setpoint of 3.125 %", Setpoint(0x0200)),
+    ("a setpoint of -3.125 %", Setpoint(-0x0200)),
+    ("ready to start", Word(0x047E)),
+    ("on", Word(0x047F)),
+    ("on, without operation", Word(0x0477)),
+    ("off 1 without operation", Word(0x0476)),
+    ("off 2", Word(0x047D)),
+    ("off 3", Word(0x047B)),
+    ("a ramp generator that is locked", Word(0x046F)),
+    ("a ramp that is held", Word(0x045F)),
+    ("a setpoint that is locked", Word(0x043F)),
+    ("an acknowledgement", Word(0x04FF)),
+    ("bits that nothing uses", Word(0x077F)),
+    ("parameter set 2", Word(0x447F)),
+    ("a word without bit 10", Word(0x007F)),
+    ("nothing without bit 10", Word(0x0000)),
+    ("nothing but bit 10", Word(0x0400)),
+];
+
+/// By what the states of an inverter differ.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct State {
+    of_machine: u8,
+    turning: bool,
+    set: u8,
+}
+
+/// A right inverter behind the guard of the rig's file.
+#[derive(Clone)]
+struct Model {
+    inverter: Inverter,
+    gate: Gate,
+    requests: Requests,
+    slave: RigSlave,
+    image: Image,
+    now: Instant,
+}
+
+impl Model {
+    fn new(slave: RigSlave, limits: Limits) -> Option<Self> {
+        let first = Index::default();
+        let setup = InverterSetup {
+            parameters: vec![(1621, first, 2), (1625, first, 100)],
+            ..InverterSetup::default()
+        };
+        let guarded = GuardedSlave {
+            address: slave.address,
+            ppo: slave.ppo,
+        };
+        let mut gate = Gate::new(limits, BusRate::K500, &[guarded]);
+        gate.learn(slave.address, 1625, 0, 100);
+        Some(Self {
+            inverter: Inverter::new(&setup, Instant::START),
+            gate,
+            requests: Requests::new(super::MASTER, slave.address).ok()?,
+            slave,
+            image: Image::default(),
+            now: Instant::START,
+        })
+    }
+
+    /// One exchange with the words in force.
+    fn exchange(&mut self) -> Result<(), String> {
+        let ppo = self.slave.ppo.unwrap_or_default();
+        let data = self.image.encode(ppo);
+        let pdu = self.requests.request(Service::DataExchange, &data);
+        let pdu = pdu.map_err(|error| error.to_string())?;
+        for octet in Telegram::Pdu(pdu).encode().iter() {
+            let admitted = self.gate.admit(self.now, *octet);
+            admitted.map_err(|denial| match denial {
+                Denial::NotPermitted { missing, .. } => format!("needs {}", missing.name()),
+                other => other.to_string(),
+            })?;
+        }
+        let [stw, hsw, pzd3, pzd4, ..] = self.image.words;
+        let outputs = Outputs {
+            stw,
+            hsw,
+            pzd3,
+            pzd4,
+        };
+        self.inverter.take(self.now, &outputs);
+        self.pass(EXCHANGE);
+        Ok(())
+    }
+
+    /// A task, until its answer has come (3.4.1).
+    fn read(&mut self, number: u16) -> Result<Vec<String>, String> {
+        let ak = Parameter::of(number).map_or(1, |own| Task::read(own).ak());
+        let octets = Pkw::of(ak, number, 0, 0).encode();
+        let octets: String = octets.iter().map(|own| format!("{own:02X}")).collect();
+        for _ in 0..ANSWERED {
+            self.exchange()?;
+        }
+        let line = format!("exchange {} PKW={octets}", self.slave.address);
+        Ok(vec![line; ANSWERED])
+    }
+
+    fn pass(&mut self, millis: u64) {
+        self.now += Span::from_millis(millis);
+        self.inverter.advance(self.now);
+    }
+
+    /// Waits until the frequency stands at one value: the line that does so.
+    fn settles(&mut self) -> Option<String> {
+        let mut waited = 0;
+        loop {
+            let before = self.inverter.frequency(self.now);
+            self.pass(20);
+            if self.inverter.frequency(self.now) == before || waited > 4_000 {
+                break;
+            }
+            waited += 20;
+        }
+        (waited > 0).then(|| format!("wait {}ms", waited * 5 / 4 + 20))
+    }
+}
+
+impl Walked for Model {
+    type State = State;
+
+    fn state(&self) -> State {
+        let state = self.inverter.state();
+        let place = InverterState::ALL.iter().position(|own| *own == state);
+        State {
+            of_machine: place
+                .and_then(|own| u8::try_from(own).ok())
+                .unwrap_or(u8::MAX),
+            turning: !self.inverter.frequency(self.now).is_zero(),
+            set: self.inverter.set(),
+        }
+    }
+
+    fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
+        let address = self.slave.address;
+        let exchange = format!("exchange {address}");
+        let line = match INPUTS[input].1 {
+            Word(stw) => {
+                self.image.words[0] = stw;
+                format!("{exchange} STW={stw:04X}")
+            }
+            Setpoint(hsw) => {
+                let hsw = hsw.cast_unsigned();
+                self.image.words[1] = hsw;
+                format!("{exchange} HSW={hsw:04X}")
+            }
+            Read(number) => return self.read(number),
+        };
+        self.exchange()?;
+        let mut lines = vec![line];
+        lines.extend(self.settles());
+        // The first reply shows the inverter as it was before the words.
+        for _ in 0..2 {
+            lines.push(exchange.clone());
+            self.exchange()?;
+        }
+        Ok(lines)
+    }
+
+    fn millis(&self) -> u64 {
+        self.now.since(Instant::START).units() / Span::from_millis(1).units()
+    }
+}
+
+/// A conversation of a walk, with the lines of the walk between the words that end a start-disable (3.3) and those that stop the motor.
+const TEXT: &str = "title   A walk through the states of an inverter, with each word in each of them\n\
+                    source  nordac 3.3\n\
+                    bus     nordac\n\
+                    slave {slave} ppo {ppo}\n\
+                    slave {slave} parameter 1621 = 2\n\
+                    slave {slave} parameter 1625 = 10s\n\n\
+                    start {slave} watchdog 5s\n\
+                    read {slave} 1625\n\
+                    exchange {slave} STW=047E\n\
+                    exchange {slave}\n\
+                    {lines}\n\
+                    exchange {slave} STW=047E HSW=0000\n\
+                    wait 1s\n\
+                    exchange {slave} STW=047D\n\
+                    exchange {slave}\n\
+                    exchange {slave}\n";
+
+/// The walk of a slave; none where it has no parameter channel, by which it is made ready.
+pub(super) fn walk_of(slave: RigSlave, limits: &Limits) -> Option<Walk<State>> {
+    let mut model =
+        Model::new(slave, *limits).filter(|_| slave.ppo.unwrap_or_default().has_pkw())?;
+    model.image.words[0] = 0x047E;
+    for _ in 0..2 {
+        model.exchange().ok()?;
+    }
+    Some(walk(&model, INPUTS.len(), BOUNDS, &[]))
+}
+
+/// The text of a conversation with these lines of a walk.
+pub(super) fn walked(slave: RigSlave, lines: &[String]) -> String {
+    let ppo = slave.ppo.unwrap_or_default().number().to_string();
+    let text = TEXT.replace("{slave}", &slave.address.to_string());
+    text.replace("{ppo}", &ppo)
+        .replace("{lines}", &lines.join("\n"))
+}
+
+/// The inputs of a walk, in the order of their numbers.
+pub(super) fn inputs() -> [&'static str; INPUTS.len()] {
+    INPUTS.map(|(name, _)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::player::Own;
+    use crate::simulate::{Bench, Setup};
+    use harness_bench::link::Link as _;
+    use harness_bench::scenario::run::{AtMismatch, play};
+    use harness_bench::scenario::source::Source;
+    use harness_proto::nordac::PpoType;
+    use harness_sim::nordac::deviation::deviation;
+
+    const SLAVE: RigSlave = RigSlave {
+        address: 8,
+        ppo: None,
+    };
+
+    fn told(limits: &Limits) -> String {
+        let walk = walk_of(SLAVE, limits).expect("a walk");
+        walk.told(&inputs(), |_| true)
+    }
+
+    /// What is missing is named with what it would permit.
+    #[test]
+    fn what_the_rig_s_file_does_not_permit_is_named() {
+        let all = told(&Limits::unlimited());
+        assert!(all.starts_with("walked: 165 of 176 "), "{all}");
+        assert!(!all.contains("allow_"), "{all}");
+        let none = told(&Limits::default());
+        assert!(none.contains("needs `allow_motion`"), "{none}");
+    }
+
+    /// What a slave sends in the whole walk, if it deviates.
+    fn sent(deviates: Option<&str>) -> String {
+        let walk = walk_of(SLAVE, &Limits::unlimited()).expect("a walk");
+        let sent = walk.parts.iter().map(|part| {
+            let source = Source {
+                name: "walk".to_owned(),
+                text: walked(SLAVE, &part.lines).into(),
+            };
+            let own = Own::read(&source).expect("a conversation");
+            let mut slaves = own.plan.setup.slaves.clone();
+            slaves[0].deviation = deviates.map(|name| deviation(name).expect("a deviation"));
+            let rate = BusRate::K500;
+            let setup = Setup {
+                rate,
+                slaves,
+                master: None,
+            };
+            let mut bench = Bench::new(&setup);
+            let outcome = play(&own.plan, &mut bench, AtMismatch::GoOn);
+            format!("{:?} {:?}", outcome.verdict, bench.trace(0))
+        });
+        sent.collect()
+    }
+
+    /// Control words, setpoints and states that the walk was not written for show.
+    #[test]
+    fn wrong_inverters_send_something_else() {
+        let right = sent(None);
+        assert!(right.starts_with("Passed"), "{}", &right[..200]);
+        for wrong in [
+            "pzd-always-valid",
+            "no-off2",
+            "no-off3",
+            "off1-coasts",
+            "ramp-bit-ignored",
+            "hold-bit-ignored",
+            "setpoint-bit-ignored",
+            "one-parameter-set",
+            "starts-at-once",
+            "setpoint-low-byte-first",
+            "hides-off2",
+            "hides-off3",
+            "no-start-disable",
+            "never-at-setpoint",
+            "errors-are-not-reported",
+        ] {
+            assert_ne!(sent(Some(wrong)), right, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_slave_without_a_parameter_channel_is_not_walked() {
+        let slave = RigSlave {
+            ppo: Some(PpoType::Three),
+            ..SLAVE
+        };
+        assert!(walk_of(slave, &Limits::unlimited()).is_none());
+    }
+}
