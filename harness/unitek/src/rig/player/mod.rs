@@ -287,6 +287,7 @@ impl Player {
             link.noted.keep();
         }
         let gone = self.go(own, &mut link, true);
+        let own = &Arc::new(own.with_firmware(self.known()));
         if let Some(begun) = begun {
             self.note(begun, own, &link, &gone);
         }
@@ -349,6 +350,7 @@ impl Player {
             self.take_notes(&link.noted);
             return Gone::Unanswered(error);
         }
+        let own = &own.with_firmware(self.known());
         let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
             Ok(rehearsal) => rehearsal.map_or_else(Vec::new, |own| {
                 foretell(

@@ -2,7 +2,9 @@
 
 use super::{AT_REST, CONVERSATION, Known};
 use crate::language::Unitek;
-use crate::language::plan::{Act, WantedFrame};
+use crate::language::plan::{Act, WantedFrame, WantedOutcome};
+use crate::rig::Axis;
+use crate::simulate::DriveSetup;
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::pattern::Expected;
 use harness_bench::scenario::plan::{Plan, PlannedAction, PlannedStep, plan};
@@ -18,8 +20,11 @@ use std::collections::BTreeSet;
 /// CAN_TIMEOUT.
 const TIME_OUT: u8 = 0xD0;
 
+/// The firmware, which each drive has of its own (dump).
+const FIRMWARE: u8 = 0x1B;
+
 /// A scenario of this bus.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Own {
     /// The name of its source.
     pub(super) name: String,
@@ -98,6 +103,64 @@ impl Own {
             .collect();
         let goes_on = asking.iter().any(|own| own.span.start != place);
         all.contains(&place).then_some((all, goes_on))
+    }
+
+    /// The scenario in which lines that ask for the firmware ask for what it read on the drive: the scenario is for drives of any. Where its
+    /// header or a step states it, it stays.
+    pub(super) fn with_firmware(&self, known: &[Known]) -> Self {
+        let mut own = self.clone();
+        let stated = |drive: &DriveSetup| {
+            drive
+                .registers
+                .iter()
+                .any(|(number, _)| *number == FIRMWARE)
+        };
+        if own.plan.setup.drives.iter().any(stated) {
+            return own;
+        }
+        let read = |is: &dyn Fn(&Axis) -> bool| {
+            let known = known.iter().find(|known| is(&known.axis))?;
+            known.cells.get(&FIRMWARE).map(|raw| raw & 0xFFFF)
+        };
+        for step in &mut own.plan.steps {
+            match &mut step.action {
+                PlannedAction::Receive(_, wanted) => {
+                    for frame in wanted {
+                        let id = frame.id.number();
+                        let Some(raw) = read(&|axis| u32::from(axis.tx) == id) else {
+                            continue;
+                        };
+                        let [low, high, ..] = raw.to_le_bytes();
+                        if let [Expected::Byte(FIRMWARE), contents @ ..] = &mut frame.data[..] {
+                            for (expected, byte) in contents.iter_mut().zip([low, high]) {
+                                if matches!(expected, Expected::Byte(_)) {
+                                    *expected = Expected::Byte(byte);
+                                }
+                            }
+                        }
+                    }
+                }
+                PlannedAction::Own(Act::Read {
+                    tx,
+                    register: FIRMWARE,
+                    wanted: Some(wanted),
+                    ..
+                }) => {
+                    if let Some(raw) = read(&|axis| axis.tx == *tx) {
+                        wanted.raw = raw;
+                    }
+                }
+                PlannedAction::Own(Act::Driver(node, _, WantedOutcome::Reads(wanted)))
+                    if wanted.register == FIRMWARE =>
+                {
+                    if let Some(raw) = read(&|axis| axis.node == *node) {
+                        wanted.raw = raw;
+                    }
+                }
+                _ => {}
+            }
+        }
+        own
     }
 
     /// The plan in which these lines ask for any contents.

@@ -119,18 +119,48 @@ fn what_is_not_compared_has_not_passed() {
     }
 }
 
-/// What a drive sends does not follow from what the bench sent where a fault is put on a frame: a right drive passes by the lines.
-#[test]
-fn faults_on_frames_accuse_no_drive() {
+/// A kept scenario.
+fn kept(name: &str) -> Source {
     let folder = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../corpora/scenarios/unitek"
     );
+    let text = std::fs::read_to_string(format!("{folder}/{name}.scn")).expect("a scenario");
+    Source {
+        name: name.to_owned(),
+        text: text.into(),
+    }
+}
+
+/// The firmware of the dump is that of one drive: another one is held against what it reads there itself.
+#[test]
+fn scenarios_are_for_drives_of_any_firmware() {
+    let other = "drive 1 register 1B = 0477";
+    for name in [
+        "4.3-identifier-bits",
+        "5.1-lengths",
+        "5.2-another-interval",
+        "5.2-stop-one-of-two",
+        "app-1-remote-frames",
+        "app-2-replies",
+        "driver-cycles",
+        "ex-1-new-identifier",
+    ] {
+        let source = kept(&format!("unitek-{name}"));
+        let right = outcome(&mut bench(&[other]), &source);
+        assert_eq!(right.verdict, Verdict::Passed, "{name}: {right:?}");
+    }
+    let wrong = [other, "drive 1 deviates answers-twice"];
+    let wrong = outcome(&mut bench(&wrong), &kept("unitek-app-2-replies"));
+    assert_eq!(wrong.verdict, Verdict::Failed, "{wrong:?}");
+}
+
+/// What a drive sends does not follow from what the bench sent where a fault is put on a frame: a right drive passes by the lines.
+#[test]
+fn faults_on_frames_accuse_no_drive() {
     let names = ["doubled", "lost", "corrupt", "late"].map(|own| format!("unitek-fault-{own}"));
     for name in names {
-        let text = std::fs::read_to_string(format!("{folder}/{name}.scn")).expect("a scenario");
-        let text = text.into();
-        let source = Source { name, text };
+        let source = kept(&name);
         let outcome = outcome(&mut bench(&[]), &source);
         assert_eq!(outcome.verdict, Verdict::Passed, "{}", source.name);
     }
