@@ -3,6 +3,7 @@
 //! A bus supplies a model with its inputs ([`Walked`]). What is planned depends on the model and on what the rig's file permits, and on
 //! nothing that a drive has sent: a record names the same conversations when it is judged again.
 
+use crate::scenario::source::Source;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A right drive as it is before the next input, behind the guard that judges what is sent to it.
@@ -220,7 +221,7 @@ impl<S: Ord> Walk<S> {
         }
     }
 
-    /// The lines that say what was walked and what was not, by the names of the inputs. `played` says whether the part at a place was.
+    /// The lines that say what was walked and what was not, by the names of the inputs. `played` says whether the part at a place has passed or failed.
     #[must_use]
     pub fn told(&self, names: &[&str], played: impl Fn(usize) -> bool) -> String {
         let (played, skipped): (Vec<_>, Vec<_>) = self
@@ -245,7 +246,7 @@ impl<S: Ord> Walk<S> {
             ));
         }
         for (number, why) in [
-            (skipped, "in conversations that were not played"),
+            (skipped, "in conversations without a verdict"),
             (
                 self.left.len(),
                 "not reached in the time that a walk may take",
@@ -269,14 +270,23 @@ pub struct DriveWalk<S> {
 }
 
 impl<S: Ord> DriveWalk<S> {
+    /// Its conversations, with names behind `prefix` and the texts that a bus makes of their lines.
+    pub fn conversations(&self, prefix: &str, text: impl Fn(&[String]) -> String) -> Vec<Source> {
+        let parts = self.walk.parts.iter().enumerate();
+        let sources = parts.map(|(place, part)| Source {
+            name: format!("{prefix}{}", self.name(place)),
+            text: text(&part.lines).into(),
+        });
+        sources.collect()
+    }
+
     /// The name of the conversation at a place, such as `walk-1-slave-8`.
-    #[must_use]
-    pub fn name(&self, place: usize) -> String {
+    fn name(&self, place: usize) -> String {
         let name = format!("walk-{} {}", place + 1, self.drive);
         name.trim_end().replace(' ', "-")
     }
 
-    /// The lines that say what was walked and what was not: see [`Walk::told`]. `played` says whether the conversation of a name was.
+    /// The lines that say what was walked and what was not: see [`Walk::told`]. `played` says whether the conversation of a name has passed or failed.
     #[must_use]
     pub fn told(&self, names: &[&str], played: impl Fn(&str) -> bool) -> String {
         let told = self.walk.told(names, |place| played(&self.name(place)));
@@ -374,7 +384,7 @@ mod tests {
         let first = own.told(&names, |place| place == 0);
         let skipped = 9 - own.parts[0].walked.len();
         assert!(
-            first.contains(&format!("{skipped} in conversations that were not played")),
+            first.contains(&format!("{skipped} in conversations without a verdict")),
             "{first}"
         );
     }

@@ -168,14 +168,9 @@ pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
         sources.collect::<Vec<_>>()
     };
     let kept = slaves.iter().flat_map(of_slave);
-    let walks = walks(rig).into_iter().flat_map(|(slave, own)| {
-        let parts = own.walk.parts.iter().enumerate();
-        let walked = parts.map(|(place, part)| Source {
-            name: format!("{CONVERSATION}{}", own.name(place)),
-            text: walked(slave, &part.lines).into(),
-        });
-        walked.collect::<Vec<_>>()
-    });
+    let walks = walks(rig).into_iter();
+    let walks = walks
+        .flat_map(|(slave, own)| own.conversations(CONVERSATION, |lines| walked(slave, lines)));
     kept.chain(walks).collect()
 }
 
@@ -212,10 +207,11 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     });
     let known: Vec<_> = known.collect();
     let played = |name: &str| {
-        let mut all = notes.iter().flatten();
-        all.any(|own| {
-            own.name().strip_prefix(CONVERSATION) == Some(name) && own.verdict != Verdict::Skipped
-        })
+        let mut own = notes
+            .iter()
+            .flatten()
+            .filter(|own| own.name().strip_prefix(CONVERSATION) == Some(name));
+        own.any(|own| matches!(own.verdict, Verdict::Passed | Verdict::Failed))
     };
     let walks = walks(rig).into_iter();
     let walks = walks.map(|(_, own)| own.told(&inputs(), played)).collect();

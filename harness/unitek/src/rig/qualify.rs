@@ -187,14 +187,9 @@ pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
         sources.collect::<Vec<_>>()
     };
     let kept = axes.iter().flat_map(of_drive);
-    let walks = walks(axes, limits).into_iter().flat_map(|(axis, own)| {
-        let parts = own.walk.parts.iter().enumerate();
-        let walked = parts.map(|(place, part)| Source {
-            name: format!("{CONVERSATION}{}", own.name(place)),
-            text: walked(axis, &part.lines).into(),
-        });
-        walked.collect::<Vec<_>>()
-    });
+    let walks = walks(axes, limits).into_iter();
+    let walks =
+        walks.flat_map(|(axis, own)| own.conversations(CONVERSATION, |lines| walked(axis, lines)));
     kept.chain(walks).collect()
 }
 
@@ -228,10 +223,11 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     });
     let known: Vec<_> = known.collect();
     let played = |name: &str| {
-        let mut all = notes.iter().flatten();
-        all.any(|own| {
-            own.name().strip_prefix(CONVERSATION) == Some(name) && own.verdict != Verdict::Skipped
-        })
+        let mut own = notes
+            .iter()
+            .flatten()
+            .filter(|own| own.name().strip_prefix(CONVERSATION) == Some(name));
+        own.any(|own| matches!(own.verdict, Verdict::Passed | Verdict::Failed))
     };
     let walks = walks(
         &rig.port().map(axes).unwrap_or_default(),
