@@ -1,5 +1,5 @@
 //! A bus in a few hundred lines: valves on frames. It is the example of the page "A fourth bus" in CONTRIBUTING.md, and no part of the program.
-//! The tests in `harness/drivebench/src/buses/toy_tests.rs` take it from the text of a scenario to the table and the page of HTML.
+//! The tests in `harness/drivebench/src/cli/toy_tests.rs` take it from the text of a scenario to the table and the page of HTML.
 //!
 //! | file | what it has | trait |
 //! |---|---|---|

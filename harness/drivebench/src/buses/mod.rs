@@ -1,11 +1,5 @@
 //! The buses: a crate each. Only this room names them all.
 
-#[cfg(test)]
-mod interrupt_tests;
-#[cfg(test)]
-mod live_tests;
-#[cfg(test)]
-mod toy_tests;
 pub use harness_nordac as nordac;
 pub use harness_novobus as novobus;
 pub use harness_unitek as unitek;
@@ -15,16 +9,6 @@ pub(crate) use crate::bus::Bus;
 use crate::bus::SharedLine;
 use crate::bus_name::BusName;
 use crate::capture::Carries;
-use crate::command::drive::DriveCommand;
-use crate::command::exit::Exit;
-use crate::command::failure::Failure;
-use crate::command::fuzz::FuzzCommands;
-use crate::command::held::HeldBench;
-use crate::command::output::Output;
-use crate::command::rig_commands::RigCommands;
-use crate::command::rig_failure;
-use crate::command::rig_name::RigName;
-use crate::command::sim::SimArguments;
 use crate::rig::buses::RigBuses;
 use crate::rig::playing::{RecordJudge, RigRun};
 use crate::rig::{FindError, Rig, SessionError, UseOptions, check, find};
@@ -32,6 +16,16 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::serve::{ServeEnd, ServeError};
 use crate::shown::SegmentReport;
+use harness_bench::command::drive::DriveCommand;
+use harness_bench::command::exit::Exit;
+use harness_bench::command::failure::Failure;
+use harness_bench::command::fuzz::FuzzCommands;
+use harness_bench::command::held::HeldBench;
+use harness_bench::command::output::Output;
+use harness_bench::command::rig_commands::RigCommands;
+use harness_bench::command::rig_failure;
+use harness_bench::command::rig_name::RigName;
+use harness_bench::command::sim::SimArguments;
 use harness_sim::record::Trace;
 use std::path::Path;
 use std::rc::Rc;

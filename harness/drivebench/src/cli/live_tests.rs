@@ -1,6 +1,6 @@
 //! What a capture shows while it goes on, in the words of each bus.
 
-use super::carrier;
+use crate::buses::carrier;
 use crate::capture::live::{LiveLine, seconds};
 use crate::capture::senders::TelegramCutter;
 use crate::capture::{

@@ -10,8 +10,12 @@ mod extcap;
 mod fuzz;
 mod help;
 mod import;
+#[cfg(test)]
+mod interrupt_tests;
 mod junit;
 mod list;
+#[cfg(test)]
+mod live_tests;
 mod man;
 mod manual;
 mod merge;
@@ -28,6 +32,8 @@ mod schema;
 mod shell;
 mod shrink;
 mod tally;
+#[cfg(test)]
+mod toy_tests;
 mod trace;
 mod verify;
 
