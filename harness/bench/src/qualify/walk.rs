@@ -4,6 +4,8 @@
 //! nothing that a drive has sent: a record names the same conversations when it is judged again.
 
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A right drive as it is before the next input, behind the guard that judges what is sent to it.
@@ -20,17 +22,17 @@ pub trait Walked: Clone {
     /// Why it is left out, such as what it needs in the rig's file. The model is of no more use.
     fn put(&mut self, input: usize) -> Result<Vec<String>, String>;
 
-    /// Milliseconds since its start that its inputs take on the bus.
-    fn millis(&self) -> u64;
+    /// Its time: it begins at the start of all times.
+    fn now(&self) -> Instant;
 }
 
-/// WalkBounds of a walk.
+/// How long a walk may take.
 #[derive(Clone, Copy, Debug)]
 pub struct WalkBounds {
-    /// Time after which a conversation ends, in ms.
-    pub conversation: u64,
-    /// Time of all conversations together, in ms.
-    pub all: u64,
+    /// Each conversation; it ends with the input that goes beyond.
+    pub conversation: Span,
+    /// All conversations together.
+    pub all: Span,
 }
 
 /// A conversation of a walk, which begins at its start.
@@ -47,9 +49,9 @@ pub struct WalkedPart<S> {
 pub struct Walk<S> {
     /// Its conversations.
     pub parts: Vec<WalkedPart<S>>,
-    /// Which are left out, by the reason.
+    /// Pairs of a state and an input that are left out, by the reason.
     pub denied: BTreeMap<String, BTreeSet<(S, usize)>>,
-    /// Which are not since the time or the ways were not enough.
+    /// Those that were not reached within the bounds.
     pub left: BTreeSet<(S, usize)>,
 }
 
@@ -71,16 +73,15 @@ pub fn walk<M: Walked>(
             left: BTreeSet::new(),
         },
     };
-    let mut past = 0;
+    let mut past = Span::ZERO;
     while past < bounds.all {
         let mut model = start.clone();
-        let most = bounds.conversation.min(bounds.all - past);
-        let part = walker.conversation(&mut model, most);
+        let part = walker.conversation(&mut model, bounds.conversation);
         // Ways alone show nothing new.
         if part.walked.is_empty() {
             break;
         }
-        past += model.millis();
+        past = past + model.now().since(Instant::START);
         walker.walk.parts.push(part);
     }
     walker.end()
@@ -98,12 +99,12 @@ struct Walker<S> {
 
 impl<S: Ord + Clone> Walker<S> {
     /// One conversation; it walks nothing where nothing is left that can be reached.
-    fn conversation<M: Walked<State = S>>(&mut self, model: &mut M, most: u64) -> WalkedPart<S> {
+    fn conversation<M: Walked<State = S>>(&mut self, model: &mut M, most: Span) -> WalkedPart<S> {
         let mut part = WalkedPart {
             lines: Vec::new(),
             walked: BTreeSet::new(),
         };
-        while model.millis() < most {
+        while model.now().since(Instant::START) < most {
             let here = model.state();
             self.explore(model, &here);
             let Some(input) = self.next(&here) else { break };
@@ -286,10 +287,14 @@ impl<S: Ord> DriveWalk<S> {
         name.trim_end().replace(' ', "-")
     }
 
-    /// The lines that say what was walked and what was not: see [`Walk::told`]. `played` says whether the conversation of a name has passed or failed.
-    #[must_use]
-    pub fn told(&self, names: &[&str], played: impl Fn(&str) -> bool) -> String {
-        let told = self.walk.told(names, |place| played(&self.name(place)));
+    /// The lines that say what was walked in these attempts, by name and verdict, and what was not: see [`Walk::told`].
+    pub fn told(&self, names: &[&str], prefix: &str, attempts: &[(&str, Verdict)]) -> String {
+        let told = self.walk.told(names, |place| {
+            let name = format!("{prefix}{}", self.name(place));
+            let judged = [Verdict::Passed, Verdict::Failed];
+            let mut attempts = attempts.iter();
+            attempts.any(|(own, verdict)| *own == name && judged.contains(verdict))
+        });
         format!("{} {told}", self.drive).trim_start().to_owned()
     }
 }
@@ -300,7 +305,7 @@ mod tests {
 
     /// A door: open, closed or locked. Input 0 looks, 1 opens or closes, 2 turns the key, 3 is never admitted.
     #[derive(Clone)]
-    struct Door(u8, u64);
+    struct Door(u8, Instant);
 
     impl Walked for Door {
         type State = u8;
@@ -310,7 +315,7 @@ mod tests {
         }
 
         fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
-            self.1 += 10;
+            self.1 += Span::from_millis(10);
             self.0 = match (self.0, input) {
                 (_, 3) => return Err("needs a hammer".to_owned()),
                 (0, 1) => 1,
@@ -322,13 +327,13 @@ mod tests {
             Ok(vec![format!("{input}")])
         }
 
-        fn millis(&self) -> u64 {
+        fn now(&self) -> Instant {
             self.1
         }
     }
 
     fn of(bounds: WalkBounds) -> Walk<u8> {
-        walk(&Door(0, 0), 4, bounds, &[])
+        walk(&Door(0, Instant::START), 4, bounds, &[])
     }
 
     fn walked(walk: &Walk<u8>) -> usize {
@@ -338,8 +343,8 @@ mod tests {
     #[test]
     fn every_input_is_put_in_every_state() {
         let bounds = WalkBounds {
-            conversation: 1_000,
-            all: 10_000,
+            conversation: Span::from_millis(1_000),
+            all: Span::from_millis(10_000),
         };
         let own = of(bounds);
         assert_eq!(walked(&own), 9, "{own:?}");
@@ -347,7 +352,7 @@ mod tests {
         assert!(own.left.is_empty(), "{own:?}");
         assert_eq!(own.parts.len(), 1);
         // Nothing is new behind it.
-        let again = walk(&Door(0, 0), 4, bounds, &own.parts);
+        let again = walk(&Door(0, Instant::START), 4, bounds, &own.parts);
         assert!(again.parts.is_empty(), "{again:?}");
     }
 
@@ -355,14 +360,14 @@ mod tests {
     #[test]
     fn what_a_bound_cuts_off_is_left() {
         let several = of(WalkBounds {
-            conversation: 60,
-            all: 10_000,
+            conversation: Span::from_millis(60),
+            all: Span::from_millis(10_000),
         });
         assert!(several.parts.len() > 1);
         assert!(several.left.is_empty(), "{several:?}");
         let cut = of(WalkBounds {
-            conversation: 60,
-            all: 60,
+            conversation: Span::from_millis(60),
+            all: Span::from_millis(60),
         });
         assert_eq!(cut.parts.len(), 1);
         assert_eq!(cut.parts[0].lines.len(), 6);
@@ -372,8 +377,8 @@ mod tests {
     #[test]
     fn what_was_not_walked_is_said() {
         let own = of(WalkBounds {
-            conversation: 60,
-            all: 10_000,
+            conversation: Span::from_millis(60),
+            all: Span::from_millis(10_000),
         });
         let names = ["a look", "a push", "a turn of the key", "a blow"];
         let all = own.told(&names, |_| true);
@@ -387,5 +392,28 @@ mod tests {
             first.contains(&format!("{skipped} in conversations without a verdict")),
             "{first}"
         );
+    }
+
+    /// What a drive has sent in an attempt without a verdict was not judged.
+    #[test]
+    fn attempts_without_a_verdict_walk_nothing() {
+        let walk = of(WalkBounds {
+            conversation: Span::from_millis(1_000),
+            all: Span::from_millis(10_000),
+        });
+        let own = DriveWalk {
+            drive: "slave 8".to_owned(),
+            walk,
+        };
+        let names = ["a look", "a push", "a turn of the key", "a blow"];
+        let walked = |verdict| own.told(&names, "q-", &[("q-walk-1-slave-8", verdict)]);
+        for verdict in [Verdict::Passed, Verdict::Failed] {
+            let told = walked(verdict);
+            assert!(told.starts_with("slave 8 walked: 9 of 12 "), "{told}");
+        }
+        for verdict in [Verdict::Inconclusive, Verdict::Skipped] {
+            let told = walked(verdict);
+            assert!(told.starts_with("slave 8 walked: 0 of 12 "), "{told}");
+        }
     }
 }

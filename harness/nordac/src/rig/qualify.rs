@@ -11,7 +11,6 @@ use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
-use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nordac::guard::Limits;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
@@ -206,15 +205,14 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
-    let played = |name: &str| {
-        let mut own = notes
-            .iter()
-            .flatten()
-            .filter(|own| own.name().strip_prefix(CONVERSATION) == Some(name));
-        own.any(|own| matches!(own.verdict, Verdict::Passed | Verdict::Failed))
-    };
+    let attempts = notes.iter().flatten();
+    let attempts: Vec<_> = attempts
+        .map(|own| (own.name().as_str(), own.verdict))
+        .collect();
     let walks = walks(rig).into_iter();
-    let walks = walks.map(|(_, own)| own.told(&inputs(), played)).collect();
+    let walks = walks
+        .map(|(_, own)| own.told(&inputs(), CONVERSATION, &attempts))
+        .collect();
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());

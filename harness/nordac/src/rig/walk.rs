@@ -7,7 +7,6 @@ use super::RigSlave;
 use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, walk};
 use harness_proto::nordac::guard::{Denial, Gate, GuardedSlave, Limits};
 use harness_proto::nordac::pkw::Index;
-use harness_proto::nordac::words::State as InverterState;
 use harness_proto::nordac::{Image, Parameter, Pkw, Task};
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::master::Requests;
@@ -16,10 +15,9 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::inverter::Outputs;
 use harness_sim::nordac::{Inverter, InverterSetup};
 
-/// Times in ms.
 const BOUNDS: WalkBounds = WalkBounds {
-    conversation: 6_000,
-    all: 24_000,
+    conversation: Span::from_millis(6_000),
+    all: Span::from_millis(24_000),
 };
 
 /// How long an exchange takes behind an adapter, at most, in ms (our choice).
@@ -70,7 +68,8 @@ const INPUTS: [(&str, Put); 22] = [
 /// By what the states of an inverter differ.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct State {
-    of_machine: u8,
+    /// That of the table, by its short name (NORDAC 3.3).
+    of_machine: &'static str,
     turning: bool,
     set: u8,
 }
@@ -170,12 +169,8 @@ impl Walked for Model {
     type State = State;
 
     fn state(&self) -> State {
-        let state = self.inverter.state();
-        let place = InverterState::ALL.iter().position(|own| *own == state);
         State {
-            of_machine: place
-                .and_then(|own| u8::try_from(own).ok())
-                .unwrap_or(u8::MAX),
+            of_machine: self.inverter.state().short(),
             turning: !self.inverter.frequency(self.now).is_zero(),
             set: self.inverter.set(),
         }
@@ -207,8 +202,8 @@ impl Walked for Model {
         Ok(lines)
     }
 
-    fn millis(&self) -> u64 {
-        self.now.since(Instant::START).units() / Span::from_millis(1).units()
+    fn now(&self) -> Instant {
+        self.now
     }
 }
 

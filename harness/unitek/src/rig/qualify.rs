@@ -12,7 +12,6 @@ use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
 use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
-use harness_bench::scenario::verdict::Verdict;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
 use harness_sim::unitek::deviation::{Deviation, deviations};
@@ -222,20 +221,17 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
-    let played = |name: &str| {
-        let mut own = notes
-            .iter()
-            .flatten()
-            .filter(|own| own.name().strip_prefix(CONVERSATION) == Some(name));
-        own.any(|own| matches!(own.verdict, Verdict::Passed | Verdict::Failed))
-    };
+    let attempts = notes.iter().flatten();
+    let attempts: Vec<_> = attempts
+        .map(|own| (own.name().as_str(), own.verdict))
+        .collect();
     let walks = walks(
         &rig.port().map(axes).unwrap_or_default(),
         &limits(rig, rig.file.limits.allow_motion),
     );
     let walks = walks
         .into_iter()
-        .map(|(_, own)| own.told(&inputs(), played))
+        .map(|(_, own)| own.told(&inputs(), CONVERSATION, &attempts))
         .collect();
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());

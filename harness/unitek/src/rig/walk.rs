@@ -12,10 +12,10 @@ use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::words::MODE_EVENT;
 use harness_sim::unitek::{Drive, Inputs};
 
-/// Times in ms; the whole walk takes a drive behind an adapter less.
+/// A conversation of more would have more worlds of a right drive than are kept.
 const BOUNDS: WalkBounds = WalkBounds {
-    conversation: 800,
-    all: 6_000,
+    conversation: Span::from_millis(800),
+    all: Span::from_millis(6_000),
 };
 
 /// How long a request and its reply take behind an adapter, at most, in ms (our choice).
@@ -39,10 +39,10 @@ enum Sent {
     Extended,
 }
 
+use Sent::{Extended, Frames, Neighbour, Read, Remote};
+
 /// The register of the cycle: nothing else asks for it, so that a frame of it is one of the cycle.
 const CYCLIC: u8 = 0x34;
-
-use Sent::{Extended, Frames, Neighbour, Read, Remote};
 
 /// The inputs of a walk: name, what is sent, and the registers that are read behind it, beside STATUS.
 const INPUTS: [(&str, Sent, &[u8]); 36] = [
@@ -332,8 +332,8 @@ impl Walked for Model {
         Ok(lines)
     }
 
-    fn millis(&self) -> u64 {
-        self.now.since(Instant::START).units() / Span::from_millis(1).units()
+    fn now(&self) -> Instant {
+        self.now
     }
 }
 
