@@ -3,10 +3,10 @@
 use super::error::EvidenceError;
 use crate::regular::{self, Links};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
-use std::io;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 /// The file of sums.
@@ -37,13 +37,31 @@ pub const PROFILE: &str = "profile.toml";
 /// The file of a qualification that says what was compared and which deviations explain it.
 pub const DEVIATIONS: &str = "deviations.txt";
 
-/// The largest file of a folder, in bytes.
+/// The largest file of a folder that is read at once, in bytes.
 const LARGEST: u64 = 1 << 31;
+
+/// How much of a file is read at once for its sum, in bytes.
+const PIECE: usize = 1 << 16;
 
 /// The sum of some bytes, as `sha256sum` prints it.
 pub fn sum(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The sum of a file, which is read in pieces: a record may be large.
+fn sum_of(file: &Path) -> io::Result<String> {
+    let mut file = regular::open(file, Links::Refuse)?;
+    let mut digest = Sha256::new();
+    let mut piece = vec![0; PIECE];
+    loop {
+        match file.read(&mut piece)? {
+            0 => break,
+            read => digest.update(&piece[..read]),
+        }
+    }
+    let digest = digest.finalize();
+    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// Reads a file of a folder, which must be a regular one.
@@ -60,7 +78,8 @@ pub fn read_text(path: &Path, file: &str) -> Result<String, String> {
 /// The sums of every file of a folder but that of sums, as `sha256sum` prints them.
 pub fn sums(path: &Path) -> Result<String, EvidenceError> {
     let mut lines = String::new();
-    for (file, sum) in Listing::of(path)?.sums {
+    let mut listing = Listing::of(path)?;
+    for (file, sum) in listing.sums(path) {
         // Writing to a String cannot fail.
         let _infallible = writeln!(lines, "{sum}  {file}");
     }
@@ -70,7 +89,7 @@ pub fn sums(path: &Path) -> Result<String, EvidenceError> {
 /// The names of the regular files of a folder, in order.
 pub fn names(path: &Path) -> Vec<String> {
     let listing = Listing::of(path);
-    listing.map_or_else(|_| Vec::new(), |own| own.sums.into_keys().collect())
+    listing.map_or_else(|_| Vec::new(), |own| own.files.into_iter().collect())
 }
 
 /// How many bytes the files of a folder have together, and how many of them its captures have.
@@ -86,7 +105,8 @@ pub fn size(path: &Path) -> (u64, u64) {
 
 /// What is wrong with the files of a folder. Without sums, as of a run that did not end, only that one is no regular file.
 pub fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
-    let listing = Listing::of(path)?;
+    let mut listing = Listing::of(path)?;
+    let sums = listing.sums(path);
     let mut wrong = listing.refused;
     let stated = match read(path, SUMS) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
@@ -100,7 +120,7 @@ pub fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
     let pairs = stated.lines().filter_map(|line| line.split_once("  "));
     let stated: BTreeMap<_, _> = pairs.map(|(sum, file)| (file, sum)).collect();
     for (file, sum) in &stated {
-        match listing.sums.get(*file) {
+        match sums.get(*file) {
             None => wrong.push(format!("{file} is missing")),
             Some(own) if own != sum => wrong.push(format!("{file} was changed")),
             Some(_) => {}
@@ -111,7 +131,7 @@ pub fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
             "{SUMS} has lines that are no sum of a file of its own"
         ));
     }
-    let added = listing.sums.keys();
+    let added = sums.keys();
     let added = added.filter(|file| !stated.contains_key(file.as_str()));
     wrong.extend(added.map(|file| format!("{file} was added")));
     Ok(wrong)
@@ -119,8 +139,8 @@ pub fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
 
 /// The files of a folder.
 struct Listing {
-    /// The sum of each regular file but that of sums.
-    sums: BTreeMap<String, String>,
+    /// Each regular file but that of sums.
+    files: BTreeSet<String>,
     /// What cannot be read, and folders and links that do not belong there; each in a sentence.
     refused: Vec<String>,
 }
@@ -128,7 +148,7 @@ struct Listing {
 impl Listing {
     fn of(path: &Path) -> Result<Self, EvidenceError> {
         let mut listing = Self {
-            sums: BTreeMap::new(),
+            files: BTreeSet::new(),
             refused: Vec::new(),
         };
         for folder in ["", SCENARIOS, CAPTURES] {
@@ -170,14 +190,23 @@ impl Listing {
             if file == SIGNATURE {
                 continue;
             }
-            match read(path, &file) {
-                Ok(bytes) => {
-                    self.sums.insert(file, sum(&bytes));
+            self.files.insert(file);
+        }
+        Ok(())
+    }
+
+    /// The sum of each file that can be read.
+    fn sums(&mut self, path: &Path) -> BTreeMap<String, String> {
+        let mut sums = BTreeMap::new();
+        for file in &self.files {
+            match sum_of(&path.join(file)) {
+                Ok(sum) => {
+                    sums.insert(file.clone(), sum);
                 }
                 Err(error) => self.refused.push(format!("{file}: {error}")),
             }
         }
-        Ok(())
+        sums
     }
 }
 

@@ -7,6 +7,7 @@ use crate::link::{Lead, LinkEvent, LinkFault, Moment, PlacedFault};
 use crate::rig::rings::rings;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use std::io::BufRead;
 
 /// The largest record, in bytes.
 pub const MAX_SIZE: u64 = 1 << 31;
@@ -14,15 +15,22 @@ pub const MAX_SIZE: u64 = 1 << 31;
 /// The longest time of a conversation: what a damaged digit makes of one must not keep a computer busy for years.
 pub(crate) const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
 
-/// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
+/// Reads a record line by line: `take` gets each one with its number, counted from 1, and its text. Returns whether the last one is whole; a
+/// run that was killed leaves half a line.
 ///
 /// # Errors
 /// The first line that is none, or that cannot stand where it does.
-pub fn read(bytes: &[u8]) -> Result<(Vec<RecordLine>, bool), RecordError> {
-    let mut lines = Vec::new();
+pub fn read(
+    record: impl BufRead,
+    mut take: impl FnMut(usize, &[u8], RecordLine),
+) -> Result<bool, RecordError> {
+    let mut record = record.take(MAX_SIZE + 1);
     let mut order = Order::default();
-    let mut offset = 0;
-    for (number, text) in (1..).zip(bytes.split_inclusive(|byte| *byte == b'\n')) {
+    let (mut number, mut offset) = (1, 0);
+    let mut text = Vec::new();
+    loop {
+        text.clear();
+        let read = record.read_until(b'\n', &mut text);
         let whole = text.ends_with(b"\n");
         let wrong = |column: usize, message: String| RecordError {
             line: number,
@@ -30,46 +38,49 @@ pub fn read(bytes: &[u8]) -> Result<(Vec<RecordLine>, bool), RecordError> {
             offset: offset + column.saturating_sub(1),
             message,
         };
-        match parse(text) {
+        match read {
+            Ok(0) if number == 1 => return Err(wrong(1, "the record is empty".to_owned())),
+            Ok(0) => return Ok(true),
+            Ok(_) if record.limit() == 0 => {
+                return Err(wrong(
+                    1,
+                    format!("the record has more than {} KiB", MAX_SIZE >> 10),
+                ));
+            }
+            Ok(_) => {}
+            Err(error) => return Err(wrong(1, error.to_string())),
+        }
+        match parse(&text) {
             Ok(line) => {
                 order.take(&line).map_err(|message| wrong(1, message))?;
-                lines.push(line);
+                take(number, &text, line);
             }
             // The first line tells what it is all about.
-            Err(_) if !whole && number > 1 => return Ok((lines, false)),
+            Err(_) if !whole && number > 1 => return Ok(false),
             Err((column, message)) => return Err(wrong(column, message)),
         }
+        if !whole {
+            return Ok(false);
+        }
         offset += text.len();
+        number += 1;
     }
-    if lines.is_empty() {
-        return Err(RecordError {
-            line: 1,
-            column: 1,
-            offset: 0,
-            message: "the record is empty".to_owned(),
-        });
-    }
-    Ok((lines, bytes.ends_with(b"\n")))
 }
 
-/// The first line that this program would write in other bytes, in a sentence: blanks, another order of fields, digits of another form.
-pub fn unlike_written(bytes: &[u8], lines: &[RecordLine]) -> Option<String> {
-    let texts = bytes.split_inclusive(|byte| *byte == b'\n');
-    let mut numbered = (1..).zip(texts.zip(lines));
-    numbered.find_map(|(number, (text, line))| {
-        // Bytes and times of an event are written from their values.
-        let event = line.event().and_then(|event| RecordLine::of(&event));
-        let own = serde_json::to_string(event.as_ref().unwrap_or(line)).unwrap_or_default();
-        let text = text.strip_suffix(b"\n").unwrap_or(text);
-        if text == own.as_bytes() {
-            return None;
-        }
-        let same = text.iter().zip(own.as_bytes());
-        let column = same.take_while(|(one, other)| one == other).count() + 1;
-        Some(format!(
-            "line {number}, column {column}: this program writes the line in other bytes"
-        ))
-    })
+/// Where this program would write a line in other bytes, in a sentence: blanks, another order of fields, digits of another form.
+pub fn unlike_written(number: usize, text: &[u8], line: &RecordLine) -> Option<String> {
+    // Bytes and times of an event are written from their values.
+    let event = line.event().and_then(|event| RecordLine::of(&event));
+    let own = serde_json::to_string(event.as_ref().unwrap_or(line)).unwrap_or_default();
+    let text = text.strip_suffix(b"\n").unwrap_or(text);
+    if text == own.as_bytes() {
+        return None;
+    }
+    let same = text.iter().zip(own.as_bytes());
+    let column = same.take_while(|(one, other)| one == other).count() + 1;
+    Some(format!(
+        "line {number}, column {column}: this program writes the line in other bytes"
+    ))
 }
 
 /// Parses a line. The error has the column, counted from 1, and the reason.

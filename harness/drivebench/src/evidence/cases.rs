@@ -16,7 +16,7 @@ use harness_proto::time::Span;
 type Texts<'t> = &'t dyn Fn(&str) -> Result<String, String>;
 
 /// What of the lines `case` and `end` does not follow from the attempts.
-pub(super) fn differences(opened: &Opened, judged: &[Judged], texts: Texts<'_>) -> Vec<String> {
+pub(super) fn differences(opened: &Opened, judged: &[Judged<'_>], texts: Texts<'_>) -> Vec<String> {
     let real = opened.header.tolerance > Span::ZERO;
     let mut settling = Settling {
         opened,
@@ -51,7 +51,7 @@ struct Settling<'s> {
 }
 
 impl Settling<'_> {
-    fn case(&mut self, line: &RecordLine, attempts: &[Judged]) {
+    fn case(&mut self, line: &RecordLine, attempts: &[Judged<'_>]) {
         let RecordLine::Case {
             name,
             title,
@@ -121,7 +121,7 @@ impl Settling<'_> {
     }
 
     /// Attempts are counted from 1, and there are as many as the rig's file asks for.
-    fn numbers(&mut self, name: &str, attempts: &[Judged]) {
+    fn numbers(&mut self, name: &str, attempts: &[Judged<'_>]) {
         let header = &self.opened.header;
         let numbers = attempts.iter().map(|own| own.recorded.attempt);
         if !numbers.eq(1..=attempts.len()) {
@@ -149,7 +149,7 @@ impl Settling<'_> {
         }
     }
 
-    fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[Judged]) {
+    fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[Judged<'_>]) {
         if let Some(own) = left.first() {
             self.wrong.push(format!(
                 "{}: the record has its attempts and no line of what came of them",
@@ -177,14 +177,14 @@ impl Settling<'_> {
 }
 
 /// The outcomes of attempts as they were judged again.
-fn settled(attempts: &[Judged]) -> Vec<Attempt> {
+fn settled(attempts: &[Judged<'_>]) -> Vec<Attempt> {
     let outcomes = attempts.iter().filter_map(Judged::outcome);
     outcomes
         .map(|outcome| Attempt::new(outcome, Vec::new()))
         .collect()
 }
 
-impl Judged {
+impl Judged<'_> {
     /// The outcome as it was judged again, with faults that never happened, which only the run knows.
     fn outcome(&self) -> Option<Outcome> {
         let (_, again) = self.again.as_ref().ok()?;

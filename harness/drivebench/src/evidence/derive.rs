@@ -53,7 +53,7 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
 pub(super) fn derived(
     path: &Path,
     opened: &Opened,
-    judged: &[Judged],
+    judged: &[Judged<'_>],
 ) -> Result<Derived, EvidenceError> {
     let all = case_reports(path, opened, judged, &|place| place + 1)?;
     let (cases, shown) = all
@@ -88,7 +88,7 @@ impl CaseReport {
 pub(super) fn case_reports(
     path: &Path,
     opened: &Opened,
-    judged: &[Judged],
+    judged: &[Judged<'_>],
     number: &dyn Fn(usize) -> usize,
 ) -> Result<Vec<CaseReport>, EvidenceError> {
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();

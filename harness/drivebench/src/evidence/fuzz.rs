@@ -42,10 +42,10 @@ pub fn record(input: &[u8]) {
     if input.len() > LONGEST {
         return;
     }
-    let lines = match read(input) {
-        Ok((lines, _)) => lines,
-        Err(error) => return placed(&error, input),
-    };
+    let mut lines = Vec::new();
+    if let Err(error) = read(input, |_, _, line| lines.push(line)) {
+        return placed(&error, input);
+    }
     let mut longest = Span::ZERO;
     for line in &lines {
         if let Some(event) = line.event() {
@@ -76,8 +76,9 @@ pub(crate) fn noted(input: &[u8], note: &mut dyn FnMut(&'static str, String)) {
     if input.len() > LONGEST {
         return;
     }
-    let (lines, whole) = match read(input) {
-        Ok(read) => read,
+    let mut lines = Vec::new();
+    let whole = match read(input, |_, _, line| lines.push(line)) {
+        Ok(whole) => whole,
         Err(error) => return note("no record", error.message),
     };
     note(

@@ -52,7 +52,7 @@ pub(super) struct Gathering<'g> {
 /// A part whose attempts were judged again.
 struct JudgedPart<'g> {
     part: &'g ReadPart,
-    judged: Vec<Judged>,
+    judged: Vec<Judged<'g>>,
     /// The places of its scenarios in the list of all.
     places: &'g [usize],
     /// Whether it was played to its end.

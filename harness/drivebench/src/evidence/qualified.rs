@@ -17,7 +17,7 @@ pub(super) type QualifiedAgain = Result<Vec<Qualified>, String>;
 /// What the record of a qualification comes to.
 pub(super) fn again(
     opened: &Opened,
-    judged: &[Judged],
+    judged: &[Judged<'_>],
     judge: &mut dyn RecordJudge,
 ) -> QualifiedAgain {
     let header = &opened.header;
@@ -90,7 +90,10 @@ fn difference(path: &Path, file: &str, made: &str) -> Option<String> {
 }
 
 /// The scenarios of a record in order.
-pub(super) fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<RecordedCase>, String> {
+pub(super) fn cases(
+    opened: &Opened,
+    judged: &[Judged<'_>],
+) -> Result<VecDeque<RecordedCase>, String> {
     let mut left = judged;
     let mut pending = 0;
     let mut cases = VecDeque::new();

@@ -26,7 +26,7 @@ const ATTACHMENT: &str = "[[ATTACHMENT|";
 pub(super) fn differences(
     path: &Path,
     opened: &Opened,
-    judged: &[Judged],
+    judged: &[Judged<'_>],
     made: &Derived,
 ) -> Vec<String> {
     let settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
@@ -107,7 +107,7 @@ fn versions(path: &Path, opened: &Opened) -> Option<String> {
 }
 
 /// The capture of an attempt.
-fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
+fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> {
     let (_, again) = own.again.as_ref().ok()?;
     let name = format!(
         "{CAPTURES}/{}.{}.json",
@@ -292,7 +292,7 @@ impl Ends {
 }
 
 /// Files that no run leaves.
-fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
+fn foreign(path: &Path, opened: &Opened, judged: &[Judged<'_>]) -> Vec<String> {
     let fixed = [RECORD, RIG, JUNIT, REPORT, PAGE, VERSIONS, SUMS];
     let mut known: BTreeSet<String> = fixed.iter().map(|own| (*own).to_owned()).collect();
     known.extend(

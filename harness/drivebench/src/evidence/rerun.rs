@@ -40,20 +40,27 @@ pub(super) fn rerun(
         Err(error) => return vec![format!("the run cannot be played again: {error}")],
     };
     let mut wrong = Vec::new();
-    let mut lines = &opened.lines[1..];
-    while let Some(end) = lines
-        .iter()
-        .position(|line| matches!(line, RecordLine::Case { .. }))
-    {
-        let (own, rest) = lines.split_at(end + 1);
-        match scenario(&mut *run, path, opened, own, texts) {
-            Ok(differs) => wrong.extend(differs),
-            Err(why) => {
-                wrong.push(why);
-                break;
+    let mut attempts = opened.attempts.iter();
+    let mut own = Vec::new();
+    for line in &opened.lines[1..] {
+        own.push(line.clone());
+        match line {
+            RecordLine::Scenario { .. } => {
+                let events = attempts.next().into_iter().flat_map(|own| &own.events);
+                own.extend(events.filter_map(RecordLine::of));
             }
+            RecordLine::Case { .. } => {
+                let own = std::mem::take(&mut own);
+                match scenario(&mut *run, path, opened, &own, texts) {
+                    Ok(differs) => wrong.extend(differs),
+                    Err(why) => {
+                        wrong.push(why);
+                        break;
+                    }
+                }
+            }
+            _ => {}
         }
-        lines = rest;
     }
     wrong
 }

@@ -6,8 +6,7 @@ use super::derive::derived;
 use super::error::EvidenceError;
 use super::error::RecordError;
 use super::files::{
-    self, DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SUMS, compare_sums,
-    read_text, sum,
+    DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SUMS, compare_sums, read_text, sum,
 };
 use super::header::{Header, header};
 use super::keep::left_out;
@@ -21,7 +20,7 @@ use super::selection;
 use super::signature::{self, Signer};
 use crate::buses::{RIG_BUSES, judge_of};
 use crate::counted::counted;
-use crate::regular;
+use crate::regular::{self, Links};
 use crate::rig::playing::RecordJudge;
 use crate::rig::{Rig, parse_beside};
 use crate::scenario::run::DENIED;
@@ -30,6 +29,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// What was found out about one attempt.
@@ -85,8 +85,8 @@ pub struct Beside<'b> {
 }
 
 /// An attempt that was played again.
-pub(super) struct Judged {
-    pub(super) recorded: Recorded,
+pub(super) struct Judged<'o> {
+    pub(super) recorded: &'o Recorded,
     /// Its text and what came of it, or why it cannot be played.
     pub(super) again: Result<(String, Again), String>,
     /// What the record says of it and its bytes do not bear out.
@@ -157,7 +157,9 @@ pub fn judge_record(record: &[u8], beside: &Beside<'_>) -> Result<Verified, Evid
 
 /// A record that has been read, and what it is judged by.
 pub(super) struct Opened {
+    /// All but the events of attempts.
     pub(super) lines: Vec<RecordLine>,
+    pub(super) attempts: Vec<Recorded>,
     /// Whether the last line is.
     whole: bool,
     pub(super) rig: Rig,
@@ -173,8 +175,8 @@ impl Opened {
     pub(super) fn folder(path: &Path) -> Result<Self, EvidenceError> {
         let foreign = |what: String| EvidenceError::Foreign(path.display().to_string(), what);
         regular::has_run(path, RECORD).map_err(foreign)?;
-        let record =
-            files::read(path, RECORD).map_err(|error| foreign(format!("{RECORD}: {error}")))?;
+        let record = regular::open(&path.join(RECORD), Links::Refuse)
+            .map_err(|error| foreign(format!("{RECORD}: {error}")))?;
         let beside = |name: &str| {
             let text = read_text(path, name)?.into_bytes();
             let name = path.join(name).display().to_string();
@@ -183,13 +185,30 @@ impl Opened {
         let source = beside(RIG).map_err(foreign)?;
         let rig = parse_beside(&source, &RIG_BUSES, &|_| beside(KNOWN_PROFILE));
         Self::of(
-            &record,
+            BufReader::new(record),
             rig.map_err(|problems| foreign(problems.to_string()))?,
         )
     }
 
-    fn of(record: &[u8], rig: Rig) -> Result<Self, EvidenceError> {
-        let (lines, whole) = read(record)?;
+    fn of(record: impl BufRead, rig: Rig) -> Result<Self, EvidenceError> {
+        let (mut lines, mut attempts) = (Vec::new(), Vec::<Recorded>::new());
+        let mut unlike = None;
+        let whole = read(record, |number, text, line| {
+            if unlike.is_none() {
+                unlike = unlike_written(number, text, &line);
+            }
+            match line.event() {
+                Some(event) => {
+                    if let Some(last) = attempts.last_mut() {
+                        last.events.push(event);
+                    }
+                }
+                None => {
+                    begin_or_end(&mut attempts, &line);
+                    lines.push(line);
+                }
+            }
+        })?;
         let mut files = Vec::new();
         let header = header(&lines, &rig, &mut files).map_err(|message| RecordError {
             line: 1,
@@ -198,12 +217,12 @@ impl Opened {
             message,
         })?;
         if header.program == env!("CARGO_PKG_VERSION") {
-            let unlike = unlike_written(record, &lines);
             files.extend(unlike.map(|why| format!("{RECORD}, {why}")));
         }
         Ok(Self {
             left_out: left_out(&lines, header.keep),
             lines,
+            attempts,
             whole,
             rig,
             header,
@@ -220,7 +239,7 @@ impl Opened {
     pub(super) fn judged(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<Vec<Judged>, EvidenceError> {
+    ) -> Result<Vec<Judged<'_>>, EvidenceError> {
         Ok(match self.judge()? {
             Some(mut judge) => self.judged_by(judge.as_mut(), scenario),
             None => self.judged_each(scenario, |recorded, text| {
@@ -233,7 +252,7 @@ impl Opened {
     fn judged_and_qualified(
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<(Vec<Judged>, Option<QualifiedAgain>), EvidenceError> {
+    ) -> Result<(Vec<Judged<'_>>, Option<QualifiedAgain>), EvidenceError> {
         let Some(mut judge) = self.judge()?.filter(|_| self.header.qualified) else {
             return Ok((self.judged(scenario)?, None));
         };
@@ -258,7 +277,7 @@ impl Opened {
         &self,
         judge: &mut dyn RecordJudge,
         scenario: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Vec<Judged> {
+    ) -> Vec<Judged<'_>> {
         self.judged_each(scenario, |recorded, text| again(recorded, text, judge))
     }
 
@@ -267,13 +286,13 @@ impl Opened {
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
         mut again: impl FnMut(&Recorded, &str) -> Result<Again, String>,
-    ) -> Vec<Judged> {
-        let attempts = group(&self.lines[1..]).into_iter();
+    ) -> Vec<Judged<'_>> {
+        let attempts = self.attempts.iter();
         attempts
             .map(|recorded| {
                 let text = text_of(&recorded.name, &recorded.sha256, scenario);
                 let again = text.and_then(|text| {
-                    let again = again(&recorded, &text)?;
+                    let again = again(recorded, &text)?;
                     Ok((text, again))
                 });
                 let differs = match &again {
@@ -290,7 +309,7 @@ impl Opened {
     }
 
     /// Whether the record has its last line and the verdict of every attempt.
-    fn is_ended(&self, judged: &[Judged]) -> bool {
+    fn is_ended(&self, judged: &[Judged<'_>]) -> bool {
         self.whole
             && matches!(self.lines.last(), Some(RecordLine::End { .. }))
             && judged.iter().all(|own| own.recorded.verdict.is_some())
@@ -299,7 +318,7 @@ impl Opened {
     /// What the record is worth.
     fn verified(
         &self,
-        judged: &[Judged],
+        judged: &[Judged<'_>],
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Verified {
         let mut verified = Verified {
@@ -391,7 +410,7 @@ pub(super) fn text_of(
     }
 }
 
-impl Judged {
+impl Judged<'_> {
     fn finding(&self) -> Rejudged {
         let own = self.recorded.verdict.as_ref();
         let unused = own.into_iter().flat_map(Recalled::unused);
@@ -411,49 +430,42 @@ impl Judged {
     }
 }
 
-/// The attempts of a record.
-fn group(lines: &[RecordLine]) -> Vec<Recorded> {
-    let mut all: Vec<Recorded> = Vec::new();
-    for line in lines {
-        match line {
-            RecordLine::Scenario {
-                name,
-                sha256,
-                attempt,
-            } => all.push(Recorded {
-                name: name.clone(),
-                sha256: sha256.clone(),
-                attempt: *attempt,
-                events: Vec::new(),
-                verdict: None,
-            }),
-            RecordLine::Verdict {
-                verdict,
-                finding,
-                remarks,
-                took,
-                unplaced,
-                opening,
-            } => {
-                if let Some(last) = all.last_mut() {
-                    last.verdict = Some(Recalled {
-                        verdict: verdict.clone(),
-                        finding: finding.clone(),
-                        remarks: remarks.clone(),
-                        took: Span::from_units(*took),
-                        unplaced: *unplaced,
-                        opening: opening.clone(),
-                    });
-                }
-            }
-            line => {
-                if let (Some(last), Some(event)) = (all.last_mut(), line.event()) {
-                    last.events.push(event);
-                }
+/// Begins an attempt with its first line, and ends it with its verdict.
+fn begin_or_end(attempts: &mut Vec<Recorded>, line: &RecordLine) {
+    match line {
+        RecordLine::Scenario {
+            name,
+            sha256,
+            attempt,
+        } => attempts.push(Recorded {
+            name: name.clone(),
+            sha256: sha256.clone(),
+            attempt: *attempt,
+            events: Vec::new(),
+            verdict: None,
+        }),
+        RecordLine::Verdict {
+            verdict,
+            finding,
+            remarks,
+            took,
+            unplaced,
+            opening,
+        } => {
+            if let Some(last) = attempts.last_mut() {
+                last.events.shrink_to_fit();
+                last.verdict = Some(Recalled {
+                    verdict: verdict.clone(),
+                    finding: finding.clone(),
+                    remarks: remarks.clone(),
+                    took: Span::from_units(*took),
+                    unplaced: *unplaced,
+                    opening: opening.clone(),
+                });
             }
         }
+        _ => {}
     }
-    all
 }
 
 /// Whether a name leads to a file of the folder and nowhere else.

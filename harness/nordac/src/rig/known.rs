@@ -10,6 +10,7 @@ use harness_proto::nordac::words::stw;
 use harness_proto::nordac::{Answer, Image, PARAMETERS, Parameter, Pkw, PpoType, Task};
 use harness_sim::nordac::History;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How many exchanges a task may take (3.4.1 says 2; `pkw-latency`).
 const MOST_EXCHANGES: u32 = 40;
@@ -37,10 +38,10 @@ const LAST_FAULT: u16 = 947;
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     pub(super) slave: RigSlave,
-    /// What the parameters read, by number and IND.
-    pub(super) values: Values,
+    /// What the parameters read, by number and IND. The notes of all attempts share it.
+    pub(super) values: Arc<Values>,
     /// The whole PWE of each of these answers: a wrong slave may show a word in PWE1.
-    pub(super) shown: Values,
+    pub(super) shown: Arc<Values>,
     /// What it keeps of the time before: see [`Self::read_history`].
     pub(super) history: History,
     /// How it behaves where the manual leaves that open, as far as a conversation has shown it.
@@ -53,8 +54,8 @@ impl Known {
     pub(super) fn new(slave: RigSlave) -> Self {
         Self {
             slave,
-            values: BTreeMap::new(),
-            shown: BTreeMap::new(),
+            values: Arc::default(),
+            shown: Arc::default(),
             history: History::default(),
             properties: Properties::default(),
             open: candidates(Properties::default(), |_| true),
@@ -90,14 +91,16 @@ impl Known {
         if !self.ppo().has_pkw() {
             return Ok(());
         }
+        let values = Arc::make_mut(&mut self.values);
+        let shown = Arc::make_mut(&mut self.shown);
         let all = PARAMETERS.iter().filter(|own| !own.has(Flag::ReadOnly));
         for parameter in all.filter(|own| !own.needs_posicon()) {
             for ind in indices(parameter) {
                 let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
                 let answer = confirmed(self.slave, talk, task)?;
                 if let Some((answer, value)) = answer.and_then(|own| Some((own, value(own)?))) {
-                    self.values.insert((parameter.number, ind), value);
-                    self.shown.insert((parameter.number, ind), answer.pwe);
+                    values.insert((parameter.number, ind), value);
+                    shown.insert((parameter.number, ind), answer.pwe);
                 }
             }
         }

@@ -13,7 +13,7 @@ fn run() -> (Bench, PathBuf, String) {
 }
 
 fn error(record: &[u8]) -> RecordError {
-    read(record).expect_err("damaged")
+    read(record, |_, _, _| {}).expect_err("damaged")
 }
 
 /// Line, column and byte of the first mistake.
@@ -202,9 +202,10 @@ fn the_rigs_file_is_its_own() {
 fn cut_anywhere() {
     let (_bench, _, text) = run();
     for length in 0..text.len().min(6_000) {
-        match read(&text.as_bytes()[..length]) {
-            Ok((lines, whole)) => {
-                assert!(!lines.is_empty() && whole == text[..length].ends_with('\n'))
+        let mut lines = 0;
+        match read(&text.as_bytes()[..length], |_, _, _| lines += 1) {
+            Ok(whole) => {
+                assert!(lines > 0 && whole == text[..length].ends_with('\n'))
             }
             Err(error) => assert!(error.line == 1 && error.offset <= length, "{error}"),
         }

@@ -8,6 +8,7 @@ use harness_proto::limit::LimitSetting;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::{Highest, Limits};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A setting of `[limits]` that can keep a scenario from being played.
 #[derive(Clone, Copy)]
@@ -131,7 +132,7 @@ impl Player {
             let mut known = listed.cloned().unwrap_or_else(|| Known::new(wanted));
             known.slave = wanted;
             if known.values.is_empty() {
-                known.values.insert((INTERFACE, 0), 2);
+                Arc::make_mut(&mut known.values).insert((INTERFACE, 0), 2);
             }
             all.retain(|own| own.slave.address != address);
             all.push(known);
