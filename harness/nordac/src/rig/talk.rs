@@ -5,8 +5,8 @@ use harness_bench::counted::counted;
 use harness_bench::link::{Line, Octets, Trouble};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::master::{ExchangeError, StartError, Startup};
-use harness_proto::nordac::{Image, PpoType};
-use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service};
+use harness_proto::nordac::{IDENT, Image, PpoType};
+use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service, SetPrm};
 use harness_proto::profibus::master::{Requests, SlaveReply};
 use harness_proto::profibus::{Buffer, Pdu, Telegram};
 use harness_proto::time::{Instant, Span};
@@ -183,9 +183,10 @@ impl<'l> Talk<'l> {
                 return Err(TalkError::Echo);
             }
             match telegram.and_then(|telegram| self.requests(slave).take(&telegram)) {
-                Some(SlaveReply::Other(control)) => other = Some(SlaveReply::Other(control)),
                 None => {}
-                fits => return Ok(fits),
+                // It may be a late reply to another request, such as that for the FDL status.
+                Some(reply) if !fits(&pdu, &reply) => other = Some(reply),
+                reply => return Ok(reply),
             }
             // A busy computer hands over a reply late, and then to a request that came behind: what is under way passes first.
             self.pass(self.patience)?;
@@ -297,6 +298,25 @@ impl<'l> Talk<'l> {
         }
     }
 
+    /// Lets a slave forget its master at once (EN 2, Set_Prm with Unlock).
+    ///
+    /// # Errors
+    /// [`TalkError`].
+    pub(crate) fn unlock(&mut self, slave: u8) -> Result<(), TalkError> {
+        let mut parameters = SetPrm::lock(IDENT);
+        parameters.status = SetPrm::UNLOCK;
+        let name = Service::SetPrm.name();
+        let data = parameters.encode().unwrap_or_default();
+        match self.ask(slave, Service::SetPrm, &data)? {
+            Some(SlaveReply::Confirmed) => Ok(()),
+            Some(other) => Err(unexpected(slave, name, &other)),
+            None => Err(TalkError::NoReply {
+                slave,
+                service: name,
+            }),
+        }
+    }
+
     /// One Data_Exchange.
     ///
     /// # Errors
@@ -336,6 +356,18 @@ impl<'l> Talk<'l> {
             self.pass(rest)?;
         }
         Ok(())
+    }
+}
+
+/// Whether a reply is one to this request.
+fn fits(request: &Pdu, reply: &SlaveReply) -> bool {
+    match reply {
+        SlaveReply::Confirmed => matches!(
+            Service::of(request.dsap()),
+            Some(Service::SetPrm | Service::ChkCfg)
+        ),
+        SlaveReply::NotActivated | SlaveReply::Data { .. } => true,
+        SlaveReply::Present | SlaveReply::Other(_) => false,
     }
 }
 

@@ -21,7 +21,7 @@ const IDLE_TIMES: usize = 2;
 /// How often each word that acknowledges a fault is sent.
 const ACKNOWLEDGED: usize = 4;
 
-/// The watchdog by which a slave forgets its master before a scenario begins: 100 ms.
+/// The watchdog by which a slave forgets its master before a scenario begins, where it may not be unlocked: 100 ms.
 const FORGET: [u8; 2] = [1, 10];
 
 /// How long that takes, at most.
@@ -102,9 +102,14 @@ impl Player {
                     let zsw = idle((slave.address, ppo), &mut talk)?;
                     faulted |= zsw & zsw::FAULT != 0;
                     self.without_fault((slave.address, ppo), zsw, &mut talk)?;
-                    talk.start(slave.address, ppo, Some(FORGET))?;
+                    match self.limits.bus_settings {
+                        true => talk.unlock(slave.address)?,
+                        false => talk.start(slave.address, ppo, Some(FORGET))?,
+                    }
                 }
-                talk.pass(FORGOTTEN)?;
+                if !self.limits.bus_settings {
+                    talk.pass(FORGOTTEN)?;
+                }
                 for slave in &own.plan.setup.slaves {
                     talk.restart(slave.address);
                     talk.diagnose(slave.address)?;
