@@ -502,7 +502,7 @@ impl Player {
         let mut link = guarded(Bench::new(&setup), *limits, &gated, false);
         if let Some(gate) = link.slaves_mut() {
             for known in self.known() {
-                for ((number, ind), raw) in &known.values {
+                for ((number, ind), raw) in known.values.iter() {
                     gate.learn(known.slave.address, *number, (ind >> 8 & 3) as u8, *raw);
                 }
             }

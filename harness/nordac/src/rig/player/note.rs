@@ -156,7 +156,11 @@ impl AttemptNote {
             Some(_) if self.shown.ended.is_some() => Verdict::Skipped,
             _ => outcome.verdict,
         };
-        let unready = self.shown.unanswered.is_some() && self.telegrams > 0;
+        let unready = match &self.shown.unanswered {
+            // The rig's line was lost.
+            None | Some(TalkError::Line(_)) => false,
+            Some(_) => self.telegrams > 0,
+        };
         self.accuses = outcome.verdict == Verdict::Failed || unready && !self.exact;
     }
 
@@ -228,7 +232,7 @@ impl AttemptNote {
             wanted.into_iter().filter(differs).collect()
         };
         let first = reads(&Values::new());
-        let mut open = differing(&first, known.shown.clone());
+        let mut open = differing(&first, (*known.shown).clone());
         let mut held = Values::new();
         for guess in [
             |_: u32, read: u32| read,

@@ -130,6 +130,8 @@ struct World {
     own: &'static [u16],
     /// Whether the slave was without a fault, so that a present one has come since.
     worked: bool,
+    /// Whether a fault has come in this conversation: what is kept of it is compared behind its acknowledgement too.
+    failed: bool,
     rate: BusRate,
     /// When the last octet had passed.
     free: Instant,
@@ -166,6 +168,7 @@ impl World {
                 false => &OWN[..OWN.len() - FAULT_MEMORY],
             },
             worked: false,
+            failed: false,
             rate,
             free: Instant::START,
             ahead: (0, 0),
@@ -183,10 +186,22 @@ impl World {
         let mut world = self;
         for (number, turn) in turns.iter().enumerate().skip(from) {
             let differs = match world.takes(number, turn, turns.get(number + 1)) {
-                Ok(own) => {
+                Ok(own) if own.owed.len() <= world.owed.len() || !are_few(&turns[number..]) => {
                     world = own;
                     continue;
                 }
+                // What did not come may come behind the next telegram, or this telegram with that one, or the line has lost one of them.
+                Ok(own) => match own.plays(turns, number + 1, most_lost) {
+                    Err(differs) => {
+                        let late = late_reply(turns, number);
+                        let late = late.map(|own| world.clone().plays(&own, number, most_lost));
+                        match late {
+                            Some(Ok(lost)) => return Ok(lost),
+                            _ => differs,
+                        }
+                    }
+                    lost => return lost,
+                },
                 Err(differs) => differs,
             };
             if most_lost == 0 {
@@ -318,7 +333,7 @@ impl World {
         let shows = matches!(image.pkw.ak(), 1 | 4);
         let number = image.pkw.number();
         let known = number == LAST_FAULT && FOLLOWS.contains(&(image.pkw.ind >> 8));
-        if !shows || !self.own.contains(&number) || known && self.has_failed() {
+        if !shows || !self.own.contains(&number) || known && self.failed {
             return None;
         }
         image.pkw.pwe = 0;
@@ -331,11 +346,6 @@ impl World {
             [slave] => slave.drive().inverter().state() == State::Fault,
             _ => false,
         }
-    }
-
-    /// Whether the slave has a fault that has come in this conversation.
-    fn has_failed(&self) -> bool {
-        self.worked && self.has_fault()
     }
 
     /// The slaves behind octets of which the last one ends at this time, and what they reply.
@@ -359,7 +369,9 @@ impl World {
                 reply.extend(sent.iter().map(|own| own.byte));
             }
         }
-        world.worked |= !world.has_fault();
+        let has_fault = world.has_fault();
+        world.failed |= world.worked && has_fault;
+        world.worked |= !has_fault;
         (world, reply)
     }
 
@@ -498,6 +510,28 @@ impl World {
         }
         None
     }
+}
+
+/// Whether nothing has come to the first of these telegrams, and to as few as a line loses in one attempt.
+fn are_few(turns: &[Turn]) -> bool {
+    let silent = turns.iter().take_while(|own| own.came.is_empty()).count();
+    (1..=MOST_LOST).contains(&silent)
+}
+
+/// The telegrams, if the first reply behind the next ones is that to the telegram at this place: it has reached the slaves late.
+fn late_reply(turns: &[Turn], place: usize) -> Option<Vec<Turn>> {
+    let behind = turns[place..].iter().position(|own| !own.came.is_empty())?;
+    let mut late = turns.to_vec();
+    let next = &mut late[place + behind];
+    let octets: Vec<u8> = next.came.iter().map(|own| *own as u8).collect();
+    let Decoded::Value { used, .. } = Telegram::decode(&octets) else {
+        return None;
+    };
+    let rest = next.came.split_off(used);
+    let reply = std::mem::replace(&mut next.came, rest);
+    let read = next.read;
+    (late[place].came, late[place].read) = (reply, read);
+    Some(late)
 }
 
 /// The inputs in a reply that carries them.

@@ -7,6 +7,7 @@ use crate::rig::RigSlave;
 use harness_bench::scenario::source::Source;
 use harness_proto::nordac::guard::Limits;
 use harness_sim::nordac::deviation::deviation;
+use std::sync::Arc;
 
 /// Up to 25 % in 1.25 s, down by OFF3, a fault by 1625, and a parameter that follows the motor.
 const RUN: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8\nexchange 8 STW=047F\nexchange 8\n\
@@ -21,10 +22,8 @@ fn known(parameters: &[(u16, u32)]) -> Known {
         ppo: Some(PpoType::One),
     });
     let values = parameters.iter().map(|(number, raw)| ((*number, 0), *raw));
-    known.values = [((1621, 0), 2), ((1615, 0), 20)]
-        .into_iter()
-        .chain(values)
-        .collect();
+    let fixed = [((1621, 0), 2), ((1615, 0), 20)].into_iter();
+    known.values = Arc::new(fixed.chain(values).collect());
     known
 }
 
@@ -130,7 +129,7 @@ fn earlier_faults_are_not_known() {
     assert!(judged(&came).is_err());
     // All else is compared.
     let mut other = faults(&[3, 5, 10]);
-    other.values.insert((1202, 0), 80);
+    Arc::make_mut(&mut other.values).insert((1202, 0), 80);
     assert!(sent_by(&[last], 0, &turns(&other)).is_err());
 }
 
@@ -196,6 +195,67 @@ fn a_line_that_loses_something_accuses_no_slave() {
     }
     assert!(lossy(&silent).is_err());
     assert!(lossy(&turns(&known(&[(1202, 80)]))).is_err());
+}
+
+/// EN 1: a slave that has not heard a request takes the next one, with the frame count bit of the one before, for its repetition.
+#[test]
+fn a_line_that_loses_a_request_accuses_no_slave() {
+    let all = [known(&[])];
+    let right = turns(&all[0]);
+    let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
+    for place in (0..right.len()).filter(played) {
+        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
+        let mut lost = right.clone();
+        for (number, turn) in lost.iter_mut().enumerate() {
+            let mut came = Vec::new();
+            if number != place {
+                let soon = world.soon(turn);
+                (world, came) = world.hears(&turn.octets, soon);
+            }
+            turn.came = wide(&came);
+        }
+        lost[place].read = None;
+        let found = sent_by(&all, MOST_LOST, &lost);
+        assert!(found.is_ok(), "{place}: {found:?}");
+    }
+}
+
+/// An adapter, or the simulator of a slave, that stands still gets the next telegram too, and handles both at once: the motor has moved since.
+#[test]
+fn telegrams_that_are_held_up_accuse_no_slave() {
+    let pause = Span::from_millis(700);
+    let all = [known(&[])];
+    let right = turns(&all[0]);
+    let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
+    for place in (0..right.len() - 1).filter(played) {
+        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
+        let mut late = right.clone();
+        let held = std::mem::take(&mut late[place].came);
+        assert!(!held.is_empty());
+        late[place].read = None;
+        for (number, turn) in late.iter_mut().enumerate() {
+            let mut came = Vec::new();
+            if number > place {
+                turn.read = turn.read.map(|own| own + pause);
+            }
+            if number > place + 1 {
+                turn.left += pause;
+            }
+            let mut at = world.soon(turn);
+            if number == place + 1 {
+                at += pause;
+                (world, came) = world.hears(&right[place].octets, at);
+                at = world.free + MOMENT;
+            }
+            if number != place {
+                let (next, more) = world.hears(&turn.octets, at);
+                world = next;
+                came.extend(more);
+            }
+            turn.came = wide(&came);
+        }
+        assert_eq!(judged(&late), Ok(()), "{place}");
+    }
 }
 
 /// An octet behind a reply was not lost, and no reply is there that the line has changed.
