@@ -39,6 +39,8 @@ pub(super) struct FrameNotes {
     pub(super) given: Vec<Given>,
     /// The last request, by register, and when it had left.
     asked: Option<(u8, Instant)>,
+    /// The registers of the requests of this conversation without a reply: one that was late is answered again where it was repeated.
+    awaited: Vec<u8>,
     /// The shortest time from the end of a request to the end of its reply.
     pub(super) shortest: Option<Span>,
     /// The longest time from the end of a request until the bench had read its reply: what the way to the drive and back takes.
@@ -149,6 +151,11 @@ impl FrameNotes {
         self.stored.iter().copied()
     }
 
+    /// Whether a request of this conversation has no reply yet.
+    pub(super) fn awaits(&self) -> bool {
+        !self.awaited.is_empty()
+    }
+
     /// What was received so far, in words.
     pub(super) fn received(&self) -> String {
         let ReceivedSum { pieces, sum } = self.heard;
@@ -183,7 +190,10 @@ impl LinkNotes for FrameNotes {
                         _ => {}
                     }
                 }
-                Ok(Request::Read { register }) => self.asked = Some((register, end)),
+                Ok(Request::Read { register }) => {
+                    self.asked = Some((register, end));
+                    self.awaited.push(register);
+                }
                 Ok(Request::Cycle { .. } | Request::Stop { .. }) | Err(_) => {}
             }
         }
@@ -209,6 +219,10 @@ impl LinkNotes for FrameNotes {
         for byte in frame.to_string().bytes() {
             self.heard.add(u32::from(byte));
         }
+        let answers = |own: &u8| frame.data().first() == Some(own);
+        if let Some(place) = self.awaited.iter().position(answers) {
+            self.awaited.remove(place);
+        }
         if let Some((register, end)) = self.asked
             && frame.data().first() == Some(&register)
         {
@@ -227,6 +241,7 @@ impl LinkNotes for FrameNotes {
             *begun = frames.len();
         }
         self.asked = None;
+        self.awaited.clear();
     }
 }
 
@@ -254,6 +269,26 @@ mod tests {
             ..Exchange::default()
         };
         talk.longest_standstill()
+    }
+
+    /// A request that was repeated because its reply was late has two replies.
+    #[test]
+    fn each_request_awaits_a_reply() {
+        let mut notes = FrameNotes::default();
+        let asks = |notes: &mut FrameNotes| {
+            notes.sent(Out::Frames(&[frame("201#3DEB00")]), Instant::START);
+        };
+        let comes = |notes: &mut FrameNotes, text: &str| {
+            let heard = Heard::Frame(can::CanEvent::Frame(frame(text)));
+            notes.heard(Medium::Frames(can::BitRate::K500), at(&1), at(&1), heard);
+        };
+        asks(&mut notes);
+        asks(&mut notes);
+        comes(&mut notes, "181#EB102700");
+        comes(&mut notes, "181#40010100");
+        assert!(notes.awaits());
+        comes(&mut notes, "181#EB102700");
+        assert!(!notes.awaits());
     }
 
     /// A cycle in which a pause stands, one that has ended before a request, and requests that are far apart (UNITEK 5.2).

@@ -157,7 +157,12 @@ pub(super) struct Slcan {
     answers: bool,
     /// Whether it was told to be silent.
     silenced: bool,
+    /// How many lines, one behind the other, were none that an adapter sends.
+    damaged: usize,
 }
+
+/// A serial line that has lost characters damages a line. From this number on, one behind the other, something else than an adapter sends.
+const MOST_DAMAGED: usize = 8;
 
 impl Slcan {
     pub(super) fn new(listen_only: bool, answers: bool, silenced: bool) -> Self {
@@ -170,6 +175,7 @@ impl Slcan {
             listen_only,
             answers,
             silenced,
+            damaged: 0,
         }
     }
 
@@ -203,6 +209,10 @@ impl Slcan {
             return Vec::new();
         };
         let report = line.and_then(|(line, end)| slcan::Report::parse(&line, end));
+        self.damaged = match report {
+            Ok(_) => 0,
+            Err(_) => self.damaged + 1,
+        };
         match report {
             Ok(slcan::Report::Frame(frame, stamp)) => {
                 let at = stamp.map_or(read, |stamp| {
@@ -225,6 +235,8 @@ impl Slcan {
                 | slcan::Report::SerialNumber(_)
                 | slcan::Report::Other(_),
             ) => Vec::new(),
+            // What stood in it was lost between the adapter and the computer.
+            Err(_) if self.damaged < MOST_DAMAGED => vec![Event::Overrun],
             Err(error) => vec![Event::Ended(error.to_string())],
         }
     }
@@ -361,6 +373,20 @@ mod tests {
         let flags = events(&mut own, "F89\r", at(5));
         assert_eq!(flags.len(), 2, "{flags:?}");
         assert_eq!(flags[0], Event::Overrun);
+    }
+
+    /// A buffer that has run over while the computer stood still leaves a line without its middle, and the next one is whole.
+    #[test]
+    fn a_damaged_line_is_lost_and_several_end_the_conversation() {
+        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
+        let text = "t1814408t1814408131005D59\rt181440810100\r";
+        let frame = Event::Heard(at(4), CanEvent::Frame(frame("181#40810100")));
+        assert_eq!(events(&mut own, text, at(4)), [Event::Overrun, frame]);
+        let lines = "t1\r".repeat(MOST_DAMAGED);
+        let all = events(&mut own, &lines, at(5));
+        let (last, lost) = all.split_last().expect("an event");
+        assert!(lost.iter().all(|own| *own == Event::Overrun));
+        assert!(matches!(last, Event::Ended(_)), "{last:?}");
     }
 
     /// What is refused is the oldest command; an adapter without status is not asked again.

@@ -17,7 +17,7 @@ mod worlds;
 pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
 use verdict::{explained, unlike};
-use worlds::{BY_LINES, Shown, Told};
+use worlds::{BY_LINES, STANDSTILL, Shown, Told};
 
 use super::Axis;
 use super::known::Known;
@@ -363,6 +363,7 @@ impl Player {
             }),
             Err(skip) => return Gone::Skipped(skip),
         };
+        outlast(link);
         link.noted.exchange.begin(Instant::START);
         let at_rest = self.prepare(own, self.limits.motion, link);
         self.before = Some(link.noted.received());
@@ -374,6 +375,7 @@ impl Player {
         if own.may_time_out(self.known()) {
             link.without_pauses();
         }
+        outlast(link);
         link.begin();
         link.take_late();
         let excused = self.excused.get(&own.name);
@@ -561,6 +563,16 @@ impl Player {
             gate.learn(known.axis.rx, full, limit);
         }
         self.moved.iter().for_each(|rx| gate.note_moved(*rx));
+    }
+}
+
+/// Receives the replies that are still to come: a request that was repeated because its reply was late has two of them, and the second one
+/// answers nothing that follows.
+fn outlast(link: &mut Observed<'_>) {
+    let end = link.now() + STANDSTILL;
+    while link.noted.awaits() && link.now() < end && link.trouble().is_none() {
+        link.wait(end.min(link.now() + STEP));
+        while link.receive(0).is_some() {}
     }
 }
 

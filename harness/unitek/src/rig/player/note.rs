@@ -131,7 +131,11 @@ impl Note {
     /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
         self.verdict = outcome.verdict;
-        let unready = self.shown.unanswered.is_some() && self.frames > 0;
+        let unready = match &self.shown.unanswered {
+            // The rig's line was lost.
+            None | Some(Error::Link(_)) => false,
+            Some(_) => self.frames > 0,
+        };
         self.accuses = outcome.verdict == Verdict::Failed || unready;
     }
 

@@ -34,7 +34,7 @@ const USUALLY: Span = Span::from_millis(3);
 const WORSE: u64 = 3;
 
 /// From this time without a reply, or without frames of a cycle, on something has stood still, and the attempt accuses no drive.
-const STANDSTILL: Span = Span::from_millis(250);
+pub(super) const STANDSTILL: Span = Span::from_millis(250);
 
 /// The most frames of an attempt that an adapter may lose.
 pub(super) const MOST_LOST: usize = 3;
