@@ -24,7 +24,10 @@ use harness_bench::link::{
 };
 use harness_bench::rig::{Again, Attempt, Keeper, PlayedScenario, Rig, SessionError, attempts_of};
 use harness_bench::scenario::problem::Problems;
-use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well};
+use harness_bench::scenario::run::{
+    AtMismatch, ByteDifference, Mismatch, Outcome, Skip, Unlock, Why, lacks, lacks_as_well,
+};
+use harness_bench::scenario::verdict::Verdict;
 use harness_proto::limit::LimitSetting;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::{Limits, Touched};
@@ -37,6 +40,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How long bytes are waited for that an attempt has not received, so that the next one does not take them for its own. A busy computer
 /// can hold them back for longer than a ring does.
 const LATEST: Span = Span::from_millis(250);
+
+/// How long a line is listened to behind a scenario in which nothing more came, beside the second for which it was waited there.
+const STANDSTILL: Span = Span::from_millis(1_500);
 
 /// A rig that scenarios are played on, and its twin.
 pub(crate) struct Run<'s> {
@@ -553,7 +559,11 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
     let outcome = match ready {
         Ok(()) => {
             link.begin();
-            play_over_bus(plan, link, AtMismatch::Stop)
+            let outcome = play_over_bus(plan, link, AtMismatch::Stop);
+            if link.time_tolerance() > Span::ZERO && ends_in_silence(&outcome) {
+                outlast_standstill(link, way.rings.len());
+            }
+            outcome
         }
         Err(not_ready) => not_ready.judged(link),
     };
@@ -561,6 +571,31 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
         come_home(link);
     }
     outcome
+}
+
+/// Whether a scenario has failed because nothing more came.
+fn ends_in_silence(outcome: &Outcome) -> bool {
+    let finding = outcome.finding.as_ref();
+    let silent = |own: &Mismatch| {
+        own.difference
+            .as_ref()
+            .is_none_or(ByteDifference::is_absence)
+    };
+    outcome.verdict == Verdict::Failed && finding.is_some_and(silent)
+}
+
+/// Receives what still comes: an adapter or a computer that stands still for up to two seconds loses nothing, and is then not taken for a
+/// drive that has not answered.
+fn outlast_standstill(link: &mut dyn Link, rings: usize) {
+    let end = link.now() + STANDSTILL;
+    let mut until = end;
+    while link.now() < until && link.trouble().is_none() && wait_keeping(link, until) {
+        for ring in 0..rings {
+            while link.receive(ring).is_some() {
+                until = end.min(link.now() + LATEST);
+            }
+        }
+    }
 }
 
 /// Drops the bytes that come back behind the end of a conversation, from rings that owe some.
