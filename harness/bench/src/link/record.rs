@@ -57,6 +57,9 @@ pub enum LinkEvent {
 pub trait Sink: Send {
     /// Takes one.
     fn take(&mut self, event: &LinkEvent);
+
+    /// A wait begins, in which nothing need happen.
+    fn waits(&mut self) {}
 }
 
 impl Sink for Vec<LinkEvent> {
@@ -240,6 +243,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
+        self.sink.waits();
         let Some(busy) = self.known.as_ref().map(|known| known.busy) else {
             let more = self.link.wait(until);
             self.tell();

@@ -154,9 +154,7 @@ impl<'s> Run<'s> {
 
     /// Tells the session's watchdog that the program works.
     fn alive(&self) {
-        if let Some(beats) = &self.beats {
-            beats.fetch_add(1, Ordering::Relaxed);
-        }
+        beat(self.beats.as_deref());
     }
 
     /// Plays a scenario, and again where it did not pass, as often as the rig's file says.
@@ -403,8 +401,8 @@ impl<'s> Run<'s> {
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
-        let mut forgotten: Vec<LinkEvent> = Vec::new();
-        play(&mut Recording::new(&mut guarded, &mut forgotten));
+        let mut beating = Beating(self.beats.clone());
+        play(&mut Recording::new(&mut guarded, &mut beating));
         Some(guarded)
     }
 
@@ -615,6 +613,25 @@ fn drop_late(link: &mut dyn Link, rings: &[RingSize], last: &Conversation) {
                 *owed = owed.saturating_sub(1);
             }
         }
+    }
+}
+
+fn beat(beats: Option<&AtomicU64>) {
+    if let Some(beats) = beats {
+        beats.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Tells a session's watchdog that the program works while it plays on a model, which takes a busy computer longer than the watchdog waits.
+struct Beating(Option<Arc<AtomicU64>>);
+
+impl Sink for Beating {
+    fn take(&mut self, _: &LinkEvent) {
+        beat(self.0.as_deref());
+    }
+
+    fn waits(&mut self) {
+        beat(self.0.as_deref());
     }
 }
 

@@ -5,6 +5,7 @@ use super::known::Known;
 use super::observed::{FrameNotes, Given, Written};
 use super::{Axis, Session};
 use crate::driver::{Driver, Error};
+use crate::gate::GuardsSegment as _;
 use crate::rig::OfUnitek as _;
 use crate::safe_state::last_words;
 use harness_bench::medium::{Out, Pieces};
@@ -34,6 +35,9 @@ const CANCEL: (u8, u16) = (0x8E, 0x4D44);
 
 /// The registers of the identifiers: to receive, and to send.
 const IDENTIFIERS: [u8; 2] = [0x68, 0x69];
+
+/// Identifiers and bit rate: a drive that stores new ones may be lost.
+const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
 
 /// How a drive is reached: on which identifiers it sends, its second ones, its time-out of the bus.
 const REACHED_BY: [u8; 4] = [0x69, 0x88, 0x89, TIME_OUT];
@@ -119,6 +123,8 @@ pub(super) fn set_back(
     let mut notes = Vec::new();
     for known in drives {
         let axis = known.axis;
+        let gate = session.link().segment();
+        let moved = gate.is_some_and(|own| own.has_moved(axis.rx));
         let mut driver = session.driver();
         let mut own = SetBack {
             driver: &mut driver,
@@ -127,6 +133,10 @@ pub(super) fn set_back(
         };
         let registers = own.registers(known, written);
         let silent = registers.is_err();
+        let moved_back = match moved && !silent {
+            true => own.moved_back(known),
+            false => Ok(false),
+        };
         notes.extend(registers.unwrap_or_else(|error| vec![error.to_string()]));
         if !silent {
             let errors = own.errors(known, may_release);
@@ -134,6 +144,10 @@ pub(super) fn set_back(
         }
         let levels = stored.iter().filter(|own| own.0 == axis.rx);
         notes.extend(levels.map(|(_, level)| own.level(*level)));
+        drop(driver);
+        if let (Ok(true), Some(gate)) = (moved_back, session.link().segment_mut()) {
+            gate.moved_back(axis.rx);
+        }
     }
     notes
 }
@@ -261,6 +275,18 @@ impl SetBack<'_, '_> {
             notes.extend(self.register(register, raw)?);
         }
         Ok(notes)
+    }
+
+    /// Whether the settings of the bus read as they did at first.
+    fn moved_back(&mut self, known: &Known) -> Result<bool, Error> {
+        for register in BUS_SETTINGS {
+            let mask = Register::of(register).mask();
+            let reads = self.driver.read(self.axis, register)?.data.bits() & mask;
+            if known.first.get(&register).map(|own| own & mask) != Some(reads) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Sets a register back to what it was. Returns what is left to say.

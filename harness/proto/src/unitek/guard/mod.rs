@@ -194,11 +194,17 @@ impl Gate {
         }
     }
 
-    /// Takes notice that new bus settings have been written earlier to the drive that receives on `rx`.
-    pub fn note_moved(&mut self, rx: u16) {
-        for drive in self.drives.iter_mut().filter(|own| own.rx.contains(&rx)) {
-            drive.moved = true;
-        }
+    /// Whether new bus settings (68, 69, 73) were written to the drive whose first identifier is `first_rx`, and are not known to be set back:
+    /// storing them (84) may lose the drive.
+    #[must_use]
+    pub fn has_moved(&self, first_rx: u16) -> bool {
+        let mut drives = self.drives.iter();
+        drives.any(|own| own.first_rx == first_rx && own.moved)
+    }
+
+    /// Takes notice that the bus settings of this drive read as they did at first.
+    pub fn moved_back(&mut self, first_rx: u16) {
+        self.with(first_rx, |drive| drive.moved = false);
     }
 
     /// What the rig's file permits.

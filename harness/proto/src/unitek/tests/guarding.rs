@@ -182,6 +182,12 @@ fn a_drive_that_moves() {
     assert!(gate.places().any(|own| own.has_moved()));
     gate.settled(0x201);
     assert!(!gate.places().any(|own| own.has_moved()));
+    // That it answers on its first identifiers does not show what 84 would store.
+    assert!(gate.has_moved(0x201));
+    assert_eq!(denied(&mut gate, "201#840000"), Some(Denial::LostDrive));
+    gate.moved_back(0x201);
+    assert!(!gate.has_moved(0x201));
+    assert_eq!(denied(&mut gate, "201#840000"), None);
 }
 
 /// UNITEK 3.1: an identifier has one drive and one direction, from the moment it may be in use until the drive is found elsewhere.

@@ -48,9 +48,6 @@ use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Settin
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Identifiers and bit rate: a drive that stores new ones may be lost.
-const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
-
 /// Registers that show what a drive makes of its inputs: a model that explains the drive reads the same at rest.
 const AT_REST: [u8; 9] = [0x40, 0x8F, 0xCE, 0xD8, 0xE2, 0xE3, 0xEF, 0xF2, 0xF5];
 
@@ -113,8 +110,6 @@ pub(crate) struct Player {
     partly: Vec<Known>,
     /// What has been written since the registers were read.
     written: Written,
-    /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
-    moved: BTreeSet<u16>,
     /// The levels of the EEPROM that the last attempt may have stored, with the drives.
     levels: BTreeSet<(u16, u16)>,
     /// Whether something that was played may have stored parameters.
@@ -155,7 +150,6 @@ impl Player {
             known: None,
             partly: Vec::new(),
             written: BTreeSet::new(),
-            moved: BTreeSet::new(),
             levels: BTreeSet::new(),
             stored: false,
             before: None,
@@ -412,12 +406,6 @@ impl Player {
             while link.receive(0).is_some() {}
         }
         self.take_notes(&link.noted);
-        let settings = link
-            .noted
-            .written
-            .iter()
-            .filter(|own| BUS_SETTINGS.contains(&own.1));
-        self.moved.extend(settings.map(|own| own.0));
         Gone::Played(Box::new(outcome), [at_rest, model])
     }
 
@@ -562,7 +550,6 @@ impl Player {
             let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
             gate.learn(known.axis.rx, full, limit);
         }
-        self.moved.iter().for_each(|rx| gate.note_moved(*rx));
     }
 }
 
