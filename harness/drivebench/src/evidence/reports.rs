@@ -130,7 +130,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> 
     if !opened.header.of_rings {
         // An adapter may stamp a frame before the conversation began, where a capture has no place for its first bit.
         let looks = !opened.rig.file.interlock.is_empty();
-        let differs = frames_differ(&own.recorded, &capture_read.traces, looks)?;
+        let differs = frames_differ(own.recorded, &capture_read.traces, looks)?;
         return Some(format!("{name}: {differs}"));
     }
     if capture(&capture_read.traces, &again.attempt.outcome) != text {
@@ -141,7 +141,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged<'_>) -> Option<String> 
     if opened.header.simulated || !opened.rig.file.interlock.is_empty() {
         return None;
     }
-    let ends = Ends::of(&own.recorded, opened);
+    let ends = Ends::of(own.recorded, opened);
     let differs = ends.differ(&capture_read.traces)?;
     Some(format!("{name}: {differs}"))
 }
