@@ -14,6 +14,13 @@ use std::fmt::Write as _;
 /// Maximum number of unexpected bytes shown.
 const SHOWN: usize = 8;
 
+/// How long bytes are waited for that an attempt has not received, so that the next one does not take them for its own. A busy computer
+/// can hold them back for longer than a ring does.
+pub(super) const LATEST: Span = Span::from_millis(250);
+
+/// How long a line is listened to where nothing more came, beside the time for which it was waited before.
+const STANDSTILL: Span = Span::from_millis(1_500);
+
 /// What is wrong with a ring.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unhealthy {
@@ -114,12 +121,29 @@ pub(crate) fn examine(
                     if left == 0 || link.trouble().is_some() {
                         return Err((ring, ill));
                     }
+                    if link.time_tolerance() > Span::ZERO {
+                        outlast_standstill(link, rings.len());
+                    }
                 }
             }
         }
     }
     link.begin();
     Ok(health)
+}
+
+/// Receives what still comes: an adapter or a computer that stands still for up to two seconds loses nothing, and is then not taken for a
+/// drive that has not answered.
+pub(super) fn outlast_standstill(link: &mut dyn Link, rings: usize) {
+    let end = link.now() + STANDSTILL;
+    let mut until = end;
+    while link.now() < until && link.trouble().is_none() && wait_keeping(link, until) {
+        for ring in 0..rings {
+            while link.receive(ring).is_some() {
+                until = end.min(link.now() + LATEST);
+            }
+        }
+    }
 }
 
 fn examine_once(link: &mut dyn Link, ring: usize, stated: RingSize) -> Result<Recovery, Unhealthy> {

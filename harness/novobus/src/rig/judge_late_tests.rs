@@ -153,6 +153,7 @@ fn late_bytes_fail_no_drive() {
         (&asked, 100, Marginal),
         (&asked, 900, Marginal),
         (&asked, 1_500, Inconclusive),
+        (&asked, 2_300, Inconclusive),
     ] {
         assert_eq!(judged("", 0, scenario).verdict, Passed);
         let outcome = judged("", late, scenario);

@@ -3,7 +3,7 @@
 
 use super::beside::BesideTwin;
 use super::driven::Driven;
-use super::health::{Unhealthy, examine};
+use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
 use super::held_session::HeldSession;
 use super::judge::{AttemptFacts, judge, known};
 use super::put_back::within;
@@ -36,13 +36,6 @@ use harness_sim::novobus::deviation::MasterDeviation;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// How long bytes are waited for that an attempt has not received, so that the next one does not take them for its own. A busy computer
-/// can hold them back for longer than a ring does.
-const LATEST: Span = Span::from_millis(250);
-
-/// How long a line is listened to behind a scenario in which nothing more came, beside the second for which it was waited there.
-const STANDSTILL: Span = Span::from_millis(1_500);
 
 /// A rig that scenarios are played on, and its twin.
 pub(crate) struct Run<'s> {
@@ -580,20 +573,6 @@ fn ends_in_silence(outcome: &Outcome) -> bool {
             .is_none_or(ByteDifference::is_absence)
     };
     outcome.verdict == Verdict::Failed && finding.is_some_and(silent)
-}
-
-/// Receives what still comes: an adapter or a computer that stands still for up to two seconds loses nothing, and is then not taken for a
-/// drive that has not answered.
-fn outlast_standstill(link: &mut dyn Link, rings: usize) {
-    let end = link.now() + STANDSTILL;
-    let mut until = end;
-    while link.now() < until && link.trouble().is_none() && wait_keeping(link, until) {
-        for ring in 0..rings {
-            while link.receive(ring).is_some() {
-                until = end.min(link.now() + LATEST);
-            }
-        }
-    }
 }
 
 /// Drops the bytes that come back behind the end of a conversation, from rings that owe some.
