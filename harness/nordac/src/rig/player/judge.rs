@@ -110,6 +110,7 @@ impl Player {
                     let remarks = std::iter::once(why).chain(outcome.remarks);
                     return Outcome {
                         verdict: Verdict::Inconclusive,
+                        shows_nothing: true,
                         remarks: remarks.collect(),
                         ..outcome
                     };

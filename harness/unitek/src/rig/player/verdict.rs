@@ -57,6 +57,7 @@ impl Player {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
                 verdict: Verdict::Inconclusive,
+                shows_nothing: true,
                 remarks: std::iter::once(format!("{why}: {LOST}"))
                     .chain(outcome.remarks)
                     .collect(),
