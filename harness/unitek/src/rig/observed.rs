@@ -76,6 +76,14 @@ impl Exchange {
         );
     }
 
+    /// Whether a register was asked for last before the clock of the link began again: while the drives were made ready.
+    pub(super) fn asks_before_it_began(&self, register: u8) -> bool {
+        let began = Instant::START + self.behind.unwrap_or_default();
+        let mut sent = self.sent.iter();
+        let asks = |own: &&(Instant, Frame)| own.1.data().starts_with(&[READ, register]);
+        sent.rfind(asks).is_some_and(|own| own.0 < began)
+    }
+
     /// Whether something came behind the last frame that was sent.
     pub(super) fn answers_last(&self) -> bool {
         let sent = self.sent.last().map(|own| own.0);

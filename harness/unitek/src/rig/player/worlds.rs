@@ -195,18 +195,25 @@ impl Player {
         let Some((place, expected)) = wrong else {
             return Shown::Unknown(NOT_FORETOLD);
         };
-        let loses = || {
+        let mut unclear = false;
+        let mut loses = || {
             let mut lateness = told.lateness().into_iter();
             lateness.any(|(late, overtakes)| {
                 let lossy = judged(known.properties, late, (overtakes, false), MOST_LOST);
+                unclear |= lossy == Judged::TooMany;
                 lossy == Judged::Right
             })
         };
         let missing = expected.filter(|_| told.way.tolerance > Span::ZERO && loses());
         let register = missing.and_then(|own| own.data().first().copied());
         let why = words(known, (&came, place), expected);
+        let asked = expected.and_then(|own| own.data().first().copied());
         match register {
             Some(register) => Shown::Lost(register, why),
+            // The drives were made ready, and what the scenario sends has too many worlds behind a loss.
+            None if unclear && asked.is_some_and(|own| talk.asks_before_it_began(own)) => {
+                Shown::Unknown(TOO_MANY)
+            }
             None => Shown::Wrong(why),
         }
     }
