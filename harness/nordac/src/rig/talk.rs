@@ -385,3 +385,23 @@ fn unexpected(slave: u8, service: &'static str, reply: &SlaveReply) -> TalkError
         found,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// EN 1, EN 2: OK without data answers a request for the FDL status, and E5 only what is confirmed.
+    #[test]
+    fn a_late_reply_to_another_request_is_none() {
+        let mut requests = Requests::new(MASTER, 8).expect("addresses");
+        let mut asks = |service| requests.request(service, &[]).expect("a request");
+        let [diagnosis, parameters] = [Service::SlaveDiag, Service::SetPrm].map(&mut asks);
+        assert!(!fits(&diagnosis, &SlaveReply::Present));
+        assert!(!fits(&diagnosis, &SlaveReply::Confirmed));
+        assert!(fits(&parameters, &SlaveReply::Confirmed));
+        assert!(!fits(&parameters, &SlaveReply::Present));
+        for own in [diagnosis, parameters] {
+            assert!(fits(&own, &SlaveReply::NotActivated));
+        }
+    }
+}

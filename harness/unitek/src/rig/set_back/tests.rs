@@ -24,9 +24,18 @@ const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings 
 
 /// A qualification of two simulated drives, of which some are set up by header lines.
 fn bench(limits: &str, setup: &[&str], qualifies: bool) -> (PortRun<Player>, Arc<AtomicBool>) {
+    let limits = format!("{limits}store_bus_settings = \"{CONFIRMATION}\"\n");
+    bench_within(&limits, setup, qualifies)
+}
+
+fn bench_within(
+    limits: &str,
+    setup: &[&str],
+    qualifies: bool,
+) -> (PortRun<Player>, Arc<AtomicBool>) {
     let text = format!(
         "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}, {{ node = 2 }}]\n\
-         [sim]\nbus = \"unitek\"\nsetup = {setup:?}\n[limits]\n{limits}store_bus_settings = \"{CONFIRMATION}\"\n"
+         [sim]\nbus = \"unitek\"\nsetup = {setup:?}\n[limits]\n{limits}"
     );
     let rig = parse(&source("desk.toml", &text), &BUSES).expect("a rig's file");
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -144,6 +153,20 @@ wait 50ms
     );
     let errors = simulated(&run).drive(1).expect("a drive").register(0x8F);
     assert_eq!(errors, ERROR_TIME_OUT);
+}
+
+/// UNITEK 3.1, ex 7: 84 would store a new identifier, and stores none once it was set back.
+#[test]
+fn parameters_are_stored_behind_identifiers_that_were_set_back() {
+    let (mut run, _) = bench_within(ALL, &[], false);
+    let moves = "> 201 51 04 00\n> 201 69 90 01\n> 201 3D 1B 00\n< 190 1B xx xx xx\n";
+    let stores = "> 201 51 04 00\n> 201 84 01 00\nread 1 51 = 0004\n";
+    assert_eq!(
+        play(&mut run, &format!("{moves}> 201 84 01 00\n")),
+        Verdict::Skipped
+    );
+    assert_eq!(play(&mut run, moves), Verdict::Passed);
+    assert_eq!(play(&mut run, stores), Verdict::Passed);
 }
 
 /// An error that was there before is not cleared: it is no trace of the run.
