@@ -21,6 +21,7 @@ use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
 use harness_sim::record::{Remark, Trace};
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Write;
 
@@ -42,25 +43,33 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
         for (place, index) in in_time(&trace.channels) {
             let byte = &trace.channels[place].octets()[index];
             let seen = readers[place].see(byte);
-            let hex = |byte: Option<u8>| byte.map_or_else(String::new, |b| format!("{b:02X}"));
             let drive = seen.meaning.drive;
             row.clear();
-            let _infallible = writeln!(
+            // Text is pushed, since formatting costs more than what is formatted.
+            let _infallible = write!(
                 row,
-                "{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},",
                 ring + 1,
                 byte.at.since_start().as_nanos(),
                 names[place],
-                index + 1,
-                hex(byte.sent),
-                hex(byte.received),
-                status(byte),
-                seen.meaning.role.name(),
-                drive.map_or_else(String::new, |drive| drive.to_string()),
-                quoted(&words(&seen, byte)),
-                seen.meaning.section(),
-                seen.mark.map_or_else(String::new, remark),
+                index + 1
             );
+            for byte in [byte.sent, byte.received] {
+                let _infallible = byte.map(|own| write!(row, "{own:02X}"));
+                row.push(',');
+            }
+            for word in [status(byte), seen.meaning.role.name()] {
+                row.push_str(word);
+                row.push(',');
+            }
+            let _infallible = drive.map(|own| write!(row, "{own}"));
+            let words = words(&seen, byte);
+            let mark = seen.mark.map_or_else(String::new, remark);
+            for text in [&quoted(&words), seen.meaning.section(), &mark] {
+                row.push(',');
+                row.push_str(text);
+            }
+            row.push('\n');
             out.write_all(row.as_bytes())?;
         }
     }
@@ -107,10 +116,10 @@ pub(crate) fn remark(mark: &Remark) -> String {
 }
 
 /// RFC 4180: a field with a comma is quoted.
-fn quoted(text: &str) -> String {
+fn quoted(text: &str) -> Cow<'_, str> {
     if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
     } else {
-        text.to_owned()
+        text.into()
     }
 }
