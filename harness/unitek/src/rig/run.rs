@@ -10,6 +10,7 @@ use crate::simulate::Bench;
 use harness_bench::bus_name::BusName;
 use harness_bench::link::frames::SLACK;
 use harness_bench::link::{Link, LinkEvent, Replay};
+use harness_bench::medium::Out;
 use harness_bench::rig::Rig;
 use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::playing::observed::Beats;
@@ -89,14 +90,18 @@ impl PortPlayer for Player {
         Self::replay(self, events, tolerance)
     }
 
-    /// Waits until 84 may be written again.
+    /// Waits until 84 may be written again, as the guard sees it.
     fn wait(&mut self, own: &Own, link: &mut dyn Link) {
-        if !self.has_stored() || !own.frames().any(stores) {
+        let Some(stores) = own.frames().find(|own| stores(own)) else {
             return;
-        }
+        };
+        let stores = [*stores];
         let end = link.now() + EEPROM_REST;
-        while link.now() < end && link.trouble().is_none() {
+        while self.has_stored() && !link.permits(0, Out::Frames(&stores)) {
             let now = link.now();
+            if now >= end || link.trouble().is_some() {
+                return;
+            }
             link.wait(end.min(now + NAP));
             while link.receive(0).is_some() {}
         }
