@@ -64,7 +64,7 @@ fn counted(link: &mut dyn Line, ring: usize, before: &[u8]) -> (Option<RingSize>
     bytes.extend([SYNCO, SYNCO]);
     bytes.extend(COUNT);
     let mut heard = Vec::new();
-    let size = listen(link, ring, &bytes, |received| {
+    let size = listen(link, ring, &bytes, MAX_DRIVES, |received| {
         heard.push(if received.error.is_none() {
             received.byte
         } else {
@@ -80,16 +80,17 @@ fn counted(link: &mut dyn Line, ring: usize, before: &[u8]) -> (Option<RingSize>
     (size, heard)
 }
 
-/// Sends bytes and SYNCO behind them, and shows what comes, until one of them says something or all must have come round.
+/// Sends bytes and SYNCO behind them, and shows what comes, until one of them says something or all must have come round this many drives.
 fn listen<T>(
     link: &mut dyn Line,
     ring: usize,
     bytes: &[u8],
+    drives: u16,
     mut heard: impl FnMut(Received) -> Option<T>,
 ) -> Option<T> {
     while link.receive_octet(ring).is_some() {}
     let sent = link.send_octets(ring, bytes);
-    let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
+    let end = sent + link.byte_time() * (u64::from(drives) + 8) + Span::from_millis(50);
     loop {
         // A busy computer may look for the bytes only when their time is over.
         let last = link.now() >= end || link.trouble().is_some();
@@ -179,11 +180,17 @@ pub(crate) enum SpellingCause {
 /// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
 #[must_use]
 pub(crate) fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
-    let (before, _) = reported(link, ring);
+    recover_up_to(link, ring, MAX_DRIVES)
+}
+
+/// The same of a ring that should have this many drives at most, which takes less time.
+#[must_use]
+pub(crate) fn recover_up_to(link: &mut dyn Line, ring: usize, drives: u16) -> Recovery {
+    let (before, _) = reported(link, ring, drives);
     let drives = count_repaired(link, ring);
     let (after, heard) = match drives {
         Some(_) => (None, Vec::new()),
-        None => reported(link, ring),
+        None => reported(link, ring, MAX_DRIVES),
     };
     let zeros_unasked = after == Some(0) && !unasked(link, ring).is_empty();
     let own = |drive: &u8| !(zeros_unasked && *drive == 0);
@@ -229,11 +236,15 @@ fn why(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> SpellingC
     }
 }
 
-/// The drive that spells out its address while the master sends SYNCO (9.7, 9.9), and the last bytes that came.
-fn reported(link: &mut dyn Line, ring: usize) -> (Option<u8>, Vec<u8>) {
-    // Once round the largest ring, and the zeros in front of the address.
+/// The zeros in front of the address that a drive spells out, and some more (9.7).
+const ZEROS: usize = 50;
+
+/// The drive that spells out its address while the master sends SYNCO (9.7, 9.9) to a ring of this many drives, and the last bytes that came.
+fn reported(link: &mut dyn Line, ring: usize, drives: u16) -> (Option<u8>, Vec<u8>) {
+    // Once round the ring, and the zeros.
+    let sent = vec![SYNCO; usize::from(drives) + ZEROS];
     let mut heard = Vec::new();
-    let _all: Option<()> = listen(link, ring, &[SYNCO; 300], |received| {
+    let _all: Option<()> = listen(link, ring, &sent, drives, |received| {
         heard.push(received);
         None
     });

@@ -22,7 +22,9 @@ mod scope;
 pub(crate) use access::Width;
 pub(crate) use axis::Axis;
 pub(crate) use discovery::{COUNT, count_behind, unasked};
-pub(crate) use discovery::{Identity, Recovery, SpelledOut, SpellingCause, count_drives, recover};
+pub(crate) use discovery::{
+    Identity, Recovery, SpelledOut, SpellingCause, count_drives, recover, recover_up_to,
+};
 pub(crate) use error::Error;
 /// What a master may send, by the rules of the bus alone.
 pub(crate) use harness_sim::novobus::fuzz::jobs::conduct;

@@ -109,13 +109,28 @@ impl PlayedOnRings for PlayedScenario {
 
     fn late_each_time(&self, tolerance: Span) -> Option<&Divergence> {
         let late = self.last_played()?.untimely()?;
-        let mut played = self.attempts.iter().filter(|own| own.was_played());
-        let like = |attempt: &Attempt| {
-            let there = attempt.untimely();
-            there.is_some_and(|there| there.is_like(late, tolerance))
-        };
-        (self.outcome.verdict == Verdict::Marginal && played.all(like)).then_some(late)
+        let same = is_late_each_time(&self.attempts, late, tolerance);
+        (self.outcome.verdict == Verdict::Marginal && same).then_some(late)
     }
+}
+
+/// Whether a byte was late at each of these attempts, at the same place and by the same time.
+fn is_late_each_time(attempts: &[Attempt], late: &Divergence, tolerance: Span) -> bool {
+    let like = |attempt: &Attempt| {
+        let there = attempt.untimely();
+        there.is_some_and(|there| there.is_like(late, tolerance))
+    };
+    let mut played = attempts.iter().filter(|own| own.was_played());
+    played.all(like)
+}
+
+/// Whether the last attempt has late bytes, at another place than one before: the computer was late, and one more attempt shows nothing else.
+pub(super) fn is_late_elsewhere(attempts: &[Attempt], tolerance: Span) -> bool {
+    let marginal = attempts
+        .last()
+        .filter(|own| own.outcome.verdict == Verdict::Marginal);
+    let late = marginal.and_then(OnRings::untimely);
+    late.is_some_and(|own| !is_late_each_time(attempts, own, tolerance))
 }
 
 #[cfg(test)]
@@ -216,5 +231,17 @@ mod tests {
         assert!(!each_time(vec![late(3, 40), late(3, 40), passed]));
         let unready = differing(attempt(Failed, SILENT), 0, None);
         assert!(each_time(vec![late(3, 40), unready, late(3, 40)]));
+    }
+
+    /// Bytes that are late at other places each time were late in the computer: a third attempt shows nothing else.
+    #[test]
+    fn bytes_that_are_late_elsewhere_end_the_attempts() {
+        let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
+        let elsewhere = |attempts: &[Attempt]| is_late_elsewhere(attempts, Span::from_millis(20));
+        assert!(!elsewhere(&[late(3, 40)]));
+        assert!(!elsewhere(&[late(3, 40), late(3, 45)]));
+        assert!(elsewhere(&[late(3, 40), late(5, 40)]));
+        assert!(elsewhere(&[late(3, 40), late(3, 90)]));
+        assert!(!elsewhere(&[late(3, 40), attempt(Failed, "")]));
     }
 }

@@ -1,7 +1,7 @@
 //! Checks whether a ring is healthy and has the size given in the rig's file.
 
 use super::line_test;
-use crate::driver::{Recovery, SpelledOut, count_behind, recover, unasked};
+use crate::driver::{Recovery, SpelledOut, count_behind, recover_up_to, unasked};
 use harness_bench::counted::counted;
 use harness_bench::link::{Link, Octets, Trouble, wait_keeping};
 use harness_proto::line::Received;
@@ -147,7 +147,7 @@ pub(super) fn outlast_standstill(link: &mut dyn Link, rings: usize) {
 }
 
 fn examine_once(link: &mut dyn Link, ring: usize, stated: RingSize) -> Result<Recovery, Unhealthy> {
-    let recovery = recover(link, ring);
+    let recovery = recover_up_to(link, ring, stated.drives().into());
     if let Some(trouble) = link.trouble() {
         return Err(Unhealthy::Trouble(trouble.clone()));
     }
@@ -227,7 +227,7 @@ fn shown(bytes: &[Received]) -> String {
 mod tests {
     use super::super::line_test::RingPace;
     use super::*;
-    use crate::driver::{OpenRings, Options, SpellingCause};
+    use crate::driver::{OpenRings, Options, SpellingCause, recover};
     use crate::gate::guard_rings;
     use crate::language::read::RingScenario;
     use crate::link::BesideTheBus as _;

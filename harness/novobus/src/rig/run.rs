@@ -1,7 +1,7 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
-use super::beside::BesideTwin;
+use super::beside::{BesideTwin, is_late_elsewhere};
 use super::driven::Driven;
 use super::health::{LATEST, Unhealthy, examine, outlast_standstill};
 use super::held_session::HeldSession;
@@ -181,7 +181,8 @@ impl<'s> Run<'s> {
                 keeper.ends(number, &attempt);
             }
             attempts.push(attempt);
-            let again = self.again.after(&attempts, most);
+            let again = self.again.after(&attempts, most)
+                && !is_late_elsewhere(&attempts, self.exactness.tolerance);
             if !again || self.session.link().trouble().is_some() {
                 return Ok(PlayedScenario::of(attempts));
             }
