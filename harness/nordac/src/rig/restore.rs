@@ -74,12 +74,14 @@ impl Player {
             drop(talk);
             let mut back = Back::new(line, self, known, slave);
             // Terminals that control it again do not let the bus acknowledge.
-            let _seen_at_the_end = back.without_fault(self);
+            let mut fault = back.without_fault(self);
             let left = back.all(&changed);
             let slave = back.slave;
             drop(back);
             line.reset_after_denial();
-            let fault = Back::new(line, self, known, slave).without_fault(self);
+            if !changed.is_empty() || fault.is_err() {
+                fault = Back::new(line, self, known, slave).without_fault(self);
+            }
             if let Some((kept, why)) = left {
                 let commands = commands(known, slave, &kept, origin);
                 notes.push(format!("slave {}: {why}{commands}", own.address));
