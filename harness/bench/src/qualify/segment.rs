@@ -142,14 +142,19 @@ pub fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec
     all
 }
 
-/// Which attempts are spoken for by the next one: it is of the same scenario, and they `showed_nothing`, since the computer, the adapter or the
-/// line may have been the cause. `of` gives the name too.
-pub fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool)) -> Vec<bool> {
-    let again = notes.windows(2).map(|two| {
-        let [(name, showed_nothing), (next, _)] = [of(&two[0]), of(&two[1])];
-        showed_nothing && name == next
+/// Which attempts are spoken for by another one of the same scenario: they `showed_nothing`, since the computer, the adapter or the line may have
+/// been the cause, and there is a later one, or one before it whose drives were `ready`. `of` gives the name, and both.
+pub fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool> {
+    let attempts = notes.chunk_by(|one, next| of(one).0 == of(next).0);
+    let spoken = attempts.flat_map(|attempts| {
+        let ready = attempts.iter().any(|own| of(own).2);
+        let of = &of;
+        attempts.iter().enumerate().map(move |(place, own)| {
+            let last = place + 1 == attempts.len();
+            of(own).1 && (!last || ready && !of(own).2)
+        })
     });
-    again.chain([false]).take(notes.len()).collect()
+    spoken.collect()
 }
 
 /// The profile of drives: every point that the manual leaves open, of each drive.
@@ -383,6 +388,18 @@ mod tests {
         assert!(none.contains("no single known deviation"), "{none}");
         let one = named(vec![unknown, (failed, false, &["one"])]);
         assert!(one.starts_with("deviation: one\ncompared"), "{one}");
+    }
+
+    /// Drives that gave no answer once, and were played on before, are not accused of it: the computer or the line may have been the cause.
+    #[test]
+    fn an_attempt_speaks_for_one_that_showed_nothing() {
+        let spoken = |attempts: &[(&'static str, bool, bool)]| spoken_for(attempts, |own| *own);
+        let (shown, silent, unclear) = (("a", false, true), ("a", true, false), ("a", true, true));
+        assert_eq!(spoken(&[silent, shown]), [true, false]);
+        assert_eq!(spoken(&[unclear, silent]), [true, true]);
+        assert_eq!(spoken(&[silent, silent, silent]), [true, true, false]);
+        assert_eq!(spoken(&[unclear, unclear]), [true, false]);
+        assert_eq!(spoken(&[shown, ("b", true, false)]), [false, false]);
     }
 
     /// Nothing is named for drives that nothing accuses.

@@ -222,7 +222,9 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let parts = notes.iter().enumerate().flat_map(part).collect();
     let notes = notes.concat();
     let notes = AttemptNotes {
-        again: spoken_for(&notes, |own| (own.name(), own.showed_nothing())),
+        again: spoken_for(&notes, |own| {
+            (own.name(), own.showed_nothing(), own.was_ready())
+        }),
         parts,
         notes,
         repeats,

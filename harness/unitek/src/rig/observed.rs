@@ -124,7 +124,30 @@ impl Exchange {
             })
         });
         let held_up = self.came.iter().map(|(at, read, _)| read.since(*at));
-        breaks.chain(held_up).max().unwrap_or_default()
+        let all = breaks.chain(held_up).chain(self.replies_held_up());
+        all.max().unwrap_or_default()
+    }
+
+    /// For how long nothing came while several requests were sent that were all answered then: a drive that loses replies does not send them later.
+    fn replies_held_up(&self) -> impl Iterator<Item = Span> {
+        let came = self.came.iter().map(|own| own.0);
+        let begins = std::iter::once(Instant::START).chain(came.clone());
+        begins.zip(came).filter_map(|(begin, end)| {
+            let waiting = self.sent.iter().filter(|(at, frame)| {
+                let read = frame.data().first() == Some(&READ);
+                read && (begin..end).contains(at)
+            });
+            let first = waiting.clone().nth(1).and(waiting.clone().next())?.0;
+            let mut registers = waiting.filter_map(|own| own.1.data().get(1));
+            let answered = |register: &u8| {
+                let sent = self.sent.iter().filter(|own| own.0 >= first);
+                let sent = sent.filter(|own| own.1.data().starts_with(&[READ, *register]));
+                let came = self.came.iter().filter(|own| own.0 >= first);
+                let came = came.filter(|own| own.2.data().first() == Some(register));
+                came.count() >= sent.count()
+            };
+            registers.all(answered).then(|| end.since(first))
+        })
     }
 
     /// A time of the link.
@@ -315,5 +338,14 @@ mod tests {
             ..Exchange::default()
         };
         assert_eq!(late.longest_standstill(), Span::from_millis(390));
+    }
+
+    /// Requests that were repeated meanwhile are all answered behind a pause; a drive that has lost a reply does not send it later.
+    #[test]
+    fn a_pause_in_which_requests_are_repeated_is_one() {
+        let pause = longest(&[5, 300, 300, 301], &[4, 20, 40, 60]);
+        assert_eq!(pause, Span::from_millis(280));
+        assert_eq!(longest(&[5, 300, 300], &[4, 20, 40, 60]), Span::ZERO);
+        assert_eq!(longest(&[5, 300], &[4, 20]), Span::ZERO);
     }
 }

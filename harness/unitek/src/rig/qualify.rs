@@ -238,7 +238,9 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
     let notes = notes.concat();
-    let again = spoken_for(&notes, |own| (own.name(), own.showed_nothing()));
+    let again = spoken_for(&notes, |own| {
+        (own.name(), own.showed_nothing(), own.was_ready())
+    });
     qualified(
         &Notes {
             notes,

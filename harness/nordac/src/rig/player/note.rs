@@ -180,6 +180,11 @@ impl AttemptNote {
             || self.shown.unanswered.is_some()
     }
 
+    /// Whether the slaves became ready for the scenario, which was played then.
+    pub(crate) const fn was_ready(&self) -> bool {
+        self.shown.ended.is_some()
+    }
+
     /// The name of the scenario.
     pub(crate) fn name(&self) -> &String {
         &self.own.name

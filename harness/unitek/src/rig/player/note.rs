@@ -184,6 +184,11 @@ impl Note {
             || self.shown.unanswered.is_some()
     }
 
+    /// Whether the drives became ready for the scenario, which was played then.
+    pub(crate) const fn was_ready(&self) -> bool {
+        self.shown.ended.is_some()
+    }
+
     /// The name of the scenario.
     pub(crate) fn name(&self) -> &String {
         &self.own.name
