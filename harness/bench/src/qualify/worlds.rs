@@ -260,6 +260,22 @@ fn judge_one<M: RightDrive>(
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
 ) -> Judged<M::Piece> {
+    // When a piece that repeats the one before it has reached a drive seldom matters: a few worlds may explain what came.
+    if (0..talk.sent.len()).any(|place| talk.repeats(place)) {
+        match judge_by(model.clone(), talk, (true, alive)) {
+            Judged::Wrong(..) => {}
+            found => return found,
+        }
+    }
+    judge_by(model, talk, (false, alive))
+}
+
+/// The same; with `few`, pieces that repeat those before them reach a drive at one time alone.
+fn judge_by<M: RightDrive>(
+    model: M,
+    talk: &Dialogue<M::Piece>,
+    (few, alive): (bool, &dyn Fn()),
+) -> Judged<M::Piece> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
     worlds.insert(World {
@@ -297,7 +313,7 @@ fn judge_one<M: RightDrive>(
             if last {
                 continue;
             }
-            for next in talk.next(world, place, &mut heard) {
+            for next in talk.next(world, (place, few), &mut heard) {
                 steps += 1;
                 worlds.insert(next);
             }
@@ -311,6 +327,15 @@ fn judge_one<M: RightDrive>(
 }
 
 impl<P: Clone + Eq + Hash> Dialogue<P> {
+    /// Whether the piece that was sent at a place is the same as the one before.
+    fn repeats(&self, place: usize) -> bool {
+        let before = place.checked_sub(1).and_then(|own| self.sent.get(own));
+        let own = self.sent.get(place);
+        before
+            .zip(own)
+            .is_some_and(|(before, own)| before.piece == own.piece)
+    }
+
     /// Whether a world cannot have sent what came at a place, whatever it does from now on: what it has said before would have come first.
     fn refutes<M: RightDrive<Piece = P>>(&self, world: &World<M>, place: usize) -> bool {
         let Some(came) = self.came.get(place).filter(|_| self.most_lost == 0) else {
@@ -364,11 +389,11 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
     }
 
     /// What a world can do next: hear what was sent at one time or another, or do its next step. At the end of
-    /// the conversation it may have done its last one.
+    /// the conversation it may have done its last one. With `few`, a piece that is repeated is heard at one time.
     fn next<M: RightDrive<Piece = P>>(
         &self,
         world: World<M>,
-        place: usize,
+        (place, few): (usize, bool),
         ended: &mut impl FnMut(World<M>),
     ) -> Vec<World<M>> {
         let mut all = Vec::new();
@@ -389,16 +414,22 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                     all.extend(waited.within(i64::MIN, i64::MAX));
                 }
                 Some(due) => {
-                    let first = (earliest - scan - world.ahead.1 - world.at).max(0);
-                    let mut at = world.at + (first + scan - 1) / scan * scan;
-                    while at < due && at + world.ahead.0 <= latest + scan {
+                    let scans = |span: i64| (span.max(0) + scan - 1) / scan * scan;
+                    let of = |ahead: i64| world.at + scans(earliest - scan - ahead - world.at);
+                    let mut first = of(world.ahead.1);
+                    let mut last = (due - 1).min(latest + scan - world.ahead.0);
+                    if few && self.repeats(world.heard) {
+                        // It reaches the drive then, whichever clock of the world's is right.
+                        first += (of(world.ahead.0).min(last) - first).max(0) / scan * scan;
+                        last = last.min(first);
+                    }
+                    for at in (first..=last).step_by(M::SCAN.units() as usize) {
                         let own = world.clone();
                         if let Some(mut own) = own.within(earliest - scan - at, latest + scan - at)
                         {
                             own.advance(at);
                             all.push(own);
                         }
-                        at += scan;
                     }
                 }
             }

@@ -253,6 +253,7 @@ impl Settled {
         Outcome {
             verdict: self.verdict,
             finding: found,
+            unmet: Vec::new(),
             remarks: self.remarks.clone(),
             took: self.took,
             records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),

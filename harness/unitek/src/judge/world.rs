@@ -26,6 +26,10 @@ const SPEED_BAND: i64 = 655;
 /// Registers of the speed, and of what decides whether it counts as standing.
 const SPEEDS: [u8; 3] = [0x30, 0x32, 0xA8];
 
+/// STATUS and ERROR_WARNING_MAP, of which the bits that are printed or field facts are compared (ex 10, dump).
+const STATUS: u8 = 0x40;
+const ERRORS: u8 = 0x8F;
+
 /// Registers of the current, and how far one may be off that of the model: 2 % of 100 % (App 7; our choice).
 const CURRENTS: [u8; 3] = [0x20, 0x27, 0x5F];
 const CURRENT_BAND: i64 = 8;
@@ -130,9 +134,14 @@ impl World {
     /// Whether a register is compared in every state of a drive, and all of it.
     #[must_use]
     pub(crate) fn compares(number: u8) -> bool {
-        let known =
-            CONSTANT.contains(&number) || LOGIC.contains(&number) || SPEEDS.contains(&number);
-        known || number == SCALE || is_parameter(number)
+        let known = [
+            &CONSTANT[..],
+            &LOGIC,
+            &SPEEDS,
+            &CURRENTS,
+            &[SCALE, STATUS, ERRORS],
+        ];
+        known.concat().contains(&number) || is_parameter(number)
     }
 
     /// A drive that stands, of which these registers are not compared. Its clock begins at the start.
@@ -273,7 +282,7 @@ impl World {
         }
         if self.disturbed {
             return match number {
-                0x8F => Some(Compared::Bits(ERROR_TIME_OUT)),
+                ERRORS => Some(Compared::Bits(ERROR_TIME_OUT)),
                 own if CONSTANT.contains(&own) || own == SCALE || is_parameter(own) => {
                     Some(Compared::Bits(!0))
                 }
@@ -310,11 +319,11 @@ impl World {
             0xF5 if self.way.is_none() && (self.speed().abs() - 328).abs() > SPEED_BAND => {
                 Some(Compared::Bits(!0))
             }
-            0x40 => Some(Compared::Bits(match self.tolerance_is_certain() {
+            STATUS => Some(Compared::Bits(match self.tolerance_is_certain() {
                 true => PRINTED,
                 false => PRINTED & !status::TOLERANCE,
             })),
-            0x8F => Some(Compared::Bits(ERRORS_NOT_READY)),
+            ERRORS => Some(Compared::Bits(ERRORS_NOT_READY)),
             own if is_parameter(own) => Some(Compared::Bits(!0)),
             _ => None,
         }

@@ -218,7 +218,11 @@ impl<P: PortPlayer> PortRun<P> {
             // The drives go to their safe state at the end of the run, and what the scenario has changed is set back then.
             self.unfinished = Some(Arc::clone(own));
         } else if played {
-            let safe = self.session.make_safe();
+            let mut safe = self.session.make_safe();
+            if !safe.confirmed && self.session.link().trouble().is_none() {
+                // A computer that stood still has not heard the drives.
+                safe = self.session.make_safe();
+            }
             match safe.confirmed {
                 true => self.set_back(own),
                 false => {

@@ -22,6 +22,8 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// The first thing that was not as a step says; playing stops there.
     pub finding: Option<Mismatch>,
+    /// Where the steps begin that were not as they say, where playing has gone on behind the first one.
+    pub unmet: Vec<usize>,
     /// Notes, also when nothing failed.
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
@@ -128,6 +130,7 @@ impl Outcome {
         Self {
             verdict,
             finding: None,
+            unmet: Vec::new(),
             remarks: vec![remark],
             took: Span::ZERO,
             records: Vec::new(),

@@ -65,6 +65,7 @@ pub fn play_until<L: Language>(
     Outcome {
         verdict,
         finding,
+        unmet: runner.unmet,
         remarks,
         took,
         records: L::records(runner.own),
@@ -86,6 +87,7 @@ pub struct Runner<'a, L: Language> {
     pub link: &'a mut dyn Link,
     pub plan: &'a Plan<L>,
     at_mismatch: AtMismatch,
+    unmet: Vec<usize>,
     /// Ends the conversation when it is set.
     pub interrupt: Option<&'a AtomicBool>,
     strict: bool,
@@ -116,6 +118,7 @@ impl<'a, L: Language> Runner<'a, L> {
             link,
             plan,
             at_mismatch,
+            unmet: Vec::new(),
             interrupt: None,
             strict: plan.strict,
             full: None,
@@ -139,13 +142,17 @@ impl<L: Language> Runner<'_, L> {
             self.place = step.span;
             let result = self.step(step);
             self.halted()?;
+            self.unmet
+                .extend(result.is_err().then_some(step.span.start));
             first = first.and(result);
             if first.is_err() && self.at_mismatch == AtMismatch::Stop {
                 return first;
             }
         }
         self.settle();
-        first.and_then(|()| self.nothing_unasked(self.place))
+        let last = self.nothing_unasked(self.place);
+        self.unmet.extend(last.is_err().then_some(self.place.start));
+        first.and(last)
     }
 
     fn step(&mut self, step: &PlannedStep<L>) -> Result<(), Stop> {

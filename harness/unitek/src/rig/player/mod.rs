@@ -16,7 +16,7 @@ mod worlds;
 
 pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
 pub(super) use own::{Own, stores};
-use verdict::{explained, unlike};
+use verdict::{are_judged, explained, unlike};
 use worlds::{BY_LINES, STANDSTILL, Shown, Told};
 
 use super::Axis;
@@ -36,7 +36,7 @@ use harness_bench::medium::Medium;
 use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::playing::observed::{Beats, LinkTimes};
 use harness_bench::scenario::expression::Scope;
-use harness_bench::scenario::run::{Outcome, Skip, Unlock, Why, lacks, run};
+use harness_bench::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
 use harness_bench::scenario::syntax::Scenario;
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
@@ -71,6 +71,8 @@ struct Other {
     phase: Span,
     /// The properties of the drive at a place, in place of those that are known.
     drive: Option<(usize, Properties)>,
+    /// Whether lines are played behind one that is not met.
+    goes_on: bool,
 }
 
 /// A scenario played on the model.
@@ -116,9 +118,6 @@ pub(crate) struct Player {
     stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
-    /// The lines whose contents right drives alone judge, by scenario, and how the first of them was not met: where frames are late, right
-    /// drives do not meet it either.
-    excused: BTreeMap<String, (BTreeSet<usize>, String)>,
     /// Of which register a frame may have been lost, and in how many attempts one behind the other, by scenario.
     lost: BTreeMap<String, (u8, usize)>,
     /// Whether the drives are qualified.
@@ -153,7 +152,6 @@ impl Player {
             levels: BTreeSet::new(),
             stored: false,
             before: None,
-            excused: BTreeMap::new(),
             lost: BTreeMap::new(),
             qualifies: false,
             beats: Beats::default(),
@@ -345,7 +343,8 @@ impl Player {
             return Gone::Unanswered(error);
         }
         let own = &own.with_firmware(self.known());
-        let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
+        let real = link.time_tolerance() > Span::ZERO;
+        let model = match rehearses.then(|| self.rehearsed(own, real)).transpose() {
             Ok(rehearsal) => rehearsal.map_or_else(Vec::new, |own| {
                 foretell(
                     &self.left,
@@ -372,10 +371,13 @@ impl Player {
         outlast(link);
         link.begin();
         link.take_late();
-        let excused = self.excused.get(&own.name);
-        let excused = excused.map(|(lines, _)| own.without_contents(lines));
-        let outcome = run(excused.as_ref().unwrap_or(&own.plan), link);
-        if link.time_tolerance() > Span::ZERO {
+        // Where time is real, right drives are compared to the end, whichever line frames have come too late for.
+        let at_mismatch = match real {
+            true => AtMismatch::GoOn,
+            false => AtMismatch::Stop,
+        };
+        let outcome = play(&own.plan, link, at_mismatch);
+        if real {
             // What is missing may still be under way.
             let stalls = link.noted.exchange.last_late() > link.time_tolerance();
             let under_way = match outcome.verdict {
@@ -413,13 +415,25 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    fn rehearsed(&self, own: &Own) -> Result<Rehearsal, Skip> {
+    fn rehearsed(&self, own: &Own, real: bool) -> Result<Rehearsal, Skip> {
         if let Some(why) = self.other_properties(&own.scenario) {
             return Err(Why::OtherDrives(why).into());
         }
         let first = self.rehearse(own, &self.limits, Other::default());
         if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
             return Ok(first);
+        }
+        // A drive with other registers than that of the scenario is qualified with it all the same, where right drives are compared.
+        if self.qualifies && real && self.limits.motion && !own.homes() {
+            let whole = Other {
+                goes_on: true,
+                ..Other::default()
+            };
+            let whole = self.rehearse(own, &self.limits, whole);
+            let failed = whole.outcome.verdict == Verdict::Failed;
+            if whole.denied.is_none() && failed && are_judged(own, &whole.outcome) {
+                return Ok(whole);
+            }
         }
         let mut limits = self.limits.clone();
         let mut unlocks = BTreeSet::new();
@@ -527,8 +541,12 @@ impl Player {
         let mut observed = Observed::new(&mut recording);
         let at_rest = self.prepare(own, limits.motion, &mut observed);
         observed.begin();
+        let at_mismatch = match other.goes_on {
+            true => AtMismatch::GoOn,
+            false => AtMismatch::Stop,
+        };
         let (outcome, at_rest) = match at_rest {
-            Ok(at_rest) => (run(&own.plan, &mut observed), at_rest),
+            Ok(at_rest) => (play(&own.plan, &mut observed, at_mismatch), at_rest),
             Err(error) => (self.unanswered(&error), Vec::new()),
         };
         let noted = std::mem::take(&mut observed.noted);

@@ -20,6 +20,9 @@ use std::collections::BTreeSet;
 /// CAN_TIMEOUT.
 const TIME_OUT: u8 = 0xD0;
 
+/// FUNC_REF_START.
+const HOMING: u8 = 0x78;
+
 /// The firmware, which each drive has of its own (dump).
 const FIRMWARE: u8 = 0x1B;
 
@@ -75,34 +78,21 @@ impl Own {
             || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
 
+    /// Whether it starts homing: how long a drive takes for that and where it stands then is not known.
+    pub(super) fn homes(&self) -> bool {
+        self.frames().any(|frame| writes(frame, HOMING))
+    }
+
     /// The registers whose contents its lines ask for.
     pub(super) fn asks_for(&self) -> BTreeSet<u8> {
         self.plan.steps.iter().flat_map(asks).collect()
     }
 
-    /// The lines from this one on of which all contents are of registers for which `compared` holds; with whether others behind it ask for
-    /// something too. `None` where it is none of them.
-    pub(super) fn lines_from(
-        &self,
-        place: usize,
-        compared: impl Fn(u8) -> bool,
-    ) -> Option<(BTreeSet<usize>, bool)> {
-        let behind = self.plan.steps.iter().filter(|own| own.span.start >= place);
-        let asking: Vec<_> = behind.filter(|own| !asks(own).is_empty()).collect();
-        let own = |step: &&&Step| {
-            let frames = matches!(
-                step.action,
-                PlannedAction::Receive(..) | PlannedAction::Own(Act::Read { .. })
-            );
-            frames && asks(step).into_iter().all(&compared)
-        };
-        let all: BTreeSet<_> = asking
-            .iter()
-            .filter(own)
-            .map(|own| own.span.start)
-            .collect();
-        let goes_on = asking.iter().any(|own| own.span.start != place);
-        all.contains(&place).then_some((all, goes_on))
+    /// The registers whose contents the lines at these places ask for.
+    pub(super) fn asks_at(&self, places: &[usize]) -> BTreeSet<u8> {
+        let steps = self.plan.steps.iter();
+        let own = steps.filter(|own| places.contains(&own.span.start));
+        own.flat_map(asks).collect()
     }
 
     /// The scenario in which lines that ask for the firmware ask for what it read on the drive: the scenario is for drives of any. Where its
@@ -161,25 +151,6 @@ impl Own {
             }
         }
         own
-    }
-
-    /// The plan in which these lines ask for any contents.
-    pub(super) fn without_contents(&self, lines: &BTreeSet<usize>) -> Plan<Unitek> {
-        let mut plan = self.plan.clone();
-        let own = |step: &&mut Step| lines.contains(&step.span.start);
-        for step in plan.steps.iter_mut().filter(own) {
-            match &mut step.action {
-                PlannedAction::Receive(_, wanted) => {
-                    let contents = wanted
-                        .iter_mut()
-                        .flat_map(|own| own.data.iter_mut().skip(1));
-                    contents.for_each(|own| *own = Expected::Any);
-                }
-                PlannedAction::Own(Act::Read { wanted, .. }) => *wanted = None,
-                _ => {}
-            }
-        }
-        plan
     }
 }
 

@@ -1,7 +1,7 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
 use super::worlds::Shown;
-use super::{CONVERSATION, Own, Player};
+use super::{CONVERSATION, Known, Own, Player};
 use crate::BUSES;
 use crate::rig::Axis;
 use crate::rig::qualify::conversations;
@@ -11,6 +11,7 @@ use harness_bench::rig::{UseOptions, parse};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
+use harness_proto::unitek::REGISTERS;
 use harness_proto::unitek::guard::Limits;
 use std::collections::BTreeSet;
 
@@ -157,6 +158,53 @@ fn scenarios_are_for_drives_of_any_firmware() {
     let wrong = [other, "drive 1 deviates answers-twice"];
     let wrong = outcome(&mut bench(&wrong), &kept("unitek-app-2-replies"));
     assert_eq!(wrong.verdict, Verdict::Failed, "{wrong:?}");
+}
+
+/// A drive whose currents have another scale than that of the dump (D9, App 7) is qualified with what the dump's drive sends all the same: right
+/// drives with its registers are compared. A run behind a port skips it.
+#[test]
+fn drives_with_other_registers_are_qualified_with_the_scenarios_of_the_dump() {
+    let rig = parse(&desk(&["drive 1 register D9 = 0200"]), &BUSES).expect("a rig's file");
+    let source = kept("unitek-app-5-torque");
+    let own = Own::read(&source).expect("a scenario");
+    let rehearsed = |qualifies, real| {
+        let mut player = Player::new(&rig, true, qualifies);
+        let mut known = Known::new(player.axes[0]);
+        let dump = REGISTERS.iter().map(|own| (own.number, own.dump));
+        known.cells = dump.collect();
+        known.cells.insert(0xD9, 0x0200);
+        player.known = Some(vec![known]);
+        player.rehearsed(&own, real).is_ok()
+    };
+    assert!(rehearsed(true, true));
+    assert!(!rehearsed(true, false) && !rehearsed(false, true));
+}
+
+/// Behind a port a line that frames have come too late for fails nothing, if right drives are compared in what it asks for. Any other is
+/// played again.
+#[test]
+fn lines_that_worlds_compare_fail_no_right_drive() {
+    let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
+    let player = Player::new(&rig, true, true);
+    for (lines, verdict) in [
+        ("read 1 30 = 0CFD", Verdict::Passed),
+        ("read 1 30 = 0CFD\nread 1 EB = 0000", Verdict::Inconclusive),
+    ] {
+        let text = format!("title t\nbus unitek\ndrive 1\n\n{lines}\n");
+        let source = Source {
+            name: "t".to_owned(),
+            text: text.into(),
+        };
+        let own = Own::read(&source).expect("a scenario");
+        let unmet = own.plan.steps.iter().map(|own| own.span.start).collect();
+        let outcome = Outcome {
+            verdict: Verdict::Failed,
+            unmet,
+            ..Outcome::rig_error(String::new())
+        };
+        let judged = player.judged(&own, outcome, false, (&[], Shown::Complete));
+        assert_eq!(judged.verdict, verdict, "{lines}");
+    }
 }
 
 /// What a drive sends does not follow from what the bench sent where a fault is put on a frame: a right drive passes by the lines.

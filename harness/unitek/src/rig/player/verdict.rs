@@ -13,7 +13,7 @@ use harness_proto::unitek::words::status;
 use std::collections::BTreeSet;
 
 /// Why a line that was not met accuses nothing.
-const LATE_ALONE: &str = "right drives send the same where frames are as late as these: the line is not met for that reason alone";
+const RIGHT_ALL_THE_SAME: &str = "right drives with these registers send the same where frames are as late as these: the line is not met for that reason alone";
 
 /// In how many attempts at a scenario, one behind the other, an adapter may have lost a frame of the same register.
 const LOST_BY_THE_ADAPTER: usize = 2;
@@ -46,13 +46,15 @@ impl Player {
     /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met: a line accuses the drive where time
     /// is virtual and right drives were compared to the end.
     pub(super) fn judged(
-        &mut self,
+        &self,
         own: &Own,
         outcome: Outcome,
         exact: bool,
         (unlike, shown): (&[(u8, u8)], Shown),
     ) -> Outcome {
-        let excused = self.excused.get(&own.name).map(|(_, found)| found.clone());
+        let differs = |register| unlike.iter().any(|own| own.1 == register);
+        let mut asked = own.asks_at(&outcome.unmet).into_iter();
+        let judged_by_worlds = are_judged(own, &outcome) && !asked.any(differs);
         match (outcome.verdict, shown) {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
@@ -63,55 +65,22 @@ impl Player {
                     .collect(),
                 ..outcome
             },
-            (Verdict::Failed, Shown::Complete) => {
-                match self.excuses(own, &outcome, unlike) {
-                    // What stands behind the line is played in the next attempt.
-                    Some(true) => right_but_late(outcome, Verdict::Marginal),
-                    Some(false) => right_but_late(outcome, Verdict::Passed),
-                    None if exact => outcome,
-                    None => inconclusive(outcome, NOT_COMPARED.to_owned()),
-                }
+            (Verdict::Failed, Shown::Complete) if judged_by_worlds => right_all_the_same(outcome),
+            (Verdict::Failed, Shown::Complete) if !exact => {
+                inconclusive(outcome, NOT_COMPARED.to_owned())
             }
-            (Verdict::Passed, Shown::Complete) => {
-                let late = excused.map(|found| [LATE_ALONE.to_owned(), found]);
-                let remarks = late.into_iter().flatten().chain(outcome.remarks);
-                let remarks = remarks.collect();
-                Outcome { remarks, ..outcome }.judged_by(&own.plan)
-            }
+            (Verdict::Passed, Shown::Complete) => outcome.judged_by(&own.plan),
             (Verdict::Failed, Shown::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
-            (Verdict::Passed, Shown::Right) if excused.is_some() => {
-                inconclusive(outcome, UNDER_WAY.to_owned())
-            }
             (Verdict::Failed, Shown::Unknown(_)) if exact => match self.left_open(own, unlike) {
                 None => outcome,
                 Some(why) => inconclusive(outcome, why),
             },
             (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
-            (Verdict::Passed, Shown::Unknown(why))
-                if own.by_frames || excused.is_some() || why == STOOD_STILL =>
-            {
+            (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || why == STOOD_STILL => {
                 inconclusive(outcome, not_to_its_end(why))
             }
             _ => outcome.judged_by(&own.plan),
         }
-    }
-
-    /// Takes the contents of the line that was not met, and of those behind it, from what the lines judge, where right drives are compared in
-    /// all that they ask for; returns whether more is asked for behind it. `None` where it is not so, or was done before.
-    fn excuses(&mut self, own: &Own, outcome: &Outcome, unlike: &[(u8, u8)]) -> Option<bool> {
-        let found = outcome.finding.as_ref()?;
-        let compared = |register| {
-            let differs = unlike.iter().any(|own| own.1 == register);
-            World::compares(register) && !differs
-        };
-        let (lines, goes_on) = own.lines_from(found.span.start, compared)?;
-        let first = || (BTreeSet::new(), found.message.clone());
-        let excused = self.excused.entry(own.name.clone()).or_insert_with(first);
-        if excused.0.contains(&found.span.start) {
-            return None;
-        }
-        excused.0.extend(lines);
-        Some(goes_on)
     }
 
     /// Why a correct drive in virtual time may not meet the scenario either: a register at rest, the place of its clock, or what the manual
@@ -133,15 +102,22 @@ impl Player {
         let phases = PHASES.map(|own| Span::from_micros(own * 1_000 / 32));
         let phases = phases.map(|phase| {
             let words = format!("its clock of 1 ms ahead by {phase}");
-            (words, Other { phase, drive: None })
+            let other = Other {
+                phase,
+                ..Other::default()
+            };
+            (words, other)
         });
         let drives = self.known().iter().enumerate();
         let values = drives.flat_map(|(place, known)| {
             let each = known.candidates().into_iter();
             each.map(move |(words, properties)| {
                 let drive = Some((place, properties));
-                let phase = Span::ZERO;
-                (words, Other { phase, drive })
+                let other = Other {
+                    drive,
+                    ..Other::default()
+                };
+                (words, other)
             })
         });
         let found = phases.chain(values).find(|own| fails(own.1));
@@ -168,6 +144,12 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
     }
 }
 
+/// Whether right drives are compared in all that the lines ask for that were not met.
+pub(super) fn are_judged(own: &Own, outcome: &Outcome) -> bool {
+    let mut asked = own.asks_at(&outcome.unmet).into_iter();
+    !outcome.unmet.is_empty() && asked.all(World::compares)
+}
+
 fn inconclusive(outcome: Outcome, why: String) -> Outcome {
     Outcome {
         verdict: Verdict::Inconclusive,
@@ -181,12 +163,12 @@ fn not_to_its_end(why: &str) -> String {
     format!("what came was not compared to its end: {why}")
 }
 
-/// An attempt in which the drives did what right ones do, and a line is not met since frames were late.
-fn right_but_late(outcome: Outcome, verdict: Verdict) -> Outcome {
+/// An attempt in which the drives did what right ones do, and a line is not met since frames were late or the drive has other registers.
+fn right_all_the_same(outcome: Outcome) -> Outcome {
     let found = outcome.finding.map(|own| own.message);
-    let why = std::iter::once(LATE_ALONE.to_owned()).chain(found);
+    let why = std::iter::once(RIGHT_ALL_THE_SAME.to_owned()).chain(found);
     Outcome {
-        verdict,
+        verdict: Verdict::Passed,
         finding: None,
         remarks: why.chain(outcome.remarks).collect(),
         ..outcome
