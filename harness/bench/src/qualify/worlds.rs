@@ -301,21 +301,25 @@ pub fn lost<M: RightDrive>(
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
 ) -> Result<Vec<usize>, Judged<M::Piece>> {
-    // When a piece that repeats the one before it has reached a drive seldom matters: a few worlds may explain what came.
-    if (0..talk.sent.len()).any(|place| talk.repeats(place)) {
-        match lost_in(model.clone(), talk, (true, alive)) {
+    // When a piece has reached a drive seldom matters: a few worlds may explain what came.
+    let at_once: [AtOnce<M::Piece>; 2] = [|_, _| true, Dialogue::repeats];
+    for at_once in at_once {
+        match lost_in(model.clone(), talk, (at_once, alive)) {
             Err(Judged::Wrong(..)) => {}
             found => return found,
         }
     }
-    lost_in(model, talk, (false, alive))
+    lost_in(model, talk, (|_, _| false, alive))
 }
 
-/// The same; with `few`, pieces that repeat those before them reach a drive at one time alone.
+/// Whether the piece that was sent at a place has reached the drive at once.
+type AtOnce<P> = fn(&Dialogue<P>, usize) -> bool;
+
+/// The same in some of the worlds.
 fn lost_in<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
-    (few, alive): (bool, &dyn Fn()),
+    (at_once, alive): (AtOnce<M::Piece>, &dyn Fn()),
 ) -> Result<Vec<usize>, Judged<M::Piece>> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
@@ -362,7 +366,7 @@ fn lost_in<M: RightDrive>(
             if last {
                 continue;
             }
-            for next in talk.next(world, (place, few), &mut heard) {
+            for next in talk.next(world, (place, at_once), &mut heard) {
                 steps += 1;
                 worlds.insert(next);
             }
@@ -439,11 +443,11 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
     }
 
     /// What a world can do next: hear what was sent at one time or another, or do its next step. At the end of
-    /// the conversation it may have done its last one. With `few`, a piece that is repeated is heard at one time.
+    /// the conversation it may have done its last one.
     fn next<M: RightDrive<Piece = P>>(
         &self,
         world: World<M>,
-        (place, few): (usize, bool),
+        (place, at_once): (usize, AtOnce<P>),
         ended: &mut impl FnMut(World<M>),
     ) -> Vec<World<M>> {
         let mut all = Vec::new();
@@ -475,7 +479,7 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                     let of = |ahead: i64| world.at + scans(earliest - scan - ahead - world.at);
                     let mut first = of(world.ahead.1);
                     let mut last = (due - 1).min(latest + scan - world.ahead.0);
-                    if few && self.repeats(world.heard) {
+                    if at_once(self, world.heard) {
                         // It reaches the drive then, whichever clock of the world's is right.
                         first += (of(world.ahead.0).min(last) - first).max(0) / scan * scan;
                         last = last.min(first);

@@ -222,7 +222,9 @@ impl LinkNotes for FrameNotes {
                     }
                 }
                 Ok(Request::Read { register }) => {
-                    self.asked = Some((register, end));
+                    // One that is repeated may get the reply to the first.
+                    let first = self.asked.filter(|own| own.0 == register);
+                    self.asked = first.or(Some((register, end)));
                     self.awaited.push(register);
                 }
                 Ok(Request::Cycle { .. } | Request::Stop { .. }) | Err(_) => {}
@@ -320,6 +322,18 @@ mod tests {
         assert!(notes.awaits());
         comes(&mut notes, "181#EB102700");
         assert!(!notes.awaits());
+    }
+
+    /// A request that is repeated may get the reply to the first one, which was late.
+    #[test]
+    fn a_repeated_request_is_as_late_as_the_first() {
+        let mut notes = FrameNotes::default();
+        for asked in [0, 20] {
+            notes.sent(Out::Frames(&[frame("201#3DEB00")]), at(&asked));
+        }
+        let heard = Heard::Frame(can::CanEvent::Frame(frame("181#EB102700")));
+        notes.heard(Medium::Frames(can::BitRate::K500), at(&30), at(&30), heard);
+        assert_eq!(notes.longest, Span::from_millis(30));
     }
 
     /// A cycle in which a pause stands, one that has ended before a request, and requests that are far apart (UNITEK 5.2).

@@ -424,7 +424,7 @@ impl Player {
             return Ok(first);
         }
         // A drive with other registers than that of the scenario is qualified with it all the same, where right drives are compared.
-        if self.qualifies && real && self.limits.motion && !own.homes() {
+        if self.qualifies && real && self.limits.motion && own.is_foretold() {
             let whole = Other {
                 goes_on: true,
                 ..Other::default()

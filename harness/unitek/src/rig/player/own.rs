@@ -78,9 +78,9 @@ impl Own {
             || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
 
-    /// Whether it starts homing: how long a drive takes for that and where it stands then is not known.
-    pub(super) fn homes(&self) -> bool {
-        self.frames().any(|frame| writes(frame, HOMING))
+    /// Whether right drives can be compared in all of it: how long homing takes is not known.
+    pub(super) fn is_foretold(&self) -> bool {
+        !self.frames().any(|frame| writes(frame, HOMING))
     }
 
     /// The registers whose contents its lines ask for.
@@ -170,8 +170,11 @@ fn is_answered(step: &Step) -> bool {
 
 /// The registers whose contents a step asks for.
 fn asks(step: &Step) -> Vec<u8> {
-    let first = |wanted: &WantedFrame| match wanted.data.first() {
-        Some(Expected::Byte(register)) => Some(*register),
+    let first = |wanted: &WantedFrame| match &wanted.data[..] {
+        [Expected::Byte(register), contents @ ..] => {
+            let any = contents.iter().all(|own| *own == Expected::Any);
+            (!any).then_some(*register)
+        }
         _ => None,
     };
     match &step.action {
