@@ -305,7 +305,7 @@ pub fn lost<M: RightDrive>(
     let at_once: [AtOnce<M::Piece>; 2] = [|_, _| true, Dialogue::repeats];
     for at_once in at_once {
         match lost_in(model.clone(), talk, (at_once, alive)) {
-            Err(Judged::Wrong(..)) => {}
+            Err(Judged::Wrong(..) | Judged::TooMany) => {}
             found => return found,
         }
     }
@@ -462,8 +462,14 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
             let (earliest, latest) = (units(sent.earliest), units(sent.latest).min(end));
             let rests = |due| due > latest + scan - world.ahead.0 && world.model.rests();
             match due {
-                // How long it has waited makes no difference to it, or none before its next step.
-                None => all.extend(world.waiting((earliest, latest + scan))),
+                // How long it has waited makes no difference to it.
+                None => {
+                    let begun = earliest.max(world.at + world.ahead.0);
+                    let mut waited = world.clone();
+                    waited.ahead = (begun - world.at, latest + scan - world.at);
+                    all.extend(waited.within(i64::MIN, i64::MAX));
+                }
+                // It makes none before its next step.
                 Some(due) if rests(due) => {
                     let waited = world.waiting((earliest - scan, latest + scan));
                     all.extend(waited.map(|own| World {

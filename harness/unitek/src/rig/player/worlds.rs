@@ -90,7 +90,10 @@ impl Told {
 
     /// How late a frame may be at most.
     fn slowest(&self) -> Span {
-        (self.measured() * WORSE).max(self.way.tolerance)
+        match self.way.tolerance {
+            Span::ZERO => Span::ZERO,
+            tolerance => tolerance.max(self.measured() * WORSE),
+        }
     }
 }
 
