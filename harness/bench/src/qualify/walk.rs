@@ -16,6 +16,11 @@ pub trait Walked: Clone {
     /// The state that it is in.
     fn state(&self) -> Self::State;
 
+    /// Whether an input means something in the state that it is in. One that does not makes no pair with the state.
+    fn takes(&self, _input: usize) -> bool {
+        true
+    }
+
     /// Sends an input, and asks the drive for what shows its effect: the lines of a scenario.
     ///
     /// # Errors
@@ -104,32 +109,32 @@ impl<S: Ord + Clone> Walker<S> {
             lines: Vec::new(),
             walked: BTreeSet::new(),
         };
+        // What comes before may decide that an input is left out here, which the state does not tell.
+        let mut refused = BTreeSet::new();
         while model.now().since(Instant::START) < most {
             let here = model.state();
             self.explore(model, &here);
-            let Some(input) = self.next(&here) else { break };
-            let put = model.put(input);
-            let there = put.is_ok().then(|| model.state());
-            if let Some(ways) = self.ways.get_mut(&here) {
-                ways[input] = there;
-            }
-            match put {
+            let Some(input) = self.next(&here, &refused) else {
+                break;
+            };
+            let mut there = model.clone();
+            match there.put(input) {
                 Ok(own) => part.lines.extend(own),
-                // What comes before decides it, which the state does not tell.
                 Err(why) => {
-                    if self.is_new(&here, input) {
-                        self.walk
-                            .denied
-                            .entry(why)
-                            .or_default()
-                            .insert((here, input));
-                    }
-                    break;
+                    let denied = self.walk.denied.entry(why).or_default();
+                    denied.insert((here, input));
+                    refused.insert(input);
+                    continue;
                 }
             }
-            if self.walked.insert((here.clone(), input)) {
-                part.walked.insert((here.clone(), input));
+            if let Some(ways) = self.ways.get_mut(&here) {
+                ways[input] = Some(there.state());
             }
+            if self.walked.insert((here.clone(), input)) {
+                part.walked.insert((here, input));
+            }
+            *model = there;
+            refused.clear();
         }
         part
     }
@@ -140,6 +145,9 @@ impl<S: Ord + Clone> Walker<S> {
             return;
         }
         let ways = (0..self.inputs).map(|input| {
+            if !model.takes(input) {
+                return None;
+            }
             let mut there = model.clone();
             match there.put(input) {
                 Ok(_) => Some(there.state()),
@@ -158,20 +166,23 @@ impl<S: Ord + Clone> Walker<S> {
         !self.walked.contains(&(state.clone(), input))
     }
 
-    /// The next input: a new one that leaves the state as it is, then any new one, then the first of the shortest way to one.
-    fn next(&self, here: &S) -> Option<usize> {
+    /// The next input but these: a new one that leaves the state as it is, then any new one, then the first of the shortest way to one.
+    fn next(&self, here: &S, refused: &BTreeSet<usize>) -> Option<usize> {
         let ways = self.ways.get(here)?;
         let new = |stays: bool| {
             (0..self.inputs).find(|input| {
                 let leads = ways[*input].as_ref();
-                leads.is_some_and(|there| (there == here) == stays) && self.is_new(here, *input)
+                let leads = leads.is_some_and(|there| (there == here) == stays);
+                leads && self.is_new(here, *input) && !refused.contains(input)
             })
         };
-        new(true).or_else(|| new(false)).or_else(|| self.way(here))
+        new(true)
+            .or_else(|| new(false))
+            .or_else(|| self.way(here, refused))
     }
 
-    /// The first input of the shortest way to a state in which an input is new.
-    fn way(&self, here: &S) -> Option<usize> {
+    /// The first input of the shortest way to a state in which an input is new; none of these.
+    fn way(&self, here: &S, refused: &BTreeSet<usize>) -> Option<usize> {
         let mut seen = BTreeSet::from([here]);
         let mut reached = VecDeque::from([(here, None)]);
         while let Some((state, first)) = reached.pop_front() {
@@ -180,6 +191,9 @@ impl<S: Ord + Clone> Walker<S> {
             };
             for (input, leads) in ways.iter().enumerate() {
                 let Some(there) = leads else { continue };
+                if first.is_none() && refused.contains(&input) {
+                    continue;
+                }
                 let first = first.or(Some(input));
                 if self.is_new(state, input) && state != here {
                     return first;
@@ -194,6 +208,11 @@ impl<S: Ord + Clone> Walker<S> {
 
     /// The walk, with what it has left out.
     fn end(mut self) -> Walk<S> {
+        for denied in self.walk.denied.values_mut() {
+            denied.retain(|pair| !self.walked.contains(pair));
+        }
+        self.walk.denied.retain(|_, denied| !denied.is_empty());
+        let denied: BTreeSet<_> = self.walk.denied.values().flatten().collect();
         let leads = |state: &S, input: usize| match self.ways.get(state) {
             Some(ways) => ways[input].is_some(),
             // Nothing is known of a state that was never reached.
@@ -205,8 +224,10 @@ impl<S: Ord + Clone> Walker<S> {
             let inputs = 0..self.inputs;
             inputs.map(move |input| (state, input))
         });
-        let left = all.filter(|(state, input)| leads(state, *input) && self.is_new(state, *input));
-        self.walk.left = left.map(|(state, input)| (state.clone(), input)).collect();
+        let left = all.filter(|(state, input)| leads(state, *input));
+        let left = left.map(|(state, input)| (state.clone(), input));
+        let left = left.filter(|pair| !self.walked.contains(pair) && !denied.contains(pair));
+        self.walk.left = left.collect();
         self.walk
     }
 }
@@ -303,7 +324,7 @@ impl<S: Ord> DriveWalk<S> {
 mod tests {
     use super::*;
 
-    /// A door: open, closed or locked. Input 0 looks, 1 opens or closes, 2 turns the key, 3 is never admitted.
+    /// A door: open, closed or locked. Input 0 looks, 1 opens or closes, 2 turns the key, 3 is never admitted, 4 means something nowhere.
     #[derive(Clone)]
     struct Door(u8, Instant);
 
@@ -312,6 +333,10 @@ mod tests {
 
         fn state(&self) -> u8 {
             self.0
+        }
+
+        fn takes(&self, input: usize) -> bool {
+            input != 4
         }
 
         fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
@@ -333,7 +358,7 @@ mod tests {
     }
 
     fn of(bounds: WalkBounds) -> Walk<u8> {
-        walk(&Door(0, Instant::START), 4, bounds, &[])
+        walk(&Door(0, Instant::START), 5, bounds, &[])
     }
 
     fn walked(walk: &Walk<u8>) -> usize {
@@ -352,7 +377,7 @@ mod tests {
         assert!(own.left.is_empty(), "{own:?}");
         assert_eq!(own.parts.len(), 1);
         // Nothing is new behind it.
-        let again = walk(&Door(0, Instant::START), 4, bounds, &own.parts);
+        let again = walk(&Door(0, Instant::START), 5, bounds, &own.parts);
         assert!(again.parts.is_empty(), "{again:?}");
     }
 
@@ -380,7 +405,7 @@ mod tests {
             conversation: Span::from_millis(60),
             all: Span::from_millis(10_000),
         });
-        let names = ["a look", "a push", "a turn of the key", "a blow"];
+        let names = ["a look", "a push", "a turn of the key", "a blow", "a word"];
         let all = own.told(&names, |_| true);
         assert_eq!(
             all,
@@ -405,7 +430,7 @@ mod tests {
             drive: "slave 8".to_owned(),
             walk,
         };
-        let names = ["a look", "a push", "a turn of the key", "a blow"];
+        let names = ["a look", "a push", "a turn of the key", "a blow", "a word"];
         let walked = |verdict| own.told(&names, "q-", &[("q-walk-1-slave-8", verdict)]);
         for verdict in [Verdict::Passed, Verdict::Failed] {
             let told = walked(verdict);

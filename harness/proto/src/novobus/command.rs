@@ -15,7 +15,7 @@ use core::fmt;
 pub const PAGE: u16 = 0xFF00;
 
 /// Which command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Reads a byte (10.1).
     ReadByte,
@@ -57,7 +57,7 @@ impl Kind {
 }
 
 /// A byte of a command, after the command byte.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Field {
     /// The low byte of the address.
     AddrL,
