@@ -26,7 +26,7 @@ pub(crate) use hypothesis::{Hypothesis, explaining};
 pub(crate) use pinned::{Pinned, questions};
 #[cfg(test)]
 pub(crate) use probes::{Asked, Probe, hypotheses};
-pub(crate) use probes::{conversations, probes, thorough};
+pub(crate) use probes::{conversations, probes, some_drives, thorough};
 pub(crate) use qualification::{Qualification, QualificationFacts, QualifiedBench};
 pub(crate) use recorded::{of_parts, of_run};
 #[cfg(test)]

@@ -134,7 +134,7 @@ const fn look(address: u16, mask: u8) -> DecidingBits {
 }
 
 /// The drives of a ring that are asked individually: the first ones, the middle one and the last one.
-fn some_drives(drives: u8) -> BTreeSet<u8> {
+pub(crate) fn some_drives(drives: u8) -> BTreeSet<u8> {
     let some = [0, 1, drives / 2, drives.saturating_sub(1)];
     some.into_iter().filter(|drive| *drive < drives).collect()
 }

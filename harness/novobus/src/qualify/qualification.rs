@@ -15,6 +15,7 @@ use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::rig::OnRings;
 use crate::rig::Run;
+use crate::rig::walk::Walks;
 use crate::twin::{Exactness, SILENCED, Twin};
 use harness_bench::link::{Link as _, Octets as _};
 use harness_bench::rig::playing::Qualified;
@@ -127,6 +128,10 @@ pub(crate) struct Qualification {
     parts: Parts,
     /// Whether a part is missing, or has not been played to its end.
     lacks_a_part: bool,
+    /// The conversations that walk the model of a right drive.
+    walks: Walks,
+    /// The conversations that were played, with their verdicts.
+    conversed: Vec<(String, Verdict)>,
 }
 
 /// The value of [`SELF_TEST_BUS`] of such a drive.
@@ -146,6 +151,8 @@ impl Qualification {
             lacks_a_part: false,
             began: String::new(),
             thorough: false,
+            walks: Walks::new(&facts.rig),
+            conversed: Vec::new(),
             facts,
         }
     }
@@ -211,7 +218,8 @@ impl Qualification {
             self.findings.note_open(ENDED.to_owned());
         }
         ended |= self.lacks_a_part;
-        let deviations = self.deviations(bench, (!ended).then_some(&settled));
+        let mut deviations = self.deviations(bench, (!ended).then_some(&settled));
+        deviations.push_str(&self.walks.told(&self.conversed));
         Ok(self.qualified(Some(profile), deviations))
     }
 
@@ -244,6 +252,7 @@ impl Qualification {
         let drives = self.drives;
         let reaches = |place: usize| place == 0 || self.facts.reached.contains(&place);
         let mut entries = conversations(drives, &reaches).unwrap_or_default();
+        entries.extend(self.walks.conversations());
         let mut read = Vec::new();
         if self.thorough {
             entries.extend(thorough(drives).unwrap_or_default());
@@ -288,7 +297,11 @@ impl Qualification {
         let name = entry.short_name();
         match (self.parts.repeats(name, &played), &self.parts.other) {
             (true, _) => {}
-            (false, None) => self.findings.note(name, &played),
+            (false, None) => {
+                let verdict = played.outcome.verdict;
+                self.conversed.push((name.to_owned(), verdict));
+                self.findings.note(name, &played);
+            }
             (false, Some(_)) => {
                 let name = self.parts.named(name);
                 self.findings.note_other_part(&name, &played);

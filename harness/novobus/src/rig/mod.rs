@@ -24,6 +24,7 @@ pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod shared;
 pub(crate) mod sim;
+pub(crate) mod walk;
 pub(crate) mod wrong_parity;
 
 pub(crate) use beside::PlayedOnRings;

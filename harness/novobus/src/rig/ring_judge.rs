@@ -7,6 +7,7 @@ use super::judge::{AttemptFacts, judge, known};
 use super::open::line_rate;
 use super::reach::{heard, keeping_parity, reached};
 use super::run::{Way, not_played, opening, play_one, twin};
+use super::walk::Walks;
 use crate::language::read::RingScenario;
 use crate::language::syntax::Header;
 use crate::qualify::{
@@ -158,7 +159,8 @@ impl RecordJudge for RingJudge {
             },
             always,
         };
-        let own = conversations(drives, &reaches).unwrap_or_default();
+        let mut own = conversations(drives, &reaches).unwrap_or_default();
+        own.extend(Walks::new(&self.rig).conversations());
         let mut list: Vec<_> = own.into_iter().map(|entry| listed(entry, true)).collect();
         let long = thorough(drives).unwrap_or_default();
         list.extend(long.into_iter().map(|entry| listed(entry, false)));
