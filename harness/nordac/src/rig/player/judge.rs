@@ -95,15 +95,15 @@ impl Player {
     fn judged_by_times(&mut self, own: &Own, outcome: Outcome, left: &Left) -> Outcome {
         let turns = &left.turns;
         let late = left.way.late.max(left.way.longest);
-        let not_shown = |why: &str| {
+        let not_shown = |verdict, why: &str| {
             let remark = format!("{why} (the computer or the adapter was late by {late})");
-            Outcome::not_ready(Verdict::Inconclusive, Unready::NoAnswer, remark)
+            Outcome::not_ready(verdict, Unready::NoAnswer, remark)
         };
         let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
         match sent {
             Err(Differs {
                 open: Some(why), ..
-            }) => return not_shown(why),
+            }) => return not_shown(Verdict::Inconclusive, why),
             Err(differs) => match self.lost(own, turns) {
                 None => return accused(outcome, &differs, turns),
                 Some(why) => {
@@ -129,6 +129,7 @@ impl Player {
         let shown = kinds(turns) == kinds(&rehearsed);
         if late > left.way.tolerance && !shown {
             return not_shown(
+                Verdict::Marginal,
                 "the slaves are right in what they sent, and the scenario was not shown",
             );
         }
