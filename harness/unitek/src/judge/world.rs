@@ -134,14 +134,15 @@ impl World {
     /// Whether a register is compared in every state of a drive, and all of it.
     #[must_use]
     pub(crate) fn compares(number: u8) -> bool {
-        let known = [
-            &CONSTANT[..],
-            &LOGIC,
-            &SPEEDS,
-            &CURRENTS,
-            &[SCALE, STATUS, ERRORS],
-        ];
-        known.concat().contains(&number) || is_parameter(number)
+        let known =
+            CONSTANT.contains(&number) || LOGIC.contains(&number) || SPEEDS.contains(&number);
+        known || number == SCALE || is_parameter(number)
+    }
+
+    /// Whether a register is compared in some states at least, or some of it.
+    #[must_use]
+    pub(crate) fn compares_partly(number: u8) -> bool {
+        [STATUS, ERRORS].contains(&number) || CURRENTS.contains(&number) || Self::compares(number)
     }
 
     /// A drive that stands, of which these registers are not compared. Its clock begins at the start.

@@ -89,8 +89,8 @@ enum Gone {
     Unanswered(Error),
     /// The rig does not play the scenario.
     Skipped(Skip),
-    /// It was played. With what the drives and their models read at rest.
-    Played(Box<Outcome>, [AtRest; 2]),
+    /// It was played. With what the drives and their models read at rest, and the lines that the models have not met.
+    Played(Box<Outcome>, [AtRest; 2], Vec<usize>),
 }
 
 /// Plays attempts, on a rig or on a record, and judges them.
@@ -291,7 +291,7 @@ impl Player {
         let outcome = match gone {
             Gone::Unanswered(error) => self.unanswered(&error),
             Gone::Skipped(skip) => Outcome::skipped(skip),
-            Gone::Played(outcome, [drives, models]) => {
+            Gone::Played(outcome, [drives, models], foretold) => {
                 let unlike = unlike(&drives, &models);
                 // What differs at rest does so in each attempt: it is judged where a conversation asks for it.
                 let asks = match own.name.starts_with(CONVERSATION) {
@@ -317,7 +317,7 @@ impl Player {
                     }
                 };
                 let wrong = matches!(shown, Shown::Wrong(_));
-                let outcome = self.judged(own, *outcome, exact, (&told.unlike, shown));
+                let outcome = self.judged(own, *outcome, exact, (&told.unlike, &foretold, shown));
                 if let Some(note) = self.notes.last_mut() {
                     note.told(told, wrong);
                 }
@@ -344,15 +344,15 @@ impl Player {
         }
         let own = &own.with_firmware(self.known());
         let real = link.time_tolerance() > Span::ZERO;
-        let model = match rehearses.then(|| self.rehearsed(own, real)).transpose() {
-            Ok(rehearsal) => rehearsal.map_or_else(Vec::new, |own| {
+        let (model, foretold) = match rehearses.then(|| self.rehearsed(own, real)).transpose() {
+            Ok(rehearsal) => rehearsal.map_or_else(Default::default, |own| {
                 foretell(
                     &self.left,
                     self.known(),
                     &own.noted.written,
                     &own.noted.given,
                 );
-                own.at_rest
+                (own.at_rest, own.outcome.unmet)
             }),
             Err(skip) => return Gone::Skipped(skip),
         };
@@ -408,7 +408,7 @@ impl Player {
             while link.receive(0).is_some() {}
         }
         self.take_notes(&link.noted);
-        Gone::Played(Box::new(outcome), [at_rest, model])
+        Gone::Played(Box::new(outcome), [at_rest, model], foretold)
     }
 
     /// Plays a scenario on the model.

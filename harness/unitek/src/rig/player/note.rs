@@ -90,7 +90,7 @@ impl Shown {
         let (unanswered, ended) = match gone {
             Gone::Unanswered(error) => (Some(error.clone()), None),
             Gone::Skipped(_) => (None, None),
-            Gone::Played(outcome, _) => {
+            Gone::Played(outcome, ..) => {
                 let place = outcome.finding.as_ref().map(|own| own.span.start);
                 (None, Some((outcome.verdict, place)))
             }

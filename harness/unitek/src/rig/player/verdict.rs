@@ -50,11 +50,17 @@ impl Player {
         own: &Own,
         outcome: Outcome,
         exact: bool,
-        (unlike, shown): (&[(u8, u8)], Shown),
+        (unlike, foretold, shown): (&[(u8, u8)], &[usize], Shown),
     ) -> Outcome {
-        let differs = |register| unlike.iter().any(|own| own.1 == register);
-        let mut asked = own.asks_at(&outcome.unmet).into_iter();
-        let judged_by_worlds = are_judged(own, &outcome) && !asked.any(differs);
+        let compared = |register| {
+            let differs = unlike.iter().any(|own| own.1 == register);
+            World::compares(register) && !differs
+        };
+        // What the model does not meet either was known before.
+        let mut unmet = outcome.unmet.clone();
+        unmet.retain(|own| !foretold.contains(own));
+        let asked = own.asks_at(&unmet);
+        let judged_by_worlds = !outcome.unmet.is_empty() && asked.into_iter().all(compared);
         match (outcome.verdict, shown) {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
@@ -144,10 +150,10 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
     }
 }
 
-/// Whether right drives are compared in all that the lines ask for that were not met.
-pub(super) fn are_judged(own: &Own, outcome: &Outcome) -> bool {
-    let mut asked = own.asks_at(&outcome.unmet).into_iter();
-    !outcome.unmet.is_empty() && asked.all(World::compares)
+/// Whether right drives are compared in what the lines ask for that the model has not met.
+pub(super) fn are_judged(own: &Own, rehearsed: &Outcome) -> bool {
+    let mut asked = own.asks_at(&rehearsed.unmet).into_iter();
+    !rehearsed.unmet.is_empty() && asked.all(World::compares_partly)
 }
 
 fn inconclusive(outcome: Outcome, why: String) -> Outcome {
