@@ -5,7 +5,6 @@ use super::super::{Own, Player};
 use super::*;
 use crate::rig::RigSlave;
 use harness_bench::scenario::source::Source;
-use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::Limits;
 use harness_sim::nordac::deviation::deviation;
 use std::sync::Arc;
@@ -50,20 +49,6 @@ fn sent_by(known: &[Known], most_lost: usize, turns: &[Turn]) -> Result<Vec<usiz
 
 fn judged(turns: &[Turn]) -> Result<(), Differs> {
     sent_by(&[known(&[])], 0, turns).map(|_| ())
-}
-
-/// What slaves reply to octets that reach them at a time.
-fn replies(line: &mut Line, octets: &[u8], at: Instant) -> Vec<u16> {
-    line.advance(at);
-    line.hear(at, &Piece::of(&wide(octets)));
-    let said = std::iter::from_fn(|| line.say());
-    said.flat_map(|own| own.octets).collect()
-}
-
-/// The main actual value in the reply to an exchange by PPO1.
-fn actual(octets: &[u16]) -> Option<u16> {
-    let place = octets.len().checked_sub(4)?;
-    (octets.len() == 21).then(|| octets[place] << 8 | octets[place + 1])
 }
 
 /// A right slave is not accused, however late the computer hands over a telegram, or reads what comes to it.
@@ -219,14 +204,15 @@ fn a_line_that_loses_a_request_accuses_no_slave() {
     let right = turns(&all[0]);
     let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
     for place in (0..right.len()).filter(played) {
-        let mut line = Line::new(&[all[0].model(Default::default())]);
+        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
         let mut lost = right.clone();
         for (number, turn) in lost.iter_mut().enumerate() {
             let mut came = Vec::new();
             if number != place {
-                came = replies(&mut line, &turn.octets, turn.left);
+                let soon = world.soon(turn);
+                (world, came) = world.hears(&turn.octets, soon);
             }
-            turn.came = came;
+            turn.came = wide(&came);
         }
         lost[place].read = None;
         let found = sent_by(&all, MOST_LOST, &lost);
@@ -242,7 +228,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
     let right = turns(&all[0]);
     let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
     for place in (0..right.len() - 1).filter(played) {
-        let mut line = Line::new(&[all[0].model(Default::default())]);
+        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
         let mut late = right.clone();
         let held = std::mem::take(&mut late[place].came);
         assert!(!held.is_empty());
@@ -255,15 +241,18 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
             if number > place + 1 {
                 turn.left += pause;
             }
-            let mut at = turn.left;
+            let mut at = world.soon(turn);
             if number == place + 1 {
                 at += pause;
-                came = replies(&mut line, &right[place].octets, at);
+                (world, came) = world.hears(&right[place].octets, at);
+                at = world.free + MOMENT;
             }
             if number != place {
-                came.extend(replies(&mut line, &turn.octets, at));
+                let (next, more) = world.hears(&turn.octets, at);
+                world = next;
+                came.extend(more);
             }
-            turn.came = came;
+            turn.came = wide(&came);
         }
         assert_eq!(judged(&late), Ok(()), "{place}");
     }
@@ -272,10 +261,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
 /// An octet behind a reply was not lost, and no reply is there that the line has changed.
 #[test]
 fn a_line_adds_nothing() {
-    let kinds = |octets: &[u16]| -> Vec<_> {
-        let own = pieces(octets, &[]).into_iter();
-        own.map(|own| Piece::of(&octets[own]).damaged).collect()
-    };
-    assert_eq!(kinds(&[0xE5, 0x10]), [false, true]);
-    assert_eq!(kinds(&[0x10]), [true]);
+    let reply = vec![vec![0xE5]];
+    assert_eq!(damages(&reply, &[0xE5, 0x10]), Vec::new());
+    assert_eq!(damages(&reply, &[0x10]), vec![(1, Vec::new())]);
 }
