@@ -142,7 +142,7 @@ pub(super) const INPUTS: [(&str, Put); 63] = [
     ("a zero", Byte(Event::Zero, 0)),
     ("7 zeros", Run(0, 7)),
     ("9 zeros", Run(0, 9)),
-    ("17 bytes that are none", Run(0x55, 17)),
+    ("17 bytes that are no zeros", Run(0x55, 17)),
     ("the check sequence behind 17 zeros", Recovery),
     ("a silence", Silence),
     ("a wrong parity bit", Byte(Event::Parity, 0)),

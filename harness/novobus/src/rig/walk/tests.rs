@@ -80,7 +80,7 @@ fn every_input_that_is_permitted_is_put_in_every_state() {
       1 left out, as conversations of their own reset drives: the right checking byte
       4 left out, as process data are not sent to other drives: the address in front of its own
       74 left out, it reaches the first drive behind the master alone: a wrong parity bit
-      20 left out, the manual leaves `broken-sequence` open: 17 bytes that are none, 7 zeros, 9 zeros, a zero, the check sequence behind 17 zeros
+      20 left out, the manual leaves `broken-sequence` open: 17 bytes that are no zeros, 7 zeros, 9 zeros, a zero, the check sequence behind 17 zeros
       10 left out, the manual leaves `empty-short-telegram` open: a next address without net bytes, a short address without net bytes
       1 left out, the manual leaves `read-long` open: a byte of a command
       3 left out, the manual leaves `short-address` open: the next drive, the same drive, the same drive, 7 net bytes
@@ -89,7 +89,7 @@ fn every_input_that_is_permitted_is_put_in_every_state() {
       1 left out, as conversations of their own reset drives: the right checking byte
       4 left out, as process data are not sent to other drives: the address in front of its own
       74 left out, it reaches the first drive behind the master alone: a wrong parity bit
-      20 left out, the manual leaves `broken-sequence` open: 17 bytes that are none, 7 zeros, 9 zeros, a zero, the check sequence behind 17 zeros
+      20 left out, the manual leaves `broken-sequence` open: 17 bytes that are no zeros, 7 zeros, 9 zeros, a zero, the check sequence behind 17 zeros
       10 left out, the manual leaves `empty-short-telegram` open: a next address without net bytes, a short address without net bytes
       1 left out, the manual leaves `read-long` open: a byte of a command
       3 left out, the manual leaves `short-address` open: the next drive, the same drive, the same drive, 7 net bytes
@@ -97,7 +97,7 @@ fn every_input_that_is_permitted_is_put_in_every_state() {
       2 left out, as a cell that is used would be written: a zero
       1 left out, as conversations of their own reset drives: the right checking byte
       4 left out, as process data are not sent to other drives: the address in front of its own
-      64 left out, the manual leaves `broken-sequence` open: 17 bytes that are none, 7 zeros, 80 in the error mode, 9 zeros, a wrong parity bit, a zero, another byte in the error mode, the check sequence behind 17 zeros
+      64 left out, the manual leaves `broken-sequence` open: 17 bytes that are no zeros, 7 zeros, 80 in the error mode, 9 zeros, a wrong parity bit, a zero, another byte in the error mode, the check sequence behind 17 zeros
       8 left out, the manual leaves `empty-short-telegram` open: a next address without net bytes, a short address without net bytes
       1 left out, the manual leaves `read-long` open: a byte of a command
       2 left out, the manual leaves `short-address` open: the same drive, the same drive, 7 net bytes
