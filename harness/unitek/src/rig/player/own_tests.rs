@@ -210,8 +210,13 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
             unmet: unmet.clone(),
             ..Outcome::rig_error(String::new())
         };
-        let judged = player.judged(&own, outcome, false, (&[], known, Shown::Complete));
-        assert_eq!(judged.verdict, verdict, "{lines}");
+        let judged = |unlike: &[(u8, u8)]| {
+            let shown = (unlike, known, Shown::Complete);
+            player.judged(&own, outcome.clone(), false, shown).verdict
+        };
+        assert_eq!(judged(&[]), verdict, "{lines}");
+        // What a drive reads differently at rest is not compared.
+        assert_eq!(judged(&[(1, 0x30), (1, 0x40)]), Verdict::Inconclusive);
     }
 }
 

@@ -52,15 +52,14 @@ impl Player {
         exact: bool,
         (unlike, foretold, shown): (&[(u8, u8)], &[usize], Shown),
     ) -> Outcome {
-        let compared = |register| {
-            let differs = unlike.iter().any(|own| own.1 == register);
-            World::compares(register) && !differs
+        let differs = |register| unlike.iter().any(|own| own.1 == register);
+        let judged = |line: &usize| {
+            // That the model does not meet a line either was known before.
+            let known = foretold.contains(line);
+            let mut asked = own.asks_at(&[*line]).into_iter();
+            asked.all(|register| (known || World::compares(register)) && !differs(register))
         };
-        // What the model does not meet either was known before.
-        let mut unmet = outcome.unmet.clone();
-        unmet.retain(|own| !foretold.contains(own));
-        let asked = own.asks_at(&unmet);
-        let judged_by_worlds = !outcome.unmet.is_empty() && asked.into_iter().all(compared);
+        let judged_by_worlds = !outcome.unmet.is_empty() && outcome.unmet.iter().all(judged);
         match (outcome.verdict, shown) {
             (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
