@@ -7,15 +7,11 @@
 //! Worlds that do the same from now on are merged. There are at most `MOST_WORLDS`: where that is not enough, nothing is accused.
 
 use harness_proto::time::{Instant, Span};
-use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::hash::Hash;
 
 /// The most worlds at one time.
 pub(crate) const MOST_WORLDS: usize = 4_096;
-
-/// The clock of a drive may be off by this part of a time: 2 % (UNITEK 5.2; our choice for other buses).
-const DRIFT: i64 = 50;
 
 /// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
 pub trait RightDrive: Clone {
@@ -25,14 +21,27 @@ pub trait RightDrive: Clone {
     /// How long a scan lasts.
     const SCAN: Span;
 
+    /// Its clock may be off by this part of a time: 2 % (UNITEK 5.2).
+    const DRIFT: i64 = 50;
+
     /// When it next does something by itself; `None` while it only waits for pieces.
     fn due(&self) -> Option<Instant>;
+
+    /// Whether it makes no difference how long it waits before that.
+    fn rests(&self) -> bool {
+        false
+    }
 
     /// Runs up to this time and including it.
     fn advance(&mut self, to: Instant);
 
     /// A piece reaches it. It has been run up to this time.
     fn hear(&mut self, at: Instant, piece: &Self::Piece);
+
+    /// The drive that a piece has reached in parts, where a stream may part it.
+    fn hear_parted(&self, _at: Instant, _piece: &Self::Piece) -> Option<Self> {
+        None
+    }
 
     /// Takes the next piece that it sends now.
     fn say(&mut self) -> Option<Self::Piece>;
@@ -44,6 +53,11 @@ pub trait RightDrive: Clone {
 
     /// Whether what it says can be what came: the same but for what means nothing, and within the band of what moves.
     fn is(&self, said: &Self::Piece, came: &Self::Piece) -> bool;
+
+    /// Whether what came is no piece, but what a line has left of one.
+    fn is_damaged(_came: &Self::Piece) -> bool {
+        false
+    }
 
     /// Whether what it does from now on is known. Where it is not, anything can come of it.
     fn knows(&self) -> bool {
@@ -83,6 +97,8 @@ pub struct Dialogue<P> {
     pub sent: Vec<Timed<P>>,
     /// What came from it, in order.
     pub came: Vec<Timed<P>>,
+    /// How many pieces had been sent when each that came was read: it is no answer to later ones. Empty where that is not known.
+    pub asked: Vec<usize>,
     /// Up to when all that came was read.
     pub end: Instant,
     /// How much later than a right drive says it a piece may be on the bus.
@@ -93,6 +109,8 @@ pub struct Dialogue<P> {
     pub complete: bool,
     /// The most pieces that the drive said and an adapter has lost.
     pub most_lost: usize,
+    /// Whether pieces that were sent are lost as well.
+    pub loses_sent: bool,
     /// The most steps of all worlds together.
     pub most_steps: usize,
 }
@@ -109,8 +127,8 @@ struct World<M: RightDrive> {
     heard: usize,
     /// What it has said that has not come so far.
     said: VecDeque<Said<M::Piece>>,
-    /// How much of what it has said was lost.
-    lost: usize,
+    /// The places of the pieces that were lost or whose answers were, in what was sent.
+    lost: Vec<usize>,
 }
 
 /// A piece that a world has said.
@@ -118,6 +136,8 @@ struct World<M: RightDrive> {
 struct Said<P> {
     /// When, on its own clock.
     at: i64,
+    /// How many pieces it had heard.
+    heard: usize,
     piece: P,
     may_wait: bool,
 }
@@ -130,21 +150,41 @@ impl<M: RightDrive> World<M> {
     fn same(&self) -> Same<M::Piece> {
         let said = self.said.iter();
         let said = said.map(|own| (self.at - own.at, own.piece.clone()));
-        (self.heard, self.lost, self.model.state(), said.collect())
+        let lost = self.lost.len();
+        (self.heard, lost, self.model.state(), said.collect())
     }
 
     /// The world in which the piece that is next to come is lost; `None` where nothing is said, or where `most` are lost.
     fn losing(&self, most: usize) -> Option<Self> {
+        let said = self.said.front().filter(|_| self.lost.len() < most)?;
+        let lost = said.heard.saturating_sub(1);
         let mut own = self.clone();
-        own.said.pop_front().filter(|_| self.lost < most)?;
-        own.lost += 1;
+        own.said.pop_front();
+        own.lost.push(lost);
         Some(own)
+    }
+
+    /// The world in which the line has added something: the answer to the last piece counts as lost.
+    fn adding(&self) -> Self {
+        let mut own = self.clone();
+        own.lost.push(own.heard.saturating_sub(1));
+        own
     }
 
     /// The world in which the computer's clock is ahead by one of these times as well; `None` if there is none.
     fn within(mut self, least: i64, most: i64) -> Option<Self> {
         self.ahead = (self.ahead.0.max(least), self.ahead.1.min(most));
         (self.ahead.0 <= self.ahead.1).then_some(self)
+    }
+
+    /// The world that has waited, its own clock like that of the computer, until what can reach it between these times.
+    fn waiting(&self, (earliest, latest): (i64, i64)) -> Option<Self> {
+        let (scan, begun) = (units_of(M::SCAN), earliest.max(self.at + self.ahead.0));
+        let mut own = self.clone();
+        own.at += (begun - self.at).max(0) / scan * scan;
+        own.ahead = (begun - own.at, latest - own.at);
+        own.model.advance(instant(own.at));
+        own.within(i64::MIN, i64::MAX)
     }
 
     /// Takes another world in that does the same, at another time of its own clock. Returns whether the times of both are one interval: where
@@ -164,6 +204,7 @@ impl<M: RightDrive> World<M> {
         while let Some(piece) = self.model.say() {
             self.said.push_back(Said {
                 at: self.at,
+                heard: self.heard,
                 may_wait: self.model.may_wait(),
                 piece,
             });
@@ -171,7 +212,7 @@ impl<M: RightDrive> World<M> {
     }
 
     fn advance(&mut self, to: i64) {
-        let drift = (to - self.at) / DRIFT;
+        let drift = (to - self.at) / M::DRIFT;
         self.ahead = (self.ahead.0 - drift, self.ahead.1 + drift);
         self.at = to;
         self.model.advance(instant(to));
@@ -193,6 +234,7 @@ type Place = (usize, i64, usize);
 /// Worlds of which no two do the same, the earliest first: what follows from one comes behind it.
 struct Worlds<M: RightDrive> {
     all: BTreeMap<Place, World<M>>,
+    /// Where those stand that do the same. A place at which none stands any more stays.
     same: HashMap<Same<M::Piece>, Vec<Place>>,
     numbers: usize,
 }
@@ -219,14 +261,7 @@ impl<M: RightDrive> Worlds<M> {
     }
 
     fn pop_first(&mut self) -> Option<World<M>> {
-        let (place, world) = self.all.pop_first()?;
-        if let Entry::Occupied(mut same) = self.same.entry(world.same()) {
-            same.get_mut().retain(|own| *own != place);
-            if same.get().is_empty() {
-                same.remove();
-            }
-        }
-        Some(world)
+        self.all.pop_first().map(|own| own.1)
     }
 }
 
@@ -245,33 +280,39 @@ pub fn judge_alive<M: RightDrive>(
     // Drives of different kinds are never merged: each is judged by itself.
     let mut first = None;
     for drive in drives {
-        match judge_one(drive, talk, alive) {
-            Judged::Wrong(place, expected) => {
+        match lost(drive, talk, alive) {
+            Err(Judged::Wrong(place, expected)) => {
                 first.get_or_insert(Judged::Wrong(place, expected));
             }
-            other => return other,
+            Err(other) => return other,
+            Ok(_) => return Judged::Right,
         }
     }
     first.unwrap_or(Judged::Unknown)
 }
 
-fn judge_one<M: RightDrive>(
+/// The places, in what was sent, of the pieces that were lost or whose answers were, where a right drive could have sent what came: as few as
+/// explain it.
+///
+/// # Errors
+/// What else is said of the conversation.
+pub fn lost<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
-) -> Judged<M::Piece> {
+) -> Result<Vec<usize>, Judged<M::Piece>> {
     // When a piece has reached a drive seldom matters: a few worlds may explain what came.
     for heard in [
         Heard::AtOnce,
         Heard::BeforeItsStep,
         Heard::RepeatsBeforeItsStep,
     ] {
-        match judge_by(model.clone(), talk, (heard, alive)) {
-            Judged::Wrong(..) | Judged::TooMany => {}
+        match lost_in(model.clone(), talk, (heard, alive)) {
+            Err(Judged::Wrong(..) | Judged::TooMany) => {}
             found => return found,
         }
     }
-    judge_by(model, talk, (Heard::AtAnyTime, alive))
+    lost_in(model, talk, (Heard::AtAnyTime, alive))
 }
 
 /// When a drive hears a piece, in the worlds that are tried.
@@ -298,11 +339,11 @@ impl Heard {
 }
 
 /// The same in some of the worlds.
-fn judge_by<M: RightDrive>(
+fn lost_in<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
     (heard, alive): (Heard, &dyn Fn()),
-) -> Judged<M::Piece> {
+) -> Result<Vec<usize>, Judged<M::Piece>> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
     worlds.insert(World {
@@ -311,7 +352,7 @@ fn judge_by<M: RightDrive>(
         ahead: (0, 0),
         heard: 0,
         said: VecDeque::new(),
-        lost: 0,
+        lost: Vec::new(),
     });
     for place in 0..=talk.came.len() {
         let mut explained = Worlds::new();
@@ -319,11 +360,11 @@ fn judge_by<M: RightDrive>(
         while let Some(world) = worlds.pop_first() {
             alive();
             if steps > talk.most_steps || worlds.all.len() + explained.all.len() > MOST_WORLDS {
-                return Judged::TooMany;
+                return Err(Judged::TooMany);
             }
             let refuted = talk.refutes(&world, place);
             if !refuted && !world.model.knows() {
-                return Judged::Unknown;
+                return Err(Judged::Unknown);
             }
             if let Some(said) = world.said.front() {
                 expected = Some(said.piece.clone());
@@ -331,8 +372,16 @@ fn judge_by<M: RightDrive>(
             if refuted {
                 continue;
             }
+            let came = talk.came.get(place);
+            let damaged = came.is_some_and(|own| M::is_damaged(&own.piece));
+            if damaged && world.lost.len() < talk.most_lost {
+                explained.insert(world.adding());
+            }
             if let Some(own) = world.losing(talk.most_lost) {
                 steps += 1;
+                if damaged {
+                    explained.insert(own.clone());
+                }
                 worlds.insert(own);
             }
             let mut explains = |world| explained.insert(world);
@@ -346,11 +395,12 @@ fn judge_by<M: RightDrive>(
             }
         }
         if explained.all.is_empty() {
-            return Judged::Wrong(place, expected);
+            return Err(Judged::Wrong(place, expected));
         }
         worlds = explained;
     }
-    Judged::Right
+    let lost = worlds.all.into_values().map(|own| own.lost);
+    Ok(lost.min_by_key(Vec::len).unwrap_or_default())
 }
 
 impl<P: Clone + Eq + Hash> Dialogue<P> {
@@ -424,14 +474,17 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         ended: &mut impl FnMut(World<M>),
     ) -> Vec<World<M>> {
         let mut all = Vec::new();
+        let mut hears = false;
         let scan = units_of(M::SCAN);
         let came = self.came.get(place);
         let end = came.map_or(self.end, |own| own.latest);
         let end = units(end) + scan;
         let due = world.model.due().map(units);
-        let sent = self.sent.get(world.heard);
+        let asked = self.asked.get(place).copied().unwrap_or(usize::MAX);
+        let sent = self.sent.get(world.heard).filter(|_| world.heard < asked);
         if let Some(sent) = sent {
             let (earliest, latest) = (units(sent.earliest), units(sent.latest).min(end));
+            let rests = |due| due > latest + scan - world.ahead.0 && world.model.rests();
             match due {
                 // How long it has waited makes no difference to it.
                 None => {
@@ -439,6 +492,17 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                     let mut waited = world.clone();
                     waited.ahead = (begun - world.at, latest + scan - world.at);
                     all.extend(waited.within(i64::MIN, i64::MAX));
+                }
+                // It makes none before its next step.
+                Some(due) if rests(due) => {
+                    let waited = world.waiting((earliest - scan, latest + scan));
+                    all.extend(waited.map(|own| World {
+                        ahead: (
+                            own.ahead.0.min(world.ahead.0),
+                            own.ahead.1.max(world.ahead.1),
+                        ),
+                        ..own
+                    }));
                 }
                 Some(due) => {
                     let scans = |span: i64| (span.max(0) + scan - 1) / scan * scan;
@@ -460,10 +524,26 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
                     }
                 }
             }
+            let mut parted = Vec::new();
             for own in &mut all {
+                let model = own.model.hear_parted(instant(own.at), &sent.piece);
+                parted.extend(model.map(|model| World {
+                    model,
+                    ..own.clone()
+                }));
                 own.model.hear(instant(own.at), &sent.piece);
+            }
+            all.extend(parted);
+            hears = !all.is_empty();
+            for own in &mut all {
                 own.heard += 1;
                 own.listen();
+            }
+            if self.loses_sent && world.lost.len() < self.most_lost {
+                let mut own = world.clone();
+                own.lost.push(own.heard);
+                own.heard += 1;
+                all.push(own);
             }
         }
         let unheard = sent.map_or(i64::MAX, |own| units(own.latest) + scan);
@@ -471,7 +551,7 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
         if may_end && unheard.min(due.map_or(i64::MAX, |due| due + world.ahead.1)) >= end {
             ended(world.clone());
         }
-        let waits = heard != Heard::AtOnce || sent.is_none() || all.is_empty();
+        let waits = heard != Heard::AtOnce || !hears;
         if let Some(due) = due.filter(|_| waits)
             && let Some(mut own) = world.within(i64::MIN, unheard.min(end) - due)
         {
@@ -480,7 +560,7 @@ impl<P: Clone + Eq + Hash> Dialogue<P> {
             let until = sent.map_or(end, |own| units(own.earliest).min(end)) - scan;
             while own.said.is_empty()
                 && let Some(due) = own.model.due().map(units)
-                && due + (due - own.at) / DRIFT + own.ahead.1 < until
+                && due + (due - own.at) / M::DRIFT + own.ahead.1 < until
             {
                 own.advance(due);
             }

@@ -8,6 +8,7 @@ use harness_proto::line::Received;
 use harness_proto::nordac::Properties;
 use harness_proto::profibus::{Buffer, BusRate, Telegram};
 use harness_proto::time::Instant;
+use std::hash::{Hash as _, Hasher};
 
 /// A drive on a line.
 #[derive(Clone, Debug)]
@@ -66,6 +67,13 @@ impl Drive {
     #[must_use]
     pub const fn is_powered(&self) -> bool {
         self.powered
+    }
+
+    /// Feeds all that decides what it does from `at` on, but its properties, to a checksum. The line is idle, and no reply waits.
+    pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
+        self.powered.hash(sum);
+        self.slave.hash_state(at, sum);
+        self.inverter.hash_state(at, sum);
     }
 
     /// Switches the drive off or on. At power-up it has its settings, and everything else is as after power-up.

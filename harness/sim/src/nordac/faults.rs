@@ -1,5 +1,7 @@
 //! The fault memory: 947 and 1800 to 1806 (5.7, 4.1.3).
 
+use std::hash::{Hash, Hasher};
+
 /// How many faults there are (1800).
 pub const FAULTS: usize = 25;
 /// The fault of a lost master (2.6): printed as USS time-out.
@@ -42,11 +44,19 @@ impl Past {
 }
 
 /// Current and past faults.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultMemory {
     pending: u8,
     past: [Past; 5],
     counters: [u16; FAULTS],
+}
+
+impl Hash for FaultMemory {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let past = self.past.iter().filter(|own| own.code != 0);
+        (self.pending, self.counters).hash(state);
+        past.for_each(|own| own.hash(state));
+    }
 }
 
 impl Default for FaultMemory {

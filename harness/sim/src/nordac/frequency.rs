@@ -1,6 +1,7 @@
 //! Exact frequencies: fractions of a tenth of a hertz, the unit of the frequency parameters (5.1).
 
 use std::cmp::Ordering;
+use std::hash::{Hash, Hasher};
 
 /// The largest denominator that a frequency keeps when it becomes the start of a ramp.
 ///
@@ -140,6 +141,13 @@ impl PartialEq for Frequency {
 }
 
 impl Eq for Frequency {}
+
+impl Hash for Frequency {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let own = self.settled();
+        (own.numerator, own.denominator).hash(state);
+    }
+}
 
 impl PartialOrd for Frequency {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {

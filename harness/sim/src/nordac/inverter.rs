@@ -21,6 +21,7 @@ use harness_proto::nordac::properties::{
 use harness_proto::nordac::words::{State, set_of, stw};
 use harness_proto::nordac::{Parameter, PpoType};
 use harness_proto::time::{Instant, Span};
+use std::hash::{Hash as _, Hasher};
 
 /// The control word before the first valid one: OFF1 alone (section 5 of the reading).
 const INITIAL: u16 = stw::NO_OFF2 | stw::NO_OFF3;
@@ -192,6 +193,24 @@ impl Inverter {
     #[must_use]
     pub fn next_action(&self) -> Option<Instant> {
         self.due.map(|(at, _)| at)
+    }
+
+    /// Until when the frequency certainly moves no more; `None` where it does not move.
+    #[must_use]
+    pub fn moves_until(&self) -> Option<Instant> {
+        self.ramp.moves_until(self.now)
+    }
+
+    /// Feeds all that decides what it does from `at` on, but its properties, to a checksum.
+    pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
+        let ago = |own: Option<Instant>| own.map(|own| at.since(own));
+        (&self.parameters, self.settings, self.faults, self.state).hash(sum);
+        (self.words, self.controlled, self.cause).hash(sum);
+        // Where 1625 is 0, the last exchange counts only for who sets it later, to less than has passed since.
+        let heard = self.heard.filter(|_| self.value(1625) != 0);
+        (ago(heard), self.heard.is_some(), ago(self.lost)).hash(sum);
+        self.apart.map(|own| own.since(at)).hash(sum);
+        self.ramp.hash_state(at, sum);
     }
 
     /// Takes over the process words of an exchange.

@@ -2,6 +2,7 @@
 
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{PARAMETERS, Parameter, Pkw};
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::sync::LazyLock;
 
@@ -61,7 +62,17 @@ impl Extent {
 
 /// All values. A copy shares them until one of the two is changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parameters(Arc<[i32]>);
+pub struct Parameters {
+    values: Arc<[i32]>,
+    /// A checksum of what differs from the factory settings.
+    sum: u64,
+}
+
+impl Hash for Parameters {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.sum.hash(state);
+    }
+}
 
 impl Default for Parameters {
     /// The factory settings.
@@ -71,7 +82,10 @@ impl Default for Parameters {
             let count = usize::from(parameter.sets()) * usize::from(parameter.count);
             values.extend(std::iter::repeat_n(parameter.default, count));
         }
-        Self(values.into())
+        Self {
+            values: values.into(),
+            sum: 0,
+        }
     }
 }
 
@@ -80,7 +94,7 @@ impl Parameters {
     #[must_use]
     pub fn get(&self, parameter: &Parameter, index: Index) -> i32 {
         let place = Places::of(parameter.number).at(index);
-        place.map_or(0, |place| self.0[place])
+        place.map_or(0, |place| self.values[place])
     }
 
     /// The first element in a set (0 to 3) of the parameter with this number; the set does not count where the parameter does not depend
@@ -90,15 +104,24 @@ impl Parameters {
         let place = Places::of(number);
         let set = set.min(place.sets.saturating_sub(1));
         let place = place.at(Index { element: 0, set });
-        place.map_or(0, |place| self.0[place])
+        place.map_or(0, |place| self.values[place])
     }
 
     /// Stores a value; nothing happens for an index that the parameter does not have.
     pub fn store(&mut self, parameter: &Parameter, index: Index, value: i32) {
         if let Some(place) = Places::of(parameter.number).at(index) {
-            Arc::make_mut(&mut self.0)[place] = value;
+            let cell = &mut Arc::make_mut(&mut self.values)[place];
+            self.sum ^= mixed(place, *cell) ^ mixed(place, value);
+            *cell = value;
         }
     }
+}
+
+/// A number that stands for a value at its place.
+fn mixed(place: usize, value: i32) -> u64 {
+    let both = (place as u64) << 32 | u64::from(value.cast_unsigned());
+    let mixed = (both ^ both >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (mixed ^ mixed >> 32).wrapping_mul(0x94D0_49BB_1331_11EB)
 }
 
 #[cfg(test)]
@@ -127,7 +150,7 @@ mod tests {
                 parameter.number
             );
         }
-        assert_eq!(all.len(), parameters.0.len());
+        assert_eq!(all.len(), parameters.values.len());
     }
 
     #[test]

@@ -6,12 +6,13 @@
 
 use super::frequency::Frequency;
 use harness_proto::time::{Instant, Span};
+use std::hash::{Hash as _, Hasher};
 
 /// The unit of a ramp time, 0.05 s, in units of [`Span`].
 const TIME: i128 = 150_000_000;
 
 /// Where the frequency goes, and how fast.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Course {
     /// The frequency at its end.
     pub target: Frequency,
@@ -31,6 +32,13 @@ impl Course {
         // At most 2^61: frequencies have 17 bits, times 15.
         let units = time / i128::from(self.maximum.max(1));
         u64::try_from(units + 1).unwrap_or(u64::MAX)
+    }
+
+    /// How far the frequency moves in a span at most.
+    #[must_use]
+    pub fn step(self, span: Span) -> Frequency {
+        let moved = i128::from(span.units()) * i128::from(self.maximum);
+        Frequency::new(moved, TIME * i128::from(self.up.min(self.down)))
     }
 
     /// Standstill at once.
@@ -98,6 +106,25 @@ impl Ramp {
         }
         let risen = Frequency::new(-left, denominator * rise);
         risen.min(end.abs()).signed(!positive)
+    }
+
+    /// The course that it takes.
+    #[must_use]
+    pub const fn course(&self) -> Course {
+        self.course
+    }
+
+    /// Until when the frequency certainly moves no more; `None` where it does not move.
+    #[must_use]
+    pub fn moves_until(&self, at: Instant) -> Option<Instant> {
+        (self.at(at) != self.course.target).then_some(self.ends)
+    }
+
+    /// Feeds all that decides its frequency from `at` on to a checksum.
+    pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
+        let moves = self.moves_until(at);
+        let begun = moves.map(|_| (self.from, at.since(self.since)));
+        (self.course, begun).hash(sum);
     }
 
     /// When the frequency is 0 for the first time on the way to 0; `None` if the course does not end there.

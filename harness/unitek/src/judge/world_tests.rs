@@ -63,6 +63,8 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
         lag: late + Span::from_millis(1),
         complete: false,
         most_lost: 0,
+        loses_sent: false,
+        asked: Vec::new(),
         most_steps: 50_000,
         overtakes: late > Span::from_millis(5),
     };
@@ -169,6 +171,8 @@ fn an_event_that_never_comes_is_missed() {
             overtakes: false,
             complete: false,
             most_lost: 0,
+            loses_sent: false,
+            asked: Vec::new(),
             most_steps: 50_000,
         };
         let drive = setup.drives[0].drive(setup.rate, Instant::START);

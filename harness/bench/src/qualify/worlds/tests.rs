@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// What a line has left of a piece.
+const DAMAGED: u8 = 250;
+
 /// A drive that holds a number, which counts up each scan while it runs, and says it where it is asked.
 #[derive(Clone, Debug, Default)]
 struct Counter {
@@ -17,7 +20,7 @@ struct Counter {
     said: VecDeque<u8>,
 }
 
-/// 0 asks, 1 starts, 2 stops, 3 makes it wander; a higher number is set.
+/// 0 asks, 1 starts, 2 stops, 3 makes it wander; a higher number is set. 200 asks where a stream parts it.
 impl RightDrive for Counter {
     type Piece = u8;
     const SCAN: Span = Span::from_millis(1);
@@ -46,8 +49,19 @@ impl RightDrive for Counter {
                 self.stops = self.stops.wrapping_mul(1_000_003) + u64::from(self.number);
             }
             3 => self.wanders = true,
+            200 => {}
             other => self.number = *other,
         }
+    }
+
+    fn hear_parted(&self, at: Instant, piece: &u8) -> Option<Self> {
+        let mut own = (*piece == 200).then(|| self.clone())?;
+        own.hear(at, &0);
+        Some(own)
+    }
+
+    fn is_damaged(came: &u8) -> bool {
+        *came == DAMAGED
     }
 
     fn knows(&self) -> bool {
@@ -84,6 +98,14 @@ fn judged_with(
     came: &[(u64, u8)],
     most_lost: usize,
 ) -> Judged<u8> {
+    let drive = Counter {
+        alarm,
+        ..Counter::default()
+    };
+    judge(vec![drive], &dialogue(sent, came, most_lost))
+}
+
+fn dialogue(sent: &[(u64, u8)], came: &[(u64, u8)], most_lost: usize) -> Dialogue<u8> {
     let timed = |list: &[(u64, u8)], before, behind| -> Vec<_> {
         let own = |(at, piece): &(u64, u8)| Timed {
             earliest: ms(at - before),
@@ -92,21 +114,18 @@ fn judged_with(
         };
         list.iter().map(own).collect()
     };
-    let drive = Counter {
-        alarm,
-        ..Counter::default()
-    };
-    let talk = Dialogue {
+    Dialogue {
         sent: timed(sent, 0, 3),
         came: timed(came, 1, 0),
         end: ms(300),
         lag: Span::from_millis(1),
         overtakes: false,
+        asked: Vec::new(),
         complete: false,
         most_lost,
+        loses_sent: false,
         most_steps: 50_000,
-    };
-    judge(vec![drive], &talk)
+    }
 }
 
 /// What it holds does not depend on when it was set.
@@ -169,6 +188,48 @@ fn lost_pieces_explain_what_has_not_come() {
     assert_eq!(came(&one[1..], 2), Judged::Right);
     assert_ne!(came(&[(22, 7), (62, 8)], 2), Judged::Right);
     assert_ne!(came(&[(22, 7), (24, 7)], 2), Judged::Right);
+}
+
+/// A line that loses what was sent, damages what was said, or parts what was sent.
+#[test]
+fn a_line_loses_damages_and_parts_pieces() {
+    let places = |sent: &[(u64, u8)], came: &[(u64, u8)]| {
+        let mut talk = dialogue(sent, came, 2);
+        (talk.loses_sent, talk.complete) = (true, true);
+        lost(Counter::default(), &talk, &|| ()).ok()
+    };
+    let sent = [(10, 7), (30, 8), (50, 0), (70, 0)];
+    assert_eq!(places(&sent, &[(52, 8), (72, 8)]), Some(vec![]));
+    assert_eq!(places(&sent, &[(52, 7), (72, 7)]), Some(vec![1]));
+    assert_eq!(places(&sent, &[(52, 8), (72, 7)]), None);
+    assert_eq!(places(&sent, &[(52, DAMAGED), (72, 8)]), Some(vec![2]));
+    assert_eq!(places(&sent, &[(52, DAMAGED), (72, 7)]), Some(vec![1, 2]));
+    let parted = [(10, 7), (30, 200), (50, 0)];
+    assert_eq!(places(&parted, &[(32, 7), (52, 7)]), Some(vec![]));
+    assert_eq!(places(&parted, &[(52, 7)]), Some(vec![]));
+    assert_eq!(places(&parted, &[(32, 9), (52, 7)]), None);
+}
+
+/// What was read before a piece was sent is no answer to it.
+#[test]
+fn an_answer_is_read_behind_its_question() {
+    let judged = |asked: &[usize]| {
+        let mut talk = dialogue(
+            &[(10, 7), (11, 0), (12, 8), (13, 0)],
+            &[(14, 8), (15, 8)],
+            1,
+        );
+        talk.asked = asked.to_vec();
+        talk.most_lost = 0;
+        judge(vec![Counter::default()], &talk)
+    };
+    assert_ne!(judged(&[4, 4]), Judged::Right);
+    let one = |asked| {
+        let talk = dialogue(&[(10, 7), (11, 0), (12, 8)], &[(12, 7)], 0);
+        judge(vec![Counter::default()], &Dialogue { asked, ..talk })
+    };
+    assert_eq!(one(vec![2]), Judged::Right);
+    assert_ne!(one(vec![1]), Judged::Right);
 }
 
 /// What came before nothing more is known is compared, although what was sent behind it may have been on its way.

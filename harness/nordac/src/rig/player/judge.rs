@@ -2,7 +2,7 @@
 
 use super::note::kind;
 use super::rehearse::Other;
-use super::worlds::{Differs, MOST_LOST, right_slaves_send};
+use super::worlds::{Differs, MOST_LOST, TOO_MANY, right_slaves_send};
 use super::{Left, Own, Player};
 use crate::rig::known::value_of;
 use crate::rig::observed::{Came, Turn};
@@ -64,7 +64,7 @@ impl Player {
     fn differs(&mut self, own: &Own, left: &Left) -> Option<Differs> {
         let turns = &left.turns;
         let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
-        let differs = sent.err().filter(|own| !own.torn)?;
+        let differs = sent.err().filter(|own| own.open.is_none())?;
         self.lost(own, turns).is_none().then_some(differs)
     }
 
@@ -101,13 +101,9 @@ impl Player {
         };
         let sent = right_slaves_send(self.known(), (self.rate, 0), turns, &self.beats);
         match sent {
-            Err(differs) if differs.torn => {
-                let verdict = Verdict::Inconclusive;
-                return not_shown(
-                    verdict,
-                    "a stream has parted a telegram, and the next one met the reply",
-                );
-            }
+            Err(Differs {
+                open: Some(why), ..
+            }) => return not_shown(Verdict::Inconclusive, why),
             Err(differs) => match self.lost(own, turns) {
                 None => return accused(outcome, &differs, turns),
                 Some(why) => {
@@ -155,8 +151,11 @@ impl Player {
     /// What the line has lost if right slaves have sent all else, in a sentence. A slave is silent at the same place each time: what was lost
     /// there in the two attempts before is not lost by the line.
     fn lost(&mut self, own: &Own, turns: &[Turn]) -> Option<String> {
-        let lost =
-            right_slaves_send(self.known(), (self.rate, MOST_LOST), turns, &self.beats).ok()?;
+        let sent = right_slaves_send(self.known(), (self.rate, MOST_LOST), turns, &self.beats);
+        let lost = match sent {
+            Ok(lost) => lost,
+            Err(own) => return own.open.filter(|why| *why == TOO_MANY).map(str::to_owned),
+        };
         let first = turns.get(*lost.first()?)?;
         let place = |number: usize| {
             let step = turns.get(number).map(|own| own.step);

@@ -20,6 +20,7 @@ use harness_proto::time::Instant;
 use parts::{Parts, Reply};
 use reads::{Collector, Raw};
 use std::fmt;
+use std::hash::{Hash as _, Hasher};
 
 /// A way in which a drive breaks the bus standard or the manual.
 pub struct Deviation {
@@ -120,6 +121,15 @@ impl Deviant {
         }
     }
 
+    /// See [`Drive::hash_state`].
+    pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
+        self.drive.hash_state(at, sum);
+        if self.deviation.is_some() {
+            let own = &self.memory;
+            (&own.reply, own.inputs, own.outputs, own.answered % 5).hash(sum);
+        }
+    }
+
     /// The right drive inside.
     #[must_use]
     pub const fn drive(&self) -> &Drive {
@@ -129,6 +139,24 @@ impl Deviant {
     /// The right drive inside.
     pub const fn drive_mut(&mut self) -> &mut Drive {
         &mut self.drive
+    }
+
+    /// Takes an octet that has ended at a time of the line's own clock, when the drive's clock stands at `at`.
+    pub fn hear_at(&mut self, at: Instant, ended: Instant, octet: Received) {
+        let raw = self.collector.hear(ended, octet);
+        let how = self.deviation.map(|deviation| deviation.how);
+        let telegram = match (self.drive.receive(ended, octet), how, raw) {
+            (None, Some(How::Reads(reads)), Some(raw)) if self.drive.is_powered() => {
+                reads(&raw).and_then(|octets| Telegram::decode(&octets).value())
+            }
+            (telegram, ..) => telegram,
+        };
+        if self.drive.torn() {
+            self.replies.clear();
+        }
+        if let Some(telegram) = telegram {
+            self.answer(at, &telegram);
+        }
     }
 
     fn answer(&mut self, at: Instant, telegram: &Telegram) {
@@ -201,20 +229,7 @@ fn own_delay(ready: Option<Instant>, at: Instant, bit: u64) -> Option<u64> {
 
 impl LineStation for Deviant {
     fn hear(&mut self, at: Instant, octet: Received) {
-        let raw = self.collector.hear(at, octet);
-        let how = self.deviation.map(|deviation| deviation.how);
-        let telegram = match (self.drive.receive(at, octet), how, raw) {
-            (None, Some(How::Reads(reads)), Some(raw)) if self.drive.is_powered() => {
-                reads(&raw).and_then(|octets| Telegram::decode(&octets).value())
-            }
-            (telegram, ..) => telegram,
-        };
-        if self.drive.torn() {
-            self.replies.clear();
-        }
-        if let Some(telegram) = telegram {
-            self.answer(at, &telegram);
-        }
+        self.hear_at(at, at, octet);
     }
 
     fn wants(&self) -> Option<Wish> {

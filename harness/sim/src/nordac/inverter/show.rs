@@ -1,6 +1,7 @@
 //! What the inverter shows: status word, actual values and the parameters of 5.7 and 4.1.3. Values are cut off, not rounded.
 
 use super::super::frequency::Frequency;
+use super::super::ramp::Course;
 use super::{Inputs, Inverter};
 use harness_proto::nordac::Parameter;
 use harness_proto::nordac::parameter::Flag;
@@ -10,7 +11,7 @@ use harness_proto::nordac::properties::{
     Zsw11AtRest,
 };
 use harness_proto::nordac::words::{FULL, State, stw, zsw};
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 
 /// Temperature of the heat sink in C.
 pub(super) const HEAT_SINK: u16 = 25;
@@ -28,8 +29,37 @@ impl Inverter {
             zsw: self.status(frequency),
             hiw: self.main_actual_value(frequency),
             pzd3: 0,
-            pzd4: self.second_actual_value(at, frequency),
+            pzd4: self.second_actual_value(frequency),
         }
+    }
+
+    /// How far main and second actual value, and parameters of a frequency in 0.1 Hz or of a voltage, move in a span at most.
+    #[must_use]
+    pub fn moves_within(&self, span: Span) -> [u16; 3] {
+        let step = match self.ramp.course() {
+            // What is shown is of the time before.
+            Course { maximum: 0, .. } => Course {
+                target: Frequency::ZERO,
+                up: self.size(1202).max(1),
+                down: self.size(1203).min(self.size(1615)).max(1),
+                maximum: self.size(1205),
+            },
+            course => course,
+        }
+        .step(span);
+        let second = matches!(self.value(1517), 1 | 2 | 4 | 9 | 10);
+        let shown = step.cut(1, 1).max(self.voltage(step));
+        [
+            self.main_actual_value(step),
+            u16::from(second) * self.second_actual_value(step),
+            u16::try_from(shown).unwrap_or(u16::MAX),
+        ]
+    }
+
+    /// HIW at the frequency that the process words demand.
+    #[must_use]
+    pub fn wanted_actual_value(&self) -> u16 {
+        self.main_actual_value(self.wanted())
     }
 
     /// The status word (3.2.2).
@@ -107,12 +137,12 @@ impl Inverter {
     }
 
     /// PZD4, selected by 1517 (3.2.6).
-    fn second_actual_value(&self, at: Instant, frequency: Frequency) -> u16 {
+    fn second_actual_value(&self, frequency: Frequency) -> u16 {
         let value = match self.value(1517) {
             1 => frequency.abs().cut(1, 1),
             2 => frequency.cut(1, 1),
             3 => self.output_current().into(),
-            4 => self.output_voltage(at),
+            4 => self.voltage(frequency),
             6 if self.state.output_on() => self.value(1306).into(),
             9 => self.speed(frequency.abs()),
             10 => self.speed(frequency),
@@ -132,11 +162,15 @@ impl Inverter {
 
     /// The output voltage in V: linear up to the nominal one.
     pub(super) fn output_voltage(&self, at: Instant) -> i128 {
+        self.voltage(self.ramp.at(at))
+    }
+
+    fn voltage(&self, frequency: Frequency) -> i128 {
         let (nominal, corner) = (self.value(1304), self.value(1301));
         if corner == 0 {
             return 0;
         }
-        let voltage = self.ramp.at(at).abs().cut(nominal.into(), corner.into());
+        let voltage = frequency.abs().cut(nominal.into(), corner.into());
         voltage.min(nominal.into())
     }
 

@@ -6,14 +6,14 @@ use harness_proto::nordac::{Answer, Pkw, PpoType, Properties};
 use harness_proto::time::Instant;
 
 /// A task that was executed, and what the inverter answered then.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Hash)]
 struct Executed {
     task: Pkw,
     answer: Answer,
 }
 
 /// The parameter channel of a slave.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Hash)]
 pub(super) struct Channel {
     /// What the last exchange has brought.
     last: Pkw,

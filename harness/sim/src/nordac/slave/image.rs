@@ -10,7 +10,7 @@ use harness_proto::profibus::dp::{DpState, GlobalControl};
 use harness_proto::time::Instant;
 
 /// Inputs and outputs, and what Sync and Freeze keep of them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Hash)]
 pub(super) struct ProcessData {
     channel: Channel,
     /// The outputs that are effective.

@@ -23,6 +23,7 @@ use harness_proto::profibus::rate::MIN_TSDR_BITS;
 use harness_proto::profibus::{Buffer, Telegram};
 use harness_proto::time::{Instant, Span};
 use image::ProcessData;
+use std::hash::{Hash as _, Hasher};
 
 /// What a slave does with a request.
 enum Outcome {
@@ -153,6 +154,18 @@ impl Slave {
                 inverter.watchdog_expired(to);
             }
         }
+    }
+
+    /// Feeds all that decides what it does from `at` on, but its properties, to a checksum.
+    pub fn hash_state(&self, at: Instant, sum: &mut impl Hasher) {
+        let agreed = &self.agreed;
+        let watchdog = agreed.watchdog.as_ref();
+        let watchdog = watchdog.map(|own| (own.time, own.expires.since(at)));
+        (self.settings, self.ppo, self.state, self.min_tsdr).hash(sum);
+        (agreed.master, agreed.group, agreed.sync, agreed.freeze).hash(sum);
+        (watchdog, self.fcb, self.last_reply.as_deref()).hash(sum);
+        (self.prm_fault, self.cfg_fault, self.diagnosis_waits).hash(sum);
+        (&self.data, self.apart, self.in_step).hash(sum);
     }
 
     /// Module and inverter lose each other, or find each other again (NORDAC 2.6).

@@ -411,6 +411,8 @@ fn conversation(
         overtakes: false,
         complete: false,
         most_lost: 0,
+        loses_sent: false,
+        asked: Vec::new(),
         most_steps: STEPS,
     }
 }

@@ -5,6 +5,7 @@ use super::super::{Own, Player};
 use super::*;
 use crate::rig::RigSlave;
 use harness_bench::scenario::source::Source;
+use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::Limits;
 use harness_sim::nordac::deviation::deviation;
 use std::sync::Arc;
@@ -15,6 +16,16 @@ const RUN: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HS
     exchange 8\nexchange 8 STW=047F\nwait 300ms\nexchange 8\nexchange 8 STW=047E\nwait 200ms\nexchange 8\nwait 3s\nexchange 8\nexchange 8 STW=047F\n\
     exchange 8 STW=047E\nexchange 8 STW=047F\nwait 500ms\nexchange 8 STW=047B\nwait 50ms\nexchange 8\nwait 1s\nexchange 8\n\
     read 8 1801\nread 8 1802\nread 8 1202\nexchange 8\n";
+
+/// Motors that run up and stop by OFF3 within some milliseconds, again and again.
+const QUICK: &str = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8\n\
+    exchange 8 STW=047F\nwait 2ms\nexchange 8\nexchange 8 STW=047B\nexchange 8\nexchange 8\nwait 3ms\nexchange 8 STW=047E\n\
+    exchange 8 STW=047F\nexchange 8\nexchange 8 STW=047B\nexchange 8\nexchange 8\nexchange 8 STW=047E\n\
+    exchange 8 STW=047F\nexchange 8\nexchange 8 STW=047B\nexchange 8\nexchange 8\nexchange 8 STW=047E\n\
+    exchange 8 STW=047F\nwait 4ms\nexchange 8 STW=047B\nexchange 8\nexchange 8\nexchange 8\nexchange 8\n";
+
+/// Ramps of 0.05 s (5.1).
+const FAST: [(u16, u32); 3] = [(1202, 1), (1203, 1), (1615, 1)];
 
 fn known(parameters: &[(u16, u32)]) -> Known {
     let mut known = Known::new(RigSlave {
@@ -29,9 +40,13 @@ fn known(parameters: &[(u16, u32)]) -> Known {
 
 /// The telegrams of a run with a slave.
 fn turns(slave: &Known) -> Vec<Turn> {
+    turns_of(slave, RUN)
+}
+
+fn turns_of(slave: &Known, text: &'static str) -> Vec<Turn> {
     let source = Source {
         name: "x".to_owned(),
-        text: RUN.into(),
+        text: text.into(),
     };
     let own = Own::read(&source).expect("a scenario");
     let limits = Limits::unlimited();
@@ -51,10 +66,35 @@ fn judged(turns: &[Turn]) -> Result<(), Differs> {
     sent_by(&[known(&[])], 0, turns).map(|_| ())
 }
 
+/// What slaves reply to octets that reach them at a time.
+fn replies(line: &mut Line<LONG>, octets: &[u8], at: Instant) -> Vec<u16> {
+    line.advance(at);
+    line.hear(at, &Piece::of(&wide(octets)));
+    let said = std::iter::from_fn(|| line.say());
+    said.flat_map(|own| own.octets).collect()
+}
+
+/// The main actual value in the reply to an exchange by PPO1.
+fn actual(octets: &[u16]) -> Option<u16> {
+    let place = octets.len().checked_sub(4)?;
+    (octets.len() == 21).then(|| octets[place] << 8 | octets[place + 1])
+}
+
 /// A right slave is not accused, however late the computer hands over a telegram, or reads what comes to it.
 #[test]
 fn a_computer_that_stands_still_accuses_no_slave() {
-    let right = turns(&known(&[]));
+    stands_still(&known(&[]), RUN);
+}
+
+/// What has begun and ended within a scan.
+#[test]
+fn a_quick_stop_between_two_telegrams_accuses_no_slave() {
+    stands_still(&known(&FAST), QUICK);
+}
+
+fn stands_still(slave: &Known, text: &'static str) {
+    let right = turns_of(slave, text);
+    let judged = |turns: &[Turn]| sent_by(std::slice::from_ref(slave), 0, turns).map(|_| ());
     assert_eq!(judged(&right), Ok(()));
     for place in 0..right.len() {
         for millis in [1, 30, 300, 2_000] {
@@ -204,15 +244,14 @@ fn a_line_that_loses_a_request_accuses_no_slave() {
     let right = turns(&all[0]);
     let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
     for place in (0..right.len()).filter(played) {
-        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
+        let mut line = Line::new(&[all[0].model(Default::default())]);
         let mut lost = right.clone();
         for (number, turn) in lost.iter_mut().enumerate() {
             let mut came = Vec::new();
             if number != place {
-                let soon = world.soon(turn);
-                (world, came) = world.hears(&turn.octets, soon);
+                came = replies(&mut line, &turn.octets, turn.left);
             }
-            turn.came = wide(&came);
+            turn.came = came;
         }
         lost[place].read = None;
         let found = sent_by(&all, MOST_LOST, &lost);
@@ -228,7 +267,7 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
     let right = turns(&all[0]);
     let played = |own: &usize| right[*own].step.is_some() && !right[*own].came.is_empty();
     for place in (0..right.len() - 1).filter(played) {
-        let mut world = World::new(&[all[0].model(Default::default())], BusRate::K500);
+        let mut line = Line::new(&[all[0].model(Default::default())]);
         let mut late = right.clone();
         let held = std::mem::take(&mut late[place].came);
         assert!(!held.is_empty());
@@ -241,18 +280,15 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
             if number > place + 1 {
                 turn.left += pause;
             }
-            let mut at = world.soon(turn);
+            let mut at = turn.left;
             if number == place + 1 {
                 at += pause;
-                (world, came) = world.hears(&right[place].octets, at);
-                at = world.free + MOMENT;
+                came = replies(&mut line, &right[place].octets, at);
             }
             if number != place {
-                let (next, more) = world.hears(&turn.octets, at);
-                world = next;
-                came.extend(more);
+                came.extend(replies(&mut line, &turn.octets, at));
             }
-            turn.came = wide(&came);
+            turn.came = came;
         }
         assert_eq!(judged(&late), Ok(()), "{place}");
     }
@@ -261,7 +297,66 @@ fn telegrams_that_are_held_up_accuse_no_slave() {
 /// An octet behind a reply was not lost, and no reply is there that the line has changed.
 #[test]
 fn a_line_adds_nothing() {
-    let reply = vec![vec![0xE5]];
-    assert_eq!(damages(&reply, &[0xE5, 0x10]), Vec::new());
-    assert_eq!(damages(&reply, &[0x10]), vec![(1, Vec::new())]);
+    let kinds = |octets: &[u16]| -> Vec<_> {
+        let own = pieces(octets, &[]).into_iter();
+        own.map(|own| Piece::of(&octets[own]).damaged).collect()
+    };
+    assert_eq!(kinds(&[0xE5, 0x10]), [false, true]);
+    assert_eq!(kinds(&[0x10]), [true]);
+}
+
+/// Worlds are merged by this checksum.
+#[test]
+fn slaves_of_the_same_state_do_the_same() {
+    let text = "title x\nbus nordac\nslave 8\nstart 8\nexchange 8 STW=047E HSW=25%\nexchange 8 STW=047F HSW=25%\n\
+        exchange 8 STW=047F HSW=12.5%\nexchange 8 STW=047B HSW=25%\nexchange 8 STW=007F\nread 8 1202\nwrite 8 1202 = 5 s\n";
+    let all = turns_of(&known(&[]), text);
+    // What makes the slave exchange is not played again.
+    let start = all.iter().find_map(|own| own.step);
+    let rest = all
+        .iter()
+        .take_while(|own| own.step.is_none() || own.step == start);
+    let rest = rest.count();
+    let played = &all[rest..];
+    let mut begun = Line::<LONG>::new(&[known(&[]).model(Default::default())]);
+    let mut at = Instant::START;
+    for turn in &all[..rest] {
+        replies(&mut begun, &turn.octets, at);
+    }
+    let play = |line: &mut Line<LONG>, at: Instant, number: usize| match played.get(number) {
+        Some(turn) => replies(line, &turn.octets, at),
+        None => Vec::new(),
+    };
+    at += Span::from_millis(50);
+    // One number more is a pause.
+    let inputs = 0..=played.len();
+    let mut states: HashMap<u64, Line<LONG>> = HashMap::new();
+    let mut alike = 0;
+    let count = inputs.clone().count().pow(3);
+    for history in 0..count {
+        let mut line = begun.clone();
+        let mut now = at;
+        let mut left = history;
+        for _ in 0..3 {
+            play(&mut line, now, left % inputs.clone().count());
+            left /= inputs.clone().count();
+            now += Span::from_millis(30);
+        }
+        line.advance(now);
+        let mut other = states
+            .entry(line.state())
+            .or_insert_with(|| line.clone())
+            .clone();
+        for (place, number) in (0..).zip(inputs.clone().chain(inputs.clone().rev())) {
+            let then = now + Span::from_millis(20 * place);
+            let both = [&mut line, &mut other].map(|own| play(own, then, number));
+            assert_eq!(both[0], both[1], "{history} {number}");
+        }
+        alike += 1;
+    }
+    assert!(
+        states.len() > 50 && alike - states.len() > 50,
+        "{alike} {}",
+        states.len()
+    );
 }
