@@ -255,6 +255,10 @@ impl Link for StreamLink {
         self.pump.tolerance
     }
 
+    fn unwatched_since(&self) -> Option<Instant> {
+        Some(self.pump.since)
+    }
+
     fn unused_faults(&self) -> Vec<String> {
         let mut unused = Vec::new();
         for (index, ring) in self.pump.ports.iter().enumerate() {

@@ -156,6 +156,7 @@ impl RecordLine {
                 busy: look.busy,
                 lead: look.lead.map(|lead| (lead.far.units(), lead.near.units())),
                 pause: look.pause.as_ref().map(units),
+                since: look.since.as_ref().map(units),
             },
             LinkEvent::Trouble(trouble) => Self::Trouble {
                 cause: match trouble {
@@ -266,6 +267,7 @@ impl RecordLine {
                 busy,
                 lead,
                 pause,
+                since,
             } => LinkEvent::Look(Look {
                 at: instant(t),
                 busy: *busy,
@@ -274,6 +276,7 @@ impl RecordLine {
                     near: Span::from_units(near),
                 }),
                 pause: pause.as_ref().map(instant),
+                since: since.as_ref().map(instant),
             }),
             Self::Trouble { cause, text } => LinkEvent::Trouble(match cause.as_str() {
                 "denied" => Trouble::Denied(text.clone()),

@@ -112,6 +112,9 @@ pub enum RecordLine {
         /// When the line wants a pause for its interlocks; none where it wants none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pause: Option<u64>,
+        /// Since when the bench had not looked, where that was more than 4 ms: what follows came between then and this look.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        since: Option<u64>,
     },
     /// A byte was received.
     Received {

@@ -522,6 +522,10 @@ impl<L: Link> Link for Guarded<L> {
         self.inner.time_tolerance()
     }
 
+    fn unwatched_since(&self) -> Option<Instant> {
+        self.inner.unwatched_since()
+    }
+
     fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         self.faulty |= !matches!(fault, PlacedFault::Stimulus(..));
         let settled = moment == Moment::Now && !self.inner.busy();

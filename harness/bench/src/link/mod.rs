@@ -419,6 +419,12 @@ pub trait Link: Line {
         Span::ZERO
     }
 
+    /// Since when the bench had not looked at its ports, nor waited for them, when it read what came last: that may have come at any time since.
+    /// `None` where time is virtual, or where the driver stamps what comes.
+    fn unwatched_since(&self) -> Option<Instant> {
+        None
+    }
+
     /// Sends octets beside the conversation and returns those received until the answers are back. Where a link can, it leaves no trace of
     /// this.
     fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {

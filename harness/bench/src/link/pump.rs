@@ -36,6 +36,9 @@ const ECHO: Span = Span::from_millis(500);
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
+/// How long octets that an adapter or a computer has held up may keep coming behind the last one that was sent.
+const MOST_HELD_UP: Span = Span::from_millis(2_000);
+
 /// The longest sleep: the link checks for a request to end at least this often.
 const NAP: Span = Span::from_millis(50);
 
@@ -78,6 +81,10 @@ pub struct Pump<A> {
     pub late: Lateness,
     /// When the ports were last looked at.
     looked: Instant,
+    /// Until when nothing had come that was not read by then.
+    watched: Instant,
+    /// What was read last had come since then.
+    pub since: Instant,
     /// Set while the caller busy-polls: it is expected to call [`Self::wait`] again before this time.
     pub awake: Option<Instant>,
     /// Edge-triggered: input already reported and still unread is not reported again.
@@ -110,6 +117,8 @@ impl<A: Accounting> Pump<A> {
             told: Cell::new(Instant::START),
             late: Lateness::new(time::Instant::now()),
             looked: Instant::START,
+            watched: Instant::START,
+            since: Instant::START,
             awake: None,
             lying: false,
             scheduled: VecDeque::new(),
@@ -248,6 +257,7 @@ impl<A: Accounting> Pump<A> {
         self.told.set(Instant::START);
         self.lying = false;
         self.looked = Instant::START;
+        self.watched = Instant::START;
         self.awake = None;
         self.scheduled.clear();
         self.ports.iter_mut().for_each(|port| port.begin(now));
@@ -295,8 +305,14 @@ impl<A: Accounting> Pump<A> {
         let (taken, given) = inner.fold((0, 0), |(taken, given), inner| {
             (taken + inner.taken, given + inner.given)
         });
+        // What is still coming has only been held up.
+        let coming = port.last_arrival.min(port.free + MOST_HELD_UP);
+        let last = match port.accounting.is_owed() {
+            true => port.free.max(coming),
+            false => port.free,
+        };
         // A byte counts as lost only after a poll later than its time.
-        !port.accounting.is_even(taken, given) && self.looked < port.free + self.round(port)
+        !port.accounting.is_even(taken, given) && self.looked < last + self.round(port)
     }
 
     /// As [`PortLink::beats`](super::PortLink::beats).
@@ -376,6 +392,7 @@ impl<A: Accounting> Pump<A> {
     /// Reads what has arrived.
     fn take(&mut self, now: Instant) {
         self.looked = now;
+        self.since = std::mem::replace(&mut self.watched, now);
         let told = self.told.get();
         for port in &mut self.ports {
             if self.trouble.is_none() {
@@ -448,8 +465,10 @@ impl<A: Accounting> Pump<A> {
         } else {
             let wake = awaited.map_or(until, |at| until.min(at - AWAKE));
             let wake = wake.min(now + NAP);
-            self.listen(wake.since(now));
-            self.late.woken(self.clock(wake), time::Instant::now());
+            let came = self.listen(wake.since(now));
+            let woken = time::Instant::now();
+            self.late.woken(self.clock(wake), woken);
+            self.watched = if came { self.at(woken) } else { wake };
         }
         self.look();
     }
@@ -472,8 +491,8 @@ impl<A: Accounting> Pump<A> {
         due.filter(|at| now < *at + STAY).min()
     }
 
-    /// Waits for the ports, for at most `span`.
-    fn listen(&mut self, span: Span) {
+    /// Waits for the ports, for at most `span`; returns whether something came.
+    fn listen(&mut self, span: Span) -> bool {
         let timeout = Timespec {
             tv_sec: 0,
             tv_nsec: i64::try_from(span.as_nanos()).unwrap_or(0).min(999_999_999),
@@ -481,10 +500,13 @@ impl<A: Accounting> Pump<A> {
         let mut fds: Vec<_> = self.ports.iter().map(|port| port.wire.poll_fd()).collect();
         fds.extend(self.inner.iter().flat_map(InnerLink::poll_fds));
         match poll(&mut fds, Some(&timeout)) {
-            Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
+            Ok(ready) => ready > 0,
+            // It is not known when the signal came.
+            Err(Errno::INTR | Errno::AGAIN) => true,
             Err(error) => {
                 let text = format!("failed to wait for the ports: {error}");
                 self.trouble.get_or_insert(Trouble::Lost(text));
+                true
             }
         }
     }
@@ -495,6 +517,7 @@ mod tests {
     use super::*;
     use crate::port::{PortAddress, PortSettings, open};
     use harness_proto::line::Rate;
+    use std::io::Write as _;
     use std::net::TcpListener;
 
     /// A bus on which nothing answers.
@@ -523,9 +546,7 @@ mod tests {
         }
     }
 
-    /// A pump waits for nothing that its bus does not owe: it is at rest when the last byte has left.
-    #[test]
-    fn a_bus_says_what_it_owes() {
+    fn pump() -> (TcpListener, Pump<Silent>) {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("an address").to_string();
         let settings = PortSettings {
@@ -536,7 +557,45 @@ mod tests {
         };
         let wire = open(&settings).expect("a wire");
         let octet_time = Rate::default().byte_time();
-        let mut pump = Pump::new([(wire, Silent)], Vec::new(), octet_time, Arc::default());
+        let pump = Pump::new([(wire, Silent)], Vec::new(), octet_time, Arc::default());
+        (listener, pump)
+    }
+
+    /// What has come while the bench did something else came at any time since; what it waited for came when it woke up.
+    #[test]
+    fn what_comes_while_nothing_looks_came_at_any_time() {
+        let (listener, mut pump) = pump();
+        let (mut peer, _) = listener.accept().expect("a peer");
+        let began = pump.look();
+        peer.write_all(&[0x80]).expect("it takes an octet");
+        while pump.receive(0).is_none() {
+            let before = pump.looked;
+            let end = pump.now() + Span::from_millis(1);
+            while pump.now() < end {}
+            pump.look();
+            assert_eq!(pump.since, before);
+        }
+        let waits = pump.now();
+        assert!(began < waits);
+        let answers = std::thread::spawn(move || peer.write_all(&[0x81]));
+        while pump.receive(0).is_none() {
+            assert!(
+                pump.wait(waits + Span::from_millis(60_000)),
+                "{:?}",
+                pump.trouble
+            );
+        }
+        assert!(pump.since >= waits);
+        answers
+            .join()
+            .expect("no panic")
+            .expect("it takes an octet");
+    }
+
+    /// A pump waits for nothing that its bus does not owe: it is at rest when the last byte has left.
+    #[test]
+    fn a_bus_says_what_it_owes() {
+        let (_peer, mut pump) = pump();
         let free = pump.send(0, &[0x10, 0x20]);
         assert_eq!(pump.awaited(Instant::START), None);
         while pump.now() < free {

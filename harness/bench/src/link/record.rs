@@ -28,7 +28,12 @@ pub struct Look {
     pub lead: Option<Lead>,
     /// When the line wants a pause; `None` where it wants none.
     pub pause: Option<Instant>,
+    /// Since when the bench had not looked, where that was long: what follows came between then and this look.
+    pub since: Option<Instant>,
 }
+
+/// How long the bench does not look before that counts.
+const LONG: Span = Span::from_millis(4);
 
 /// Something that happened. Times are those of the conversation, but that of [`LinkEvent::Begin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -180,11 +185,13 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         known.busy = self.link.busy();
         known.pause = self.link.pause_due();
         let lead = self.link.lead();
+        let since = self.link.unwatched_since();
         let look = Look {
             at: known.now,
             busy: known.busy,
             lead: (lead != known.lead).then_some(lead),
             pause: known.pause,
+            since: since.filter(|own| known.now.since(*own) > LONG && !came.is_empty()),
         };
         known.lead = lead;
         self.sink.take(&LinkEvent::Look(look));

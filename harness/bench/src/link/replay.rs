@@ -246,6 +246,7 @@ impl Replay {
             busy,
             lead,
             pause,
+            since: _,
         } = *look;
         self.events.pop_front();
         let before = (self.now, known.busy);

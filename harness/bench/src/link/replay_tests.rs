@@ -126,6 +126,7 @@ fn recorded(looks: bool) -> Vec<LinkEvent> {
             busy: false,
             lead: None,
             pause: pause.map(ms),
+            since: None,
         })
     };
     let fault = PlacedFault::Link(0, LinkFault::Duplicate);
@@ -224,6 +225,7 @@ fn bytes_may_leave_later_than_the_next_look() {
                 busy: true,
                 lead: None,
                 pause: None,
+                since: None,
             })
         };
         let events = vec![

@@ -124,6 +124,10 @@ impl Link for Ends {
         each!(self, link => link.time_tolerance())
     }
 
+    fn unwatched_since(&self) -> Option<Instant> {
+        each!(self, link => link.unwatched_since())
+    }
+
     fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
         each!(self, link => link.probe(ring, octets))
     }

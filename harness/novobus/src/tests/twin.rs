@@ -14,7 +14,7 @@ use harness_bench::link::{Line as _, Link, LinkEvent, Octets, Recording, Replay}
 use harness_bench::scenario::run::{AtMismatch, Outcome, lacks};
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 
 const EXACT: Exactness = Exactness {
     tolerance: Span::ZERO,
@@ -444,4 +444,76 @@ fn what_the_right_drive_explains_names_no_deviation() {
             .any(|name| name.contains("drive 1: checksum-wrong")),
         "{named:?}"
     );
+}
+
+/// Bytes that were held up and are still coming when the bench stops to listen are late, and none of them is lost; where nothing has come any
+/// more for longer than the tolerance, one is.
+#[test]
+fn bytes_that_are_still_coming_are_not_lost() {
+    let plan = entry("title x\nring 3\nread-byte 0 FE13\nwait 100ms\nread-byte 1 FE13\n").plan;
+    let (_, mut link) = model(&[]);
+    let seen = conversations(&plan, &mut link);
+    let compared = |held_up: Span, silent: Span| {
+        let mut seen = seen.clone();
+        for conversation in &mut seen {
+            for (_, at, _) in conversation.received.iter_mut().skip(3) {
+                *at += held_up;
+            }
+            let most = conversation.received.len();
+            conversation.received.truncate(most.saturating_sub(2));
+            if let Some((_, last, _)) = conversation.received.last() {
+                conversation.end = *last + silent;
+            }
+        }
+        let real = Exactness {
+            tolerance: Span::from_millis(20),
+            ..EXACT
+        };
+        let (plan, link) = model(&[]);
+        let mut twin = Twin::new(link, &plan.rings);
+        let all: Vec<_> = seen.iter().map(|one| twin.follow(one, real)).collect();
+        let missing = |one: &crate::twin::Comparison| one.divergence.as_ref().map(|own| own.what);
+        let late = all.iter().any(|one| one.untimely.is_some());
+        (all.iter().find_map(missing), late)
+    };
+    let soon = Span::from_millis(1);
+    assert_eq!(compared(Span::from_millis(200), soon), (None, true));
+    let long = Span::from_millis(60);
+    let lost = compared(Span::ZERO, long);
+    assert_eq!(lost, (Some(Symptom::Missing), false));
+    let lost = compared(Span::from_millis(200), long);
+    assert_eq!(lost.0, Some(Symptom::Missing));
+}
+
+/// A byte that was read late is late only where the bench had looked for it in time.
+#[test]
+fn a_byte_is_late_where_the_bench_had_looked_for_it() {
+    let plan = entry("title x\nring 3\nread-byte 1 FE13\n").plan;
+    let (_, mut link) = model(&[]);
+    let seen = conversations(&plan, &mut link);
+    let is_late = |moved: fn(Instant) -> Instant, unwatched: &[(u64, u64)]| {
+        let mut seen = seen.clone();
+        for conversation in &mut seen {
+            for (_, at, _) in &mut conversation.received {
+                *at = moved(*at);
+            }
+            let ms = |own| Instant::START + Span::from_millis(own);
+            let unwatched = unwatched.iter();
+            conversation.unwatched = unwatched.map(|own| (ms(own.0), ms(own.1))).collect();
+            conversation.end = ms(200);
+        }
+        let real = Exactness {
+            tolerance: Span::from_millis(20),
+            ..EXACT
+        };
+        let (plan, link) = model(&[]);
+        let mut twin = Twin::new(link, &plan.rings);
+        let mut all = seen.iter().map(|one| twin.follow(one, real));
+        all.any(|one| one.untimely.is_some())
+    };
+    let late = |at| at + Span::from_millis(60);
+    assert!(is_late(late, &[]));
+    assert!(!is_late(late, &[(0, 80)]));
+    assert!(is_late(late, &[(40, 80)]));
+    assert!(is_late(late, &[(0, 30)]));
 }

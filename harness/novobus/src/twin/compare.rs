@@ -30,6 +30,8 @@ pub(crate) struct Comparer<'a> {
     pub(crate) recording: BTreeSet<(usize, u8)>,
     /// How long a drive that monitors hears nothing at least before it detects a time-out.
     pub(crate) earliest_time_out: Span,
+    /// As [`Conversation::unwatched`].
+    pub(crate) unwatched: &'a [(Instant, Instant)],
     pub(crate) comparison: Comparison,
 }
 
@@ -494,10 +496,13 @@ impl Comparer<'_> {
         step: impl FnOnce() -> Option<usize>,
         (expected, received): ((Instant, Received), (Instant, Received)),
     ) {
-        let apart = expected
-            .0
-            .since(received.0)
-            .max(received.0.since(expected.0));
+        let unwatched = self.unwatched.iter().copied();
+        let came = |own: &(Instant, Instant)| (own.0..=own.1).contains(&received.0);
+        let (earliest, latest) = unwatched
+            .rev()
+            .find(came)
+            .unwrap_or((received.0, received.0));
+        let apart = expected.0.since(latest).max(earliest.since(expected.0));
         self.comparison.apart = self.comparison.apart + apart;
         if apart > self.exactness.tolerance && self.comparison.untimely.is_none() {
             self.comparison.untimely = Some(Divergence {

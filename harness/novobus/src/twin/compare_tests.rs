@@ -62,6 +62,7 @@ fn rows(
         bytes.iter().map(|byte| (Instant::START, *byte)).collect()
     };
     let mut comparer = Comparer {
+        unwatched: &[],
         exactness: Exactness {
             tolerance: Span::ZERO,
             line_errors,

@@ -38,6 +38,8 @@ pub(crate) struct Conversation {
     pub received: Vec<(usize, Instant, Received)>,
     /// When the next conversation began, or when this one was over.
     pub end: Instant,
+    /// When the bench did not look at its ports: what was read behind that came at any time in it.
+    pub unwatched: Vec<(Instant, Instant)>,
 }
 
 impl Conversation {
@@ -84,7 +86,10 @@ impl Conversation {
                     let received = came.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
-                LinkEvent::Look(look) => open.end = open.end.max(look.at),
+                LinkEvent::Look(look) => {
+                    open.end = open.end.max(look.at);
+                    open.unwatched.extend(look.since.map(|own| (own, look.at)));
+                }
                 LinkEvent::Probe(..) | LinkEvent::Tapped(..) | LinkEvent::Trouble(_) => {}
             }
         }
@@ -238,6 +243,7 @@ impl Twin {
             knowledge: &mut self.knowledge,
             recording,
             earliest_time_out: self.link.earliest_time_out().min(EARLIEST_TIME_OUT),
+            unwatched: &conversation.unwatched,
             comparison: Comparison {
                 monitored,
                 left_out: !left_out.is_empty(),

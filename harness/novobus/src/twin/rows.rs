@@ -115,11 +115,14 @@ impl Rows<'_> {
         Command::decode(&bytes).value()
     }
 
-    /// Whether the conversation ended before a byte that is missing could be called late. One that came although the twin does not send it,
-    /// not even later, is never excused.
+    /// Whether the conversation ended before a byte that is missing could be called late, or while others were still coming. One that came
+    /// although the twin does not send it, not even later, is never excused.
     pub(super) fn cut_short(&self, index: usize, what: &Symptom, tail: Instant) -> bool {
         match (what, self.expected.get(index), self.received.get(index)) {
-            (Symptom::Missing, Some((at, _)), None) => *at >= tail,
+            (Symptom::Missing, Some((at, _)), None) => {
+                let last = self.received.last().map(|(came, _)| came);
+                at.max(last.unwrap_or(at)) >= &tail
+            }
             _ => false,
         }
     }

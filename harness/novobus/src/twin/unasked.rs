@@ -333,6 +333,7 @@ pub(super) fn behind_a_race(
         done: done.copied().collect(),
         received: received.collect(),
         end: conversation.end,
+        unwatched: conversation.unwatched.clone(),
     };
     Some((conversation, rest, left))
 }

@@ -140,7 +140,7 @@ impl Piece {
     }
 }
 
-/// The slaves of a line, in scans of so many milliseconds.
+/// The slaves of a line, in scans of this number of milliseconds.
 #[derive(Clone)]
 pub(super) struct Line<const SCAN: u64> {
     slaves: Vec<Deviant>,
