@@ -335,20 +335,24 @@ impl Attempts for AttemptNotes<'_> {
     }
 
     fn is_right(&self, attempt: usize) -> bool {
-        self.notes[attempt].is_explained_by(SlaveIs::Right, &Values::new())
+        self.notes[attempt].is_explained_by(SlaveIs::Right, &Values::new()) == Some(true)
     }
 
     fn explains(&self, own: &WrongSlave, attempt: usize) -> Option<bool> {
         let note = self.notes[attempt];
         let wrong = SlaveIs::WrongSlave(own.place, own.deviation);
-        if note.is_explained_by(wrong, &Values::new()) {
-            return Some(true);
+        let explained = note.is_explained_by(wrong, &Values::new());
+        if explained != Some(false) {
+            return explained;
         }
         let mut behind = self.behind.borrow_mut();
         let held = behind.entry((self.parts[attempt], own.place, own.deviation.name));
         // Parameters are read once in a part, so that every attempt knows the same.
         let held = held.or_insert_with(|| note.behind(own.place, own.deviation));
-        Some(!held.is_empty() && note.is_explained_by(wrong, held))
+        match held.is_empty() {
+            true => explained,
+            false => note.is_explained_by(wrong, held),
+        }
     }
 }
 

@@ -257,11 +257,16 @@ impl AttemptNote {
         held
     }
 
-    /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read.
-    pub(crate) fn is_explained_by(&self, other: Other, held: &Values) -> bool {
-        if !self.exact && self.shown.ended.is_some() {
-            return self.could_be_sent_by(other, held);
+    /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read; `None` where that was not
+    /// compared to its end.
+    pub(crate) fn is_explained_by(&self, other: Other, held: &Values) -> Option<bool> {
+        match !self.exact && self.shown.ended.is_some() {
+            true => self.could_be_sent_by(other, held),
+            false => Some(self.is_shown_by(other, held)),
         }
+    }
+
+    fn is_shown_by(&self, other: Other, held: &Values) -> bool {
         let base: Assumed = self.slaves.iter().map(|own| own.properties).collect();
         if let Other::WrongSlave(..) = other {
             return self.shown_by(other, &base, held) == self.shown;
@@ -285,24 +290,27 @@ impl AttemptNote {
         !found.is_empty()
     }
 
-    /// Whether slaves that differ so could have sent what came where time is real.
-    fn could_be_sent_by(&self, other: Other, held: &Values) -> bool {
-        let Other::WrongSlave(place, deviation) = other else {
-            let beats = &self.begun.beats;
-            return right_slaves_send(&self.slaves, (self.begun.rate, 0), &self.turns, beats)
-                .is_ok();
-        };
-        let slaves = self.slaves.iter().enumerate().map(|(own, known)| {
-            let mut slave = known.model(known.properties);
-            if own == place {
-                slave.deviation = Some(deviation);
-                slave.parameters.extend(stated(held));
+    /// The same of what came where time is real.
+    fn could_be_sent_by(&self, other: Other, held: &Values) -> Option<bool> {
+        let (rate, beats) = (self.begun.rate, &self.begun.beats);
+        beats.beat();
+        let sent = match other {
+            Other::Right => {
+                right_slaves_send(&self.slaves, (rate, 0), &self.turns, beats).map(|_| ())
             }
-            slave
-        });
-        let slaves: Vec<_> = slaves.collect();
-        self.begun.beats.beat();
-        could_send(&slaves, self.begun.rate, &self.turns).is_ok()
+            Other::WrongSlave(place, deviation) => {
+                let known = self.slaves.iter();
+                let slaves = known.map(|known| known.model(known.properties));
+                let mut slaves: Vec<_> = slaves.collect();
+                slaves[place].deviation = Some(deviation);
+                slaves[place].parameters.extend(stated(held));
+                could_send(&slaves, rate, &self.turns)
+            }
+        };
+        match sent {
+            Ok(()) => Some(true),
+            Err(differs) => differs.open.is_none().then_some(false),
+        }
     }
 
     /// What the attempt shows on models.
