@@ -1,46 +1,68 @@
 //! Drives that share a segment: which known deviation explains every attempt of a qualification.
 //!
-//! A bus supplies its attempts and what it knows of wrong drives ([`Attempts`]); the rules when a deviation is named are the same for all.
+//! A bus supplies its attempts and what it knows of wrong drives ([`Note`]); the rules when a deviation is named are the same for all.
 
+use super::walk::DriveWalk;
 use crate::counted::counted;
 use crate::rig::Rig;
 use crate::rig::playing::Qualified;
 use crate::rig::profile::{Profile, ProfileLines};
+use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use include_dir::{Dir, File};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The most deviations that are listed where several explain everything.
 const MOST_TOLD: usize = 8;
 
-/// The attempts of a qualification, by their places.
-pub trait Attempts {
-    /// A known way in which a drive may be wrong.
-    type Deviation;
+/// What the names of conversations of a qualification begin with.
+pub const CONVERSATION: &str = "qualify-";
 
-    /// Every known way.
-    fn deviations(&self) -> Vec<Self::Deviation>;
-
-    /// Its name, section and effect, with the drive.
-    fn words(&self, deviation: &Self::Deviation) -> String;
-
-    /// What of the drives was walked and what was not, in lines; nothing where none is.
-    fn walked(&self) -> &str {
-        ""
-    }
-
-    /// The attempts that were begun, in order.
-    fn attempts(&self) -> Vec<Attempted>;
-
-    /// Whether correct drives, with any value of what the manual leaves open, would have shown the same in an attempt.
-    fn is_right(&self, attempt: usize) -> bool;
-
-    /// Whether drives with this deviation would have shown the same in an attempt; `None` where that was not compared to its end.
-    fn explains(&self, deviation: &Self::Deviation, attempt: usize) -> Option<bool>;
+/// The conversations that are kept in a folder, in which what stands for a drive is `filled` in. `drive` is its name as the header of a scenario has
+/// it; empty where it is alone.
+pub fn kept(folder: &Dir<'_>, drive: &str, filled: impl Fn(&str) -> String) -> Vec<Source> {
+    let mut files: Vec<_> = folder.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let source = |file: &File<'_>| {
+        let name = file.path().file_stem()?.to_str()?;
+        let name = format!("{CONVERSATION}{name} {drive}");
+        Some(Source {
+            name: name.trim_end().replace(' ', "-"),
+            text: filled(file.contents_utf8()?).into(),
+        })
+    };
+    files.into_iter().filter_map(source).collect()
 }
 
-/// One attempt at a scenario.
-#[derive(Clone, Copy, Debug)]
-pub struct Attempted {
+/// What a bus keeps of an attempt at a scenario, so that models can be compared with it.
+pub trait Note {
+    /// A known way in which a drive may be wrong.
+    type Deviation: ?Sized + 'static;
+
+    /// Every known way.
+    fn deviations() -> Vec<&'static Self::Deviation>;
+
+    /// Its name, section and effect.
+    fn words(deviation: &Self::Deviation) -> String;
+
+    /// What all buses keep of it.
+    fn noted(&self) -> &Noted;
+
+    /// Its drives, as the header of a scenario names them.
+    fn drives(&self) -> Vec<String>;
+
+    /// Whether correct drives, with any value of what the manual leaves open, would have shown the same.
+    fn is_right(&self) -> bool;
+
+    /// Whether drives of which the one at this place has a deviation would have shown the same; `None` where that was not compared to its end.
+    fn explains(&self, place: usize, deviation: &'static Self::Deviation) -> Option<bool>;
+}
+
+/// What is kept of an attempt on any bus.
+#[derive(Clone, Debug)]
+pub struct Noted {
+    /// The name of the scenario.
+    pub name: String,
     /// Its verdict; skipped where the drives were only asked for their registers.
     pub verdict: Verdict,
     /// Whether the drives did something that no correct drive does, as far as is known.
@@ -49,9 +71,95 @@ pub struct Attempted {
     pub exact: bool,
     /// How many frames or telegrams were received.
     pub received: usize,
+    /// Whether the drives became ready for the scenario, which was played then.
+    pub was_ready: bool,
+    /// Whether they did not become ready.
+    pub was_unanswered: bool,
+}
+
+impl Noted {
+    /// Whether the scenario was played, or the drives did not become ready for it.
+    #[must_use]
+    pub const fn was_tried(&self) -> bool {
+        self.was_ready || self.was_unanswered
+    }
+
+    /// Whether it says nothing of the drives where it is played again.
+    fn showed_nothing(&self) -> bool {
+        [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict) || self.was_unanswered
+    }
+}
+
+/// The attempts of a qualification that were begun, in order.
+pub struct Attempts<'n, N> {
+    notes: Vec<&'n N>,
+    /// Which of them another one speaks for.
+    spoken_for: Vec<bool>,
+    /// Which of them repeat what another part has played.
+    repeats: Vec<bool>,
+    /// What of the drives was walked and what was not, in lines; nothing where none is.
+    walks: String,
+}
+
+impl<'n, N: Note> Attempts<'n, N> {
+    /// The attempts of the parts of a qualification, and the walks of its drives by inputs with these names.
+    pub fn new<'w, S: Ord + 'w>(
+        parts: &[Vec<&'n N>],
+        walks: impl Iterator<Item = &'w DriveWalk<S>>,
+        inputs: &[&str],
+    ) -> Self {
+        let repeats = repeats(parts, |own| (own.noted().name.clone(), own.noted().verdict));
+        let notes = parts.concat();
+        let verdicts = notes.iter().map(|own| own.noted());
+        let verdicts: Vec<_> = verdicts.map(|own| (&*own.name, own.verdict)).collect();
+        let walks = walks.map(|own| own.told(inputs, CONVERSATION, &verdicts));
+        let walks = walks.collect();
+        let spoken_for = spoken_for(&notes, |own| {
+            let own = own.noted();
+            (&own.name, own.showed_nothing(), own.was_ready)
+        });
+        Self {
+            notes,
+            spoken_for,
+            repeats,
+            walks,
+        }
+    }
+
+    fn attempted(&self) -> Vec<Attempted> {
+        let other = self.repeats.iter().zip(&self.spoken_for);
+        let all = self.notes.iter().map(|own| own.noted()).zip(other);
+        let all = all.map(|(own, (repeats, spoken_for))| Attempted {
+            verdict: own.verdict,
+            accuses: own.accuses && !spoken_for,
+            exact: own.exact,
+            received: own.received,
+            repeats: *repeats || *spoken_for,
+        });
+        all.collect()
+    }
+
+    /// Each deviation that each drive may have, with the drive and its place.
+    fn deviations(&self) -> Vec<(usize, String, &'static N::Deviation)> {
+        let drives = self.notes.first().map_or(Vec::new(), |own| own.drives());
+        let each = drives.into_iter().enumerate().flat_map(|(place, drive)| {
+            let all = N::deviations().into_iter();
+            all.map(move |own| (place, drive.clone(), own))
+        });
+        each.collect()
+    }
+}
+
+/// One attempt at a scenario.
+#[derive(Clone, Copy, Debug)]
+struct Attempted {
+    verdict: Verdict,
+    accuses: bool,
+    exact: bool,
+    received: usize,
     /// Whether another attempt speaks for it, or another part of the qualification has played the same conversation before with the same
     /// verdict: it is judged, and not counted again.
-    pub repeats: bool,
+    repeats: bool,
 }
 
 /// What the attempts say of the drives.
@@ -65,28 +173,32 @@ enum Named {
 
 /// Names the deviations that explain every attempt that accuses a drive, and every one that passed. Where time is virtual, an attempt that
 /// passed counts too if correct drives do not explain what came; but it alone accuses no drive.
-fn named<A: Attempts>(all: &A, attempts: &[Attempted]) -> Named {
-    let places = attempts.iter().enumerate();
+fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[Attempted]) -> Named {
+    let both = attempts.iter().zip(&all.notes);
     let right = [Verdict::Passed, Verdict::Skipped];
-    let compared = places.filter(|(_, own)| own.accuses || right.contains(&own.verdict));
+    let compared = both.filter(|(own, _)| own.accuses || right.contains(&own.verdict));
     let (unlike, alike): (Vec<_>, Vec<_>) =
-        compared.partition(|(place, own)| (own.accuses || own.exact) && !all.is_right(*place));
+        compared.partition(|(own, note)| (own.accuses || own.exact) && !note.is_right());
     if unlike.is_empty() {
         return Named::None;
     }
-    let explaining = all.deviations().into_iter().filter(|deviation| {
-        let mut shown = false;
-        let mut unlike = unlike.iter();
-        let could = unlike.all(|(place, _)| {
-            let explains = all.explains(deviation, *place);
-            shown |= explains == Some(true);
-            explains != Some(false)
+    let explaining = all
+        .deviations()
+        .into_iter()
+        .filter(|(place, _, deviation)| {
+            let mut shown = false;
+            let mut unlike = unlike.iter();
+            let could = unlike.all(|(_, note)| {
+                let explains = note.explains(*place, deviation);
+                shown |= explains == Some(true);
+                explains != Some(false)
+            });
+            let mut alike = alike.iter();
+            could && shown && alike.all(|(_, note)| note.explains(*place, deviation) != Some(false))
         });
-        let mut alike = alike.iter();
-        could && shown && alike.all(|(place, _)| all.explains(deviation, *place) != Some(false))
-    });
-    let explaining: Vec<_> = explaining.map(|own| all.words(&own)).collect();
-    let accused = unlike.iter().any(|(_, own)| own.accuses);
+    let explaining = explaining.map(|(_, drive, own)| format!("{drive}: {}", N::words(own)));
+    let explaining: Vec<_> = explaining.collect();
+    let accused = unlike.iter().any(|(own, _)| own.accuses);
     match explaining.len() {
         1 => Named::Explained(explaining),
         _ if accused => Named::Explained(explaining),
@@ -131,7 +243,7 @@ fn agreed<'p>(parts: Vec<Vec<Point<'p>>>) -> (Vec<Point<'p>>, Vec<String>) {
 
 /// Which attempts of the parts of a qualification, one behind the other, repeat what a part before has played: they have the same name and
 /// the same verdict.
-pub fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<bool> {
+fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec<bool> {
     let mut before = BTreeSet::new();
     let mut all = Vec::new();
     for part in parts {
@@ -144,7 +256,7 @@ pub fn repeats<N>(parts: &[Vec<N>], of: impl Fn(&N) -> (String, Verdict)) -> Vec
 
 /// Which attempts are spoken for by another one of the same scenario: they `showed_nothing`, since the computer, the adapter or the line may have
 /// been the cause, and there is a later one, or one before it whose drives were `ready`. `of` gives the name, and both.
-pub fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool> {
+fn spoken_for<N>(notes: &[N], of: impl Fn(&N) -> (&str, bool, bool)) -> Vec<bool> {
     let attempts = notes.chunk_by(|one, next| of(one).0 == of(next).0);
     let spoken = attempts.flat_map(|attempts| {
         let ready = attempts.iter().any(|own| of(own).2);
@@ -202,8 +314,8 @@ fn of_points((rig, began): (&Rig, &str), points: Vec<Point<'_>>) -> Profile<Prof
 
 /// What a qualification comes to. `frames` is the word for what is received, in the singular; `known` are the deviations that the rig's file
 /// names. `whole` if everything was played.
-pub fn qualified<A: Attempts>(
-    all: &A,
+pub fn qualified<N: Note>(
+    all: &Attempts<'_, N>,
     profiled: Profiled,
     frames: &str,
     known: &[String],
@@ -213,7 +325,7 @@ pub fn qualified<A: Attempts>(
         profile,
         contradictions,
     } = profiled;
-    let attempts = all.attempts();
+    let attempts = all.attempted();
     let named = named(all, &attempts);
     let settled = profile.as_ref().map_or(0, |own| own.property.len());
     let open = profile.as_ref().map_or(0, |own| own.open.len());
@@ -223,7 +335,7 @@ pub fn qualified<A: Attempts>(
     let passed = verdicts(Verdict::Passed).count();
     let unclear = |(place, own): &(usize, &Attempted)| {
         let settled = [Verdict::Passed, Verdict::Failed, Verdict::Skipped];
-        !(settled.contains(&own.verdict) || own.exact && all.is_right(*place))
+        !(settled.contains(&own.verdict) || own.exact && all.notes[*place].is_right())
     };
     let inconclusive = counted_once().filter(unclear).count();
     let tried = counted_once().count() - verdicts(Verdict::Skipped).count();
@@ -277,7 +389,7 @@ pub fn qualified<A: Attempts>(
         counted(received, frames),
         counted(settled + open, "open point"),
     ));
-    text.push_str(all.walked());
+    text.push_str(&all.walks);
     if !whole {
         text.push_str("the run ended before everything was played\n");
     }
@@ -299,95 +411,100 @@ pub fn qualified<A: Attempts>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use Verdict::{Failed, Inconclusive, Passed};
 
-    /// Attempts, each with the deviations that explain it.
-    struct Table(Vec<(Attempted, bool, &'static [&'static str])>);
+    /// An attempt, whether right drives explain it, and the deviations that do; none where that was not compared.
+    struct Row(Noted, bool, &'static [&'static str]);
 
-    impl Attempts for Table {
-        type Deviation = &'static str;
+    impl Note for Row {
+        type Deviation = str;
 
-        fn deviations(&self) -> Vec<&'static str> {
+        fn deviations() -> Vec<&'static str> {
             vec!["one", "two"]
         }
 
-        fn words(&self, deviation: &&'static str) -> String {
-            (*deviation).to_owned()
+        fn words(deviation: &str) -> String {
+            deviation.to_owned()
         }
 
-        fn attempts(&self) -> Vec<Attempted> {
-            self.0.iter().map(|own| own.0).collect()
+        fn noted(&self) -> &Noted {
+            &self.0
         }
 
-        fn is_right(&self, attempt: usize) -> bool {
-            self.0[attempt].1
+        fn drives(&self) -> Vec<String> {
+            vec!["drive 1".to_owned()]
         }
 
-        fn explains(&self, deviation: &&'static str, attempt: usize) -> Option<bool> {
-            let own = self.0[attempt].2;
-            (!own.is_empty()).then(|| own.contains(deviation))
+        fn is_right(&self) -> bool {
+            self.1
         }
-    }
 
-    fn attempted(verdict: Verdict) -> Attempted {
-        Attempted {
-            verdict,
-            accuses: verdict == Verdict::Failed,
-            exact: false,
-            received: 3,
-            repeats: false,
+        fn explains(&self, _: usize, deviation: &'static str) -> Option<bool> {
+            (!self.2.is_empty()).then(|| self.2.contains(&deviation))
         }
     }
 
-    fn deviations(table: &Table) -> (String, Verdict) {
+    /// Attempts at scenarios with these names.
+    fn rows(attempts: &[(&str, Verdict, bool, &'static [&'static str])]) -> Vec<Row> {
+        let row = |(name, verdict, right, explain): &(&str, Verdict, bool, &'static [_])| {
+            let noted = Noted {
+                name: (*name).to_owned(),
+                verdict: *verdict,
+                accuses: *verdict == Failed,
+                exact: false,
+                received: 3,
+                was_ready: true,
+                was_unanswered: false,
+            };
+            Row(noted, *right, explain)
+        };
+        attempts.iter().map(row).collect()
+    }
+
+    fn found(parts: &[Vec<Row>], contradictions: &[&str]) -> (String, Verdict) {
         let profiled = Profiled {
             profile: None,
-            contradictions: Vec::new(),
+            contradictions: contradictions.iter().map(|own| (*own).to_owned()).collect(),
         };
-        let own = qualified(table, profiled, "frame", &[], true);
+        let parts = parts.iter().map(|own| own.iter().collect());
+        let none = std::iter::empty::<&DriveWalk<u8>>();
+        let all = Attempts::new(&parts.collect::<Vec<_>>(), none, &[]);
+        let own = qualified(&all, profiled, "frame", &[], true);
         (own.deviations, own.verdict)
+    }
+
+    fn deviations(
+        attempts: &[(&str, Verdict, bool, &'static [&'static str])],
+    ) -> (String, Verdict) {
+        found(&[rows(attempts)], &[])
     }
 
     /// One is named where it alone explains what failed and what passed.
     #[test]
     fn one_deviation_is_named_where_it_alone_explains_everything() {
-        let failed = attempted(Verdict::Failed);
-        let passed = attempted(Verdict::Passed);
         let both: &[&str] = &["one", "two"];
-        let named = deviations(&Table(vec![
-            (failed, false, both),
-            (passed, true, &["two"]),
-        ]));
-        assert!(
-            named
-                .0
-                .starts_with("deviation: two\ncompared: 1 of 2 attempts passed"),
-            "{}",
-            named.0
-        );
-        assert_eq!(named.1, Verdict::Failed);
-        let several = deviations(&Table(vec![(failed, false, both), (passed, true, both)]));
-        assert!(
-            several.0.contains("does not tell which one"),
-            "{}",
-            several.0
-        );
-        let none = deviations(&Table(vec![
-            (failed, false, &["one"]),
-            (passed, true, &["two"]),
-        ]));
+        let named = deviations(&[("a", Failed, false, both), ("b", Passed, true, &["two"])]);
+        let expected = "deviation: drive 1: two\ncompared: 1 of 2 attempts passed";
+        assert!(named.0.starts_with(expected), "{}", named.0);
+        assert_eq!(named.1, Failed);
+        let several = deviations(&[("a", Failed, false, both), ("b", Passed, true, both)]).0;
+        assert!(several.contains("does not tell which one"), "{several}");
+        let none = deviations(&[
+            ("a", Failed, false, &["one"]),
+            ("b", Passed, true, &["two"]),
+        ]);
         assert!(none.0.contains("no single known deviation"), "{}", none.0);
     }
 
     /// What was not compared explains nothing by itself, and refutes nothing.
     #[test]
     fn what_is_not_compared_names_nothing() {
-        let failed = attempted(Verdict::Failed);
-        let unknown = (failed, false, &[][..]);
-        let named = |table| deviations(&Table(table)).0;
-        let none = named(vec![unknown]);
+        let unknown = ("a", Failed, false, &[][..]);
+        let none = deviations(&[unknown]).0;
         assert!(none.contains("no single known deviation"), "{none}");
-        let one = named(vec![unknown, (failed, false, &["one"])]);
-        assert!(one.starts_with("deviation: one\ncompared"), "{one}");
+        let one = deviations(&[unknown, ("b", Failed, false, &["one"])]).0;
+        let expected = "deviation: drive 1: one\ncompared";
+        assert!(one.starts_with(expected), "{one}");
     }
 
     /// Drives that gave no answer once, and were played on before, are not accused of it: the computer or the line may have been the cause.
@@ -405,17 +522,15 @@ mod tests {
     /// Nothing is named for drives that nothing accuses.
     #[test]
     fn correct_drives_are_not_named() {
-        let passed = attempted(Verdict::Passed);
-        let own = deviations(&Table(vec![(passed, true, &["one"])]));
+        let own = deviations(&[("a", Passed, true, &["one"])]);
         assert!(own.0.starts_with("deviations: none;"), "{}", own.0);
-        assert_eq!(own.1, Verdict::Passed);
-        let unclear = attempted(Verdict::Inconclusive);
-        let own = deviations(&Table(vec![
-            (unclear, false, &["one"]),
-            (passed, true, &["two"]),
-        ]));
+        assert_eq!(own.1, Passed);
+        let own = deviations(&[
+            ("a", Inconclusive, false, &["one"]),
+            ("b", Passed, true, &["two"]),
+        ]);
         assert!(own.0.starts_with("deviations: not known"), "{}", own.0);
-        assert_eq!(own.1, Verdict::Inconclusive);
+        assert_eq!(own.1, Inconclusive);
     }
 
     fn point(value: Result<&str, &str>) -> Point<'static> {
@@ -447,47 +562,35 @@ mod tests {
     /// Drives that are right by themselves and differ from part to part are not said to be right.
     #[test]
     fn parts_that_contradict_each_other_are_never_passed() {
-        let passed = Table(vec![(attempted(Verdict::Passed), true, &["one"])]);
-        let profiled = Profiled {
-            profile: None,
-            contradictions: vec!["drive 1, event-edges: they differ".to_owned()],
-        };
-        let own = qualified(&passed, profiled, "frame", &[], true);
+        let passed = rows(&[("a", Passed, true, &["one"])]);
+        let own = found(&[passed], &["drive 1, event-edges: they differ"]);
         let expected = "deviations: not known; the parts of the qualification show drives that differ\n  drive 1, event-edges: they differ\n";
-        assert!(own.deviations.starts_with(expected), "{}", own.deviations);
-        assert_eq!(own.verdict, Verdict::Inconclusive);
+        assert!(own.0.starts_with(expected), "{}", own.0);
+        assert_eq!(own.1, Inconclusive);
     }
 
     /// A part of wrong drives and a part of right ones: no deviation explains both.
     #[test]
     fn no_deviation_explains_a_right_and_a_wrong_drive() {
-        let (passed, failed) = (attempted(Verdict::Passed), attempted(Verdict::Failed));
-        let own = deviations(&Table(vec![
-            (passed, true, &["two"]),
-            (failed, false, &["one"]),
-        ]));
+        let own = deviations(&[
+            ("a", Passed, true, &["two"]),
+            ("b", Failed, false, &["one"]),
+        ]);
         let expected =
             "deviations: the drives differ from the model, and no single known deviation";
         assert!(own.0.starts_with(expected), "{}", own.0);
-        assert_eq!(own.1, Verdict::Failed);
+        assert_eq!(own.1, Failed);
     }
 
     /// What a second part has played again is judged, and counted once; another verdict is counted.
     #[test]
     fn what_parts_repeat_is_counted_once() {
         let of = |own: &(&str, Verdict)| (own.0.to_owned(), own.1);
-        let (passed, failed) = (("state", Verdict::Passed), ("state", Verdict::Failed));
+        let (passed, failed) = (("state", Passed), ("state", Failed));
         let own = repeats(&[vec![passed, passed], vec![passed, failed]], of);
         assert_eq!(own, [false, false, true, false]);
-        let again = Attempted {
-            repeats: true,
-            ..attempted(Verdict::Passed)
-        };
-        let both = Table(vec![
-            (attempted(Verdict::Passed), true, &["one"]),
-            (again, true, &["one"]),
-        ]);
-        let own = deviations(&both);
+        let part = || rows(&[("state", Passed, true, &["one"])]);
+        let own = found(&[part(), part()], &[]);
         let counts = "compared: 1 of 1 attempt passed, 0 failed, 0 inconclusive; 3 frames received";
         assert!(own.0.contains(counts), "{}", own.0);
     }

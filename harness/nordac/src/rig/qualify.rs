@@ -1,11 +1,11 @@
 //! A qualification of NORDAC inverters: the deviations that explain what they did, and the values of the open points that were settled.
 
-use super::known::{Known, Values, value_of};
-use super::player::{AttemptNote, CONVERSATION, Player, SlaveIs};
+use super::known::{Known, value_of};
+use super::player::{Player, SlaveNote};
 use super::walk::{State, inputs, walk_of, walked};
 use super::{RigSlave, limits, slaves};
 use harness_bench::qualify::segment::{
-    Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
+    Attempts, CONVERSATION, Note as _, Point, kept, profile, qualified,
 };
 use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
@@ -14,10 +14,7 @@ use harness_bench::scenario::source::Source;
 use harness_proto::nordac::guard::Limits;
 use harness_proto::nordac::properties::{Description, PROPERTIES};
 use harness_proto::profibus::fdl::{SD1, check_sum};
-use harness_sim::nordac::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
-use std::cell::RefCell;
-use std::collections::BTreeMap;
 
 /// The conversations that are played with each slave behind the selected scenarios.
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/qualify/nordac");
@@ -148,23 +145,10 @@ fn with_slave(text: &str, slave: &RigSlave) -> String {
 
 /// The conversations with the slaves of a rig.
 pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
-    let mut files: Vec<_> = CONVERSATIONS.files().collect();
-    files.sort_by_key(|file| file.path().to_owned());
     let slaves = rig.port().map(slaves).unwrap_or_default();
-    let several = slaves.len() > 1;
     let of_slave = |slave: &RigSlave| {
-        let sources = files.iter().filter_map(|file| {
-            let name = file.path().file_stem()?.to_str()?;
-            let address = slave.address;
-            Some(Source {
-                name: match several {
-                    true => format!("{CONVERSATION}{name}-slave-{address}"),
-                    false => format!("{CONVERSATION}{name}"),
-                },
-                text: with_slave(file.contents_utf8()?, slave).into(),
-            })
-        });
-        sources.collect::<Vec<_>>()
+        let name = alone_or_named(&slaves, slave);
+        kept(&CONVERSATIONS, &name, |text| with_slave(text, slave))
     };
     let kept = slaves.iter().flat_map(of_slave);
     let walks = walks(rig).into_iter();
@@ -173,16 +157,20 @@ pub(super) fn conversations(rig: &Rig) -> Vec<Source> {
     kept.chain(walks).collect()
 }
 
+/// The name of a slave in those of its conversations; empty where it is alone.
+fn alone_or_named(slaves: &[RigSlave], slave: &RigSlave) -> String {
+    match slaves.len() {
+        1 => String::new(),
+        _ => format!("slave {}", slave.address),
+    }
+}
+
 /// The walks of the slaves of a rig, as far as its file permits them.
 fn walks(rig: &Rig) -> Vec<(RigSlave, DriveWalk<State>)> {
     let slaves = rig.port().map(slaves).unwrap_or_default();
     let limits = limits(rig, rig.file.limits.allow_motion);
-    let several = slaves.len() > 1;
     let walk = |slave: &RigSlave| {
-        let drive = match several {
-            true => format!("slave {}", slave.address),
-            false => String::new(),
-        };
+        let drive = alone_or_named(&slaves, slave);
         let walk = walk_of(*slave, &limits)?;
         Some((*slave, DriveWalk { drive, walk }))
     };
@@ -205,37 +193,18 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
-    let attempts = notes.iter().flatten();
-    let attempts: Vec<_> = attempts
-        .map(|own| (own.name().as_str(), own.verdict))
-        .collect();
-    let walks = walks(rig).into_iter();
-    let walks = walks
-        .map(|(_, own)| own.told(&inputs(), CONVERSATION, &attempts))
-        .collect();
+    let walks = walks(rig);
+    let walks = walks.iter().map(|own| &own.1);
+    let attempts = Attempts::new(&notes, walks, &inputs());
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
     let named: Vec<_> = named.collect();
-    let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
-    let part = |(place, own): (usize, &Vec<_>)| vec![place; own.len()];
-    let parts = notes.iter().enumerate().flat_map(part).collect();
-    let notes = notes.concat();
-    let notes = AttemptNotes {
-        again: spoken_for(&notes, |own| {
-            (own.name(), own.showed_nothing(), own.was_ready())
-        }),
-        parts,
-        notes,
-        repeats,
-        walks,
-        behind: RefCell::default(),
-    };
-    qualified(&notes, profile, "telegram", &named, whole)
+    qualified(&attempts, profile, "telegram", &named, whole)
 }
 
 /// Settles the properties of a slave of which one value alone explains the conversation that shows it.
-fn settle(slaves: &mut [Known], place: usize, notes: &[&AttemptNote]) {
+fn settle(slaves: &mut [Known], place: usize, notes: &[&SlaveNote]) {
     let address = slaves[place].slave.address;
     for (name, _, conversation) in NEEDS {
         let property = Description::of(name).filter(|own| !slaves[place].is_settled(own));
@@ -243,7 +212,7 @@ fn settle(slaves: &mut [Known], place: usize, notes: &[&AttemptNote]) {
         let shown = format!("{CONVERSATION}{conversation}");
         let of_slave = format!("{shown}-slave-{address}");
         let notes = notes.iter();
-        for note in notes.filter(|note| [&shown, &of_slave].contains(&note.name())) {
+        for note in notes.filter(|note| [&shown, &of_slave].contains(&&note.noted().name)) {
             if let [value] = &note.explaining(slaves, place, property)[..] {
                 slaves[place].settle(property, value);
             }
@@ -264,96 +233,6 @@ fn points<'p>(slaves: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
             },
         })
     })
-}
-
-/// The attempts of a qualification.
-struct AttemptNotes<'n> {
-    notes: Vec<&'n AttemptNote>,
-    /// Of which part each of them is.
-    parts: Vec<usize>,
-    /// Which of them repeat what another part has played.
-    repeats: Vec<bool>,
-    /// Which of them the next one speaks for.
-    again: Vec<bool>,
-    /// What of the slaves was walked, and what was not.
-    walks: String,
-    /// What parameters of the slave at a place hold in a part, if it has the deviation with this name and that changes what they read.
-    behind: RefCell<BTreeMap<(usize, usize, &'static str), Values>>,
-}
-
-/// A deviation of the slave at a place.
-struct WrongSlave {
-    place: usize,
-    address: u8,
-    deviation: &'static Deviation,
-}
-
-impl Attempts for AttemptNotes<'_> {
-    type Deviation = WrongSlave;
-
-    fn deviations(&self) -> Vec<WrongSlave> {
-        let addresses = self
-            .notes
-            .first()
-            .into_iter()
-            .flat_map(|own| own.addresses());
-        let each = addresses.enumerate().flat_map(|(place, address)| {
-            deviations().map(move |deviation| WrongSlave {
-                place,
-                address,
-                deviation,
-            })
-        });
-        each.collect()
-    }
-
-    fn words(&self, own: &WrongSlave) -> String {
-        let Deviation {
-            name,
-            section,
-            about,
-            ..
-        } = own.deviation;
-        format!("slave {}: {name} (NORDAC {section}): {about}", own.address)
-    }
-
-    fn attempts(&self) -> Vec<Attempted> {
-        let other = self.repeats.iter().zip(&self.again);
-        let attempted = self.notes.iter().zip(other);
-        let attempted = attempted.map(|(own, (repeats, again))| Attempted {
-            verdict: own.verdict,
-            accuses: own.accuses && !again,
-            exact: own.exact,
-            received: own.telegrams,
-            repeats: *repeats || *again,
-        });
-        attempted.collect()
-    }
-
-    fn walked(&self) -> &str {
-        &self.walks
-    }
-
-    fn is_right(&self, attempt: usize) -> bool {
-        self.notes[attempt].is_explained_by(SlaveIs::Right, &Values::new()) == Some(true)
-    }
-
-    fn explains(&self, own: &WrongSlave, attempt: usize) -> Option<bool> {
-        let note = self.notes[attempt];
-        let wrong = SlaveIs::WrongSlave(own.place, own.deviation);
-        let explained = note.is_explained_by(wrong, &Values::new());
-        if explained != Some(false) {
-            return explained;
-        }
-        let mut behind = self.behind.borrow_mut();
-        let held = behind.entry((self.parts[attempt], own.place, own.deviation.name));
-        // Parameters are read once in a part, so that every attempt knows the same.
-        let held = held.or_insert_with(|| note.behind(own.place, own.deviation));
-        match held.is_empty() {
-            true => explained,
-            false => note.is_explained_by(wrong, held),
-        }
-    }
 }
 
 #[cfg(test)]

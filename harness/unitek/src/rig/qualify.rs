@@ -2,11 +2,11 @@
 
 use super::Axis;
 use super::known::Known;
-use super::player::{CONVERSATION, DriveIs, Note, Player};
+use super::player::{DriveNote, Player};
 use super::walk::{State, inputs, walk_of, walked};
 use super::{axes, limits};
 use harness_bench::qualify::segment::{
-    Attempted, Attempts, Point, profile, qualified, repeats, spoken_for,
+    Attempts, CONVERSATION, Note as _, Point, kept, profile, qualified,
 };
 use harness_bench::qualify::walk::DriveWalk;
 use harness_bench::rig::Rig;
@@ -14,7 +14,6 @@ use harness_bench::rig::playing::Qualified;
 use harness_bench::scenario::source::Source;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::properties::{Description, PROPERTIES};
-use harness_sim::unitek::deviation::{Deviation, deviations};
 use include_dir::{Dir, include_dir};
 use std::ops::RangeInclusive;
 
@@ -141,8 +140,6 @@ fn free_to_send(axes: &[Axis], axis: Axis) -> u16 {
 
 /// The conversations with these drives: those that are kept, and those that walk each of them as far as the rig's file permits.
 pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
-    let mut files: Vec<_> = CONVERSATIONS.files().collect();
-    files.sort_by_key(|file| file.path().to_owned());
     let of_drive = |axis: &Axis| {
         let [free, other] = free(axes, *axis);
         let bytes = |id: u16| [id, id & 0xFF, id >> 8];
@@ -167,23 +164,11 @@ pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
             format!("{send_low:02X}"),
             format!("{send_high:02X}"),
         ];
-        let several = axes.len() > 1;
-        let node = axis.node;
-        let sources = files.iter().filter_map(move |file| {
-            let name = file.path().file_stem()?.to_str()?;
-            let text = DRIVE.iter().zip(&values);
-            let text = text.fold(file.contents_utf8()?.to_owned(), |text, (place, value)| {
-                text.replace(place, value)
-            });
-            Some(Source {
-                name: match several {
-                    true => format!("{CONVERSATION}{name}-drive-{node}"),
-                    false => format!("{CONVERSATION}{name}"),
-                },
-                text: text.into(),
-            })
-        });
-        sources.collect::<Vec<_>>()
+        kept(&CONVERSATIONS, &alone_or_named(axes, *axis), |text| {
+            let text = text.to_owned();
+            let places = DRIVE.iter().zip(&values);
+            places.fold(text, |text, (place, value)| text.replace(place, value))
+        })
     };
     let kept = axes.iter().flat_map(of_drive);
     let walks = walks(axes, limits).into_iter();
@@ -192,13 +177,18 @@ pub(super) fn conversations(axes: &[Axis], limits: &Limits) -> Vec<Source> {
     kept.chain(walks).collect()
 }
 
+/// The name of a drive in those of its conversations; empty where it is alone.
+fn alone_or_named(axes: &[Axis], axis: Axis) -> String {
+    match axes.len() {
+        1 => String::new(),
+        _ => format!("drive {}", axis.node),
+    }
+}
+
 /// The walks of drives, as far as these limits permit them.
 fn walks(axes: &[Axis], limits: &Limits) -> Vec<(Axis, DriveWalk<State>)> {
     let walk = |axis: &Axis| {
-        let drive = match axes.len() {
-            1 => String::new(),
-            _ => format!("drive {}", axis.node),
-        };
+        let drive = alone_or_named(axes, *axis);
         let walk = walk_of(*axis, limits);
         (*axis, DriveWalk { drive, walk })
     };
@@ -221,42 +211,21 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
-    let attempts = notes.iter().flatten();
-    let attempts: Vec<_> = attempts
-        .map(|own| (own.name().as_str(), own.verdict))
-        .collect();
     let walks = walks(
         &rig.port().map(axes).unwrap_or_default(),
         &limits(rig, rig.file.limits.allow_motion),
     );
-    let walks = walks
-        .into_iter()
-        .map(|(_, own)| own.told(&inputs(), CONVERSATION, &attempts))
-        .collect();
+    let walks = walks.iter().map(|own| &own.1);
+    let attempts = Attempts::new(&notes, walks, &inputs());
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());
-    let repeats = repeats(&notes, |own| (own.name().clone(), own.verdict));
-    let notes = notes.concat();
-    let again = spoken_for(&notes, |own| {
-        (own.name(), own.showed_nothing(), own.was_ready())
-    });
-    qualified(
-        &Notes {
-            notes,
-            repeats,
-            again,
-            walks,
-        },
-        profile,
-        "frame",
-        &named.collect::<Vec<_>>(),
-        whole,
-    )
+    let named: Vec<_> = named.collect();
+    qualified(&attempts, profile, "frame", &named, whole)
 }
 
 /// Settles the properties of a drive of which one value alone explains the conversation that shows it.
-fn settle(drives: &mut [Known], place: usize, notes: &[&Note]) {
+fn settle(drives: &mut [Known], place: usize, notes: &[&DriveNote]) {
     let drive = &mut drives[place];
     for (name, _, conversation) in NEEDS {
         let property = Description::of(name).filter(|_| !drive.settled.contains(name));
@@ -265,7 +234,7 @@ fn settle(drives: &mut [Known], place: usize, notes: &[&Note]) {
         let shown = format!("{CONVERSATION}{conversation}");
         let of_drive = format!("{shown}-drive-{}", drive.axis.node);
         for note in notes {
-            let explaining = match [&shown, &of_drive].contains(&note.name()) {
+            let explaining = match [&shown, &of_drive].contains(&&note.noted().name) {
                 true => note.explaining(place, &values),
                 false => continue,
             };
@@ -290,75 +259,6 @@ fn points<'p>(drives: &'p [Known], limits: &'p Limits) -> impl Iterator<Item = P
             },
         })
     })
-}
-
-/// The attempts of a qualification.
-struct Notes<'n> {
-    notes: Vec<&'n Note>,
-    /// Which of them repeat what another part has played.
-    repeats: Vec<bool>,
-    /// Which of them the next one speaks for.
-    again: Vec<bool>,
-    /// What of the drives was walked, and what was not.
-    walks: String,
-}
-
-/// A deviation of the drive at a place.
-struct Deviates {
-    place: usize,
-    node: u8,
-    deviation: &'static Deviation,
-}
-
-impl Attempts for Notes<'_> {
-    type Deviation = Deviates;
-
-    fn deviations(&self) -> Vec<Deviates> {
-        let nodes = self.notes.first().into_iter().flat_map(|own| own.nodes());
-        let each = nodes.enumerate().flat_map(|(place, node)| {
-            deviations().map(move |deviation| Deviates {
-                place,
-                node,
-                deviation,
-            })
-        });
-        each.collect()
-    }
-
-    fn words(&self, own: &Deviates) -> String {
-        let Deviation {
-            name,
-            section,
-            about,
-            ..
-        } = own.deviation;
-        format!("drive {}: {name} (UNITEK {section}): {about}", own.node)
-    }
-
-    fn attempts(&self) -> Vec<Attempted> {
-        let other = self.repeats.iter().zip(&self.again);
-        let attempted = self.notes.iter().zip(other);
-        let attempted = attempted.map(|(own, (repeats, again))| Attempted {
-            verdict: own.verdict,
-            accuses: own.accuses && !again,
-            exact: own.exact,
-            received: own.frames,
-            repeats: *repeats || *again,
-        });
-        attempted.collect()
-    }
-
-    fn walked(&self) -> &str {
-        &self.walks
-    }
-
-    fn is_right(&self, attempt: usize) -> bool {
-        self.notes[attempt].is_explained_by(DriveIs::Right) == Some(true)
-    }
-
-    fn explains(&self, own: &Deviates, attempt: usize) -> Option<bool> {
-        self.notes[attempt].is_explained_by(DriveIs::Deviates(own.place, own.deviation))
-    }
 }
 
 #[cfg(test)]

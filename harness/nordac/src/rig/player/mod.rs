@@ -13,7 +13,8 @@ mod shorten;
 mod unlock;
 mod worlds;
 
-pub(crate) use note::{AttemptNote, CONVERSATION, Other as SlaveIs};
+use note::Behind;
+pub(crate) use note::SlaveNote;
 pub(super) use ready::idle;
 pub(super) use rehearse::Begun;
 
@@ -132,7 +133,8 @@ pub(crate) struct Player {
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
     /// The attempts of a qualification.
-    notes: Vec<AttemptNote>,
+    notes: Vec<SlaveNote>,
+    behind: Behind,
 }
 
 /// Slaves that are ready for a scenario.
@@ -173,6 +175,7 @@ impl Player {
             lost: BTreeMap::new(),
             beats: Beats::default(),
             notes: Vec::new(),
+            behind: Behind::default(),
         }
     }
 
@@ -182,7 +185,7 @@ impl Player {
     }
 
     /// The attempts of a qualification.
-    pub(super) fn notes(&self) -> &[AttemptNote] {
+    pub(super) fn notes(&self) -> &[SlaveNote] {
         &self.notes
     }
 

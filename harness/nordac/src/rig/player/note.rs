@@ -11,6 +11,7 @@ use crate::rig::settle::{Assumed, search};
 use crate::rig::talk::{Talk, TalkError};
 use crate::simulate::SlaveSetup;
 use harness_bench::link::{Link as _, LinkEvent, Recording};
+use harness_bench::qualify::segment::{Note, Noted};
 use harness_bench::scenario::run::{Outcome, Why};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::nordac::pkw::Index;
@@ -20,12 +21,9 @@ use harness_proto::nordac::{Image, Parameter, PpoType};
 use harness_proto::profibus::dp::Service;
 use harness_proto::profibus::{Pdu, Telegram};
 use harness_proto::time::Span;
-use harness_sim::nordac::deviation::Deviation;
+use harness_sim::nordac::deviation::{Deviation, deviations};
 use std::collections::BTreeMap;
-use std::sync::Arc;
-
-/// What the names of conversations of a qualification begin with.
-pub(crate) const CONVERSATION: &str = "qualify-";
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// How a slave differs from what is known of it.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +36,7 @@ pub(crate) enum Other {
 
 /// One attempt.
 #[derive(Clone, Debug)]
-pub(crate) struct AttemptNote {
+pub(crate) struct SlaveNote {
     own: Arc<Own>,
     /// What was known when it began.
     begun: Player,
@@ -49,13 +47,7 @@ pub(crate) struct AttemptNote {
     shown: AttemptShown,
     /// Where time is real, the telegrams of the bench with what came behind each.
     turns: Vec<Turn>,
-    pub(crate) verdict: Verdict,
-    /// Whether the slaves did something that no right slave does, as far as is known.
-    pub(crate) accuses: bool,
-    /// Whether time is virtual: what comes can be compared with a model, whatever the verdict.
-    pub(crate) exact: bool,
-    /// How many telegrams were received.
-    pub(crate) telegrams: usize,
+    noted: Noted,
 }
 
 /// What an attempt has shown.
@@ -148,51 +140,25 @@ fn meaning(telegram: &Telegram) -> (String, String) {
     (head, contents)
 }
 
-impl AttemptNote {
+impl SlaveNote {
     /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
         // What was not shown is shown by another attempt, or not at all.
-        self.verdict = match outcome.unready {
+        self.noted.verdict = match outcome.unready {
             Some(_) if self.shown.ended.is_some() => Verdict::Skipped,
             _ => outcome.verdict,
         };
         let unready = match &self.shown.unanswered {
             // The rig's line was lost.
             None | Some(TalkError::Line(_)) => false,
-            Some(_) => self.telegrams > 0,
+            Some(_) => self.noted.received > 0,
         };
-        self.accuses = outcome.verdict == Verdict::Failed || unready && !self.exact;
-    }
-
-    /// Whether the scenario was played, or the slaves did not become ready for it.
-    fn was_tried(&self) -> bool {
-        self.shown.unanswered.is_some() || self.shown.ended.is_some()
+        self.noted.accuses = outcome.verdict == Verdict::Failed || unready && !self.noted.exact;
     }
 
     /// Whether it has shown something: the scenario was tried, or the slaves were asked for everything.
     pub(crate) fn shows_something(&self) -> bool {
-        self.was_tried() || self.begun.known.is_none() && self.begun.unable.is_none()
-    }
-
-    /// Whether it says nothing of the slaves where it is played again.
-    pub(crate) fn showed_nothing(&self) -> bool {
-        [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict)
-            || self.shown.unanswered.is_some()
-    }
-
-    /// Whether the slaves became ready for the scenario, which was played then.
-    pub(crate) const fn was_ready(&self) -> bool {
-        self.shown.ended.is_some()
-    }
-
-    /// The name of the scenario.
-    pub(crate) fn name(&self) -> &String {
-        &self.own.name
-    }
-
-    /// The addresses of the slaves, in their order.
-    pub(crate) fn addresses(&self) -> impl Iterator<Item = u8> {
-        self.begun.slaves.iter().map(|own| own.address)
+        self.noted.was_tried() || self.begun.known.is_none() && self.begun.unable.is_none()
     }
 
     /// The values of a property of the slave at a place with which slaves that are `known` would have shown the same.
@@ -216,7 +182,7 @@ impl AttemptNote {
     /// What parameters of the slave at a place hold if it has a deviation that changes what they read; nothing where they hold what was read.
     ///
     /// A guess is kept where it reads as the slave did: that the deviation exchanges octets, adds something, or exchanges PWE1 and PWE2.
-    pub(crate) fn behind(&self, place: usize, deviation: &'static Deviation) -> Values {
+    fn behind(&self, place: usize, deviation: &'static Deviation) -> Values {
         let known = &self.slaves[place];
         let reads = |held: &Values| {
             let mut slave = known.model(known.properties);
@@ -259,8 +225,8 @@ impl AttemptNote {
 
     /// Whether slaves that differ so would have shown the same, where parameters hold something else than was read; `None` where that was not
     /// compared to its end.
-    pub(crate) fn is_explained_by(&self, other: Other, held: &Values) -> Option<bool> {
-        match !self.exact && self.shown.ended.is_some() {
+    fn is_explained_by(&self, other: Other, held: &Values) -> Option<bool> {
+        match !self.noted.exact && self.noted.was_ready {
             true => self.could_be_sent_by(other, held),
             false => Some(self.is_shown_by(other, held)),
         }
@@ -272,7 +238,7 @@ impl AttemptNote {
             return self.shown_by(other, &base, held) == self.shown;
         }
         // A verdict in virtual time has looked for right slaves that do the same.
-        if self.exact && self.verdict == Verdict::Failed {
+        if self.noted.exact && self.noted.verdict == Verdict::Failed {
             return false;
         }
         let open: Vec<Vec<&str>> = self
@@ -350,10 +316,10 @@ impl AttemptNote {
         let mut recording = Recording::new(&mut link, &mut forgotten);
         recording.begin();
         let mut link = Observed::new(&mut recording);
-        if self.exact {
+        if self.noted.exact {
             link.noted.expect(&self.shown.came, 0, true);
         }
-        let gone = match self.was_tried() {
+        let gone = match self.noted.was_tried() {
             true => player.go(&self.own, &mut link, Some(self.switches)).0,
             false => match player
                 .learn(&mut link, false)
@@ -363,7 +329,58 @@ impl AttemptNote {
                 Err(error) => AttemptCourse::Unanswered(error),
             },
         };
-        AttemptShown::of(&gone, &link, self.exact)
+        AttemptShown::of(&gone, &link, self.noted.exact)
+    }
+}
+
+impl Note for SlaveNote {
+    type Deviation = Deviation;
+
+    fn deviations() -> Vec<&'static Deviation> {
+        deviations().collect()
+    }
+
+    fn words(own: &Deviation) -> String {
+        format!("{} (NORDAC {}): {}", own.name, own.section, own.about)
+    }
+
+    fn noted(&self) -> &Noted {
+        &self.noted
+    }
+
+    fn drives(&self) -> Vec<String> {
+        let slaves = self.begun.slaves.iter();
+        slaves.map(|own| format!("slave {}", own.address)).collect()
+    }
+
+    fn is_right(&self) -> bool {
+        self.is_explained_by(Other::Right, &Values::new()) == Some(true)
+    }
+
+    fn explains(&self, place: usize, deviation: &'static Deviation) -> Option<bool> {
+        let wrong = Other::WrongSlave(place, deviation);
+        let explained = self.is_explained_by(wrong, &Values::new());
+        if explained != Some(false) {
+            return explained;
+        }
+        let read = || self.behind(place, deviation);
+        let held = self.begun.behind.get((place, deviation.name), read);
+        match held.is_empty() {
+            true => explained,
+            false => self.is_explained_by(wrong, &held),
+        }
+    }
+}
+
+/// What parameters of the slave at a place hold if it has the deviation with this name and that changes what they read. It is worked out once in
+/// a part of a qualification, so that every attempt knows the same.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Behind(Arc<Mutex<BTreeMap<(usize, &'static str), Values>>>);
+
+impl Behind {
+    fn get(&self, key: (usize, &'static str), read: impl FnOnce() -> Values) -> Values {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.entry(key).or_insert_with(read).clone()
     }
 }
 
@@ -385,20 +402,26 @@ impl Player {
         gone: &AttemptCourse,
     ) {
         let exact = link.time_tolerance() == Span::ZERO;
-        self.notes.push(AttemptNote {
+        let shown = AttemptShown::of(gone, link, exact);
+        self.notes.push(SlaveNote {
             own: Arc::clone(own),
             begun,
             slaves: self.known.as_ref().unwrap_or(&self.partly).clone(),
             switches,
-            shown: AttemptShown::of(gone, link, exact),
             turns: match exact {
                 true => Vec::new(),
                 false => link.noted.turns.clone(),
             },
-            exact,
-            verdict: Verdict::Skipped,
-            accuses: false,
-            telegrams: link.noted.all().telegrams().len(),
+            noted: Noted {
+                name: own.name.clone(),
+                verdict: Verdict::Skipped,
+                accuses: false,
+                exact,
+                received: link.noted.all().telegrams().len(),
+                was_ready: shown.ended.is_some(),
+                was_unanswered: shown.unanswered.is_some(),
+            },
+            shown,
         });
     }
 }

@@ -14,7 +14,7 @@ mod ready;
 mod verdict;
 mod worlds;
 
-pub(crate) use note::{CONVERSATION, Note, Other as DriveIs};
+pub(crate) use note::DriveNote;
 pub(super) use own::{Own, stores};
 use verdict::{are_judged, explained, unlike};
 use worlds::{BY_LINES, STANDSTILL, Shown, Told};
@@ -33,6 +33,7 @@ use crate::language::syntax::{PropertyValue, SetupKind};
 use crate::simulate::{self, Bench};
 use harness_bench::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use harness_bench::medium::Medium;
+use harness_bench::qualify::segment::CONVERSATION;
 use harness_bench::rig::left::NotPutBack;
 use harness_bench::rig::playing::observed::{Beats, LinkTimes};
 use harness_bench::scenario::expression::Scope;
@@ -127,7 +128,7 @@ pub(crate) struct Player {
     /// Where it says what a scenario or a probe changes, before it does.
     pub(super) left: NotPutBack,
     /// The attempts of a qualification.
-    notes: Vec<Note>,
+    notes: Vec<DriveNote>,
 }
 
 impl Player {
@@ -183,7 +184,7 @@ impl Player {
     }
 
     /// The attempts of a qualification.
-    pub(super) fn notes(&self) -> &[Note] {
+    pub(super) fn notes(&self) -> &[DriveNote] {
         &self.notes
     }
 

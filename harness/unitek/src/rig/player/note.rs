@@ -13,21 +13,19 @@ use crate::gate::guarded;
 use crate::simulate::{self, Bench, DriveSetup};
 use harness_bench::link::{Line as _, Link as _, LinkEvent, Recording};
 use harness_bench::medium::Out;
+use harness_bench::qualify::segment::{Note, Noted};
 use harness_bench::scenario::run::{Outcome, Why};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{Access, REGISTERS, Register, Request};
-use harness_sim::unitek::deviation::Deviation;
+use harness_sim::unitek::deviation::{Deviation, deviations};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// How many frames a drive may have heard before an attempt, counted in the cycle of a deviation that shows in each fifth one.
 const HEARD_BEFORE: std::ops::Range<u8> = 1..5;
-
-/// What the names of conversations of a qualification begin with.
-pub(crate) const CONVERSATION: &str = "qualify-";
 
 /// Every how many phases of a drive's clock one is tried for a drive that is wrong.
 const EACH_PHASE: usize = 8;
@@ -43,7 +41,7 @@ pub(crate) enum Other {
 
 /// One attempt.
 #[derive(Clone, Debug)]
-pub(crate) struct Note {
+pub(crate) struct DriveNote {
     own: Arc<Own>,
     /// What was known when it began.
     begun: Player,
@@ -54,13 +52,7 @@ pub(crate) struct Note {
     told: Option<Told>,
     /// Whether no right drive could have sent them then.
     wrong: bool,
-    pub(crate) verdict: Verdict,
-    /// Whether the drives did something that no correct drive does, as far as is known.
-    pub(crate) accuses: bool,
-    /// Whether time is virtual: what comes can be compared with a model, whatever the verdict.
-    pub(crate) exact: bool,
-    /// How many frames were received.
-    pub(crate) frames: usize,
+    noted: Noted,
 }
 
 /// What an attempt has shown.
@@ -127,22 +119,22 @@ fn meaning(frame: &Frame, all: bool) -> (String, String) {
     (head, format!("{shown:02X?}"))
 }
 
-impl Note {
+impl DriveNote {
     /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
-        self.verdict = outcome.verdict;
+        self.noted.verdict = outcome.verdict;
         let unready = match &self.shown.unanswered {
             // The rig's line was lost.
             None | Some(Error::Link(_)) => false,
-            Some(_) => self.frames > 0,
+            Some(_) => self.noted.received > 0,
         };
-        self.accuses = outcome.verdict == Verdict::Failed || unready;
+        self.noted.accuses = outcome.verdict == Verdict::Failed || unready;
     }
 
     /// Notes its frames and their times, and whether no right drive could have sent them.
     pub(super) fn told(&mut self, told: Told, wrong: bool) {
         self.wrong = wrong;
-        self.told = Some(told).filter(|_| !self.exact || self.own.by_frames);
+        self.told = Some(told).filter(|_| !self.noted.exact || self.own.by_frames);
     }
 
     /// Whether the frames and their times are those that a drive with a deviation could have sent; `None` where that is not compared.
@@ -168,35 +160,9 @@ impl Note {
         refuted
     }
 
-    /// Whether the scenario was played, or the drives did not become ready for it.
-    fn was_tried(&self) -> bool {
-        self.shown.unanswered.is_some() || self.shown.ended.is_some()
-    }
-
     /// Whether it has shown something: the scenario was tried, or the drives were asked for everything.
     pub(crate) fn shows_something(&self) -> bool {
-        self.was_tried() || self.begun.known.is_none()
-    }
-
-    /// Whether it says nothing of the drives where it is played again.
-    pub(crate) fn showed_nothing(&self) -> bool {
-        [Verdict::Inconclusive, Verdict::Marginal].contains(&self.verdict)
-            || self.shown.unanswered.is_some()
-    }
-
-    /// Whether the drives became ready for the scenario, which was played then.
-    pub(crate) const fn was_ready(&self) -> bool {
-        self.shown.ended.is_some()
-    }
-
-    /// The name of the scenario.
-    pub(crate) fn name(&self) -> &String {
-        &self.own.name
-    }
-
-    /// The numbers of the drives, in their order.
-    pub(crate) fn nodes(&self) -> impl Iterator<Item = u8> {
-        self.begun.axes.iter().map(|axis| axis.node)
+        self.noted.was_tried() || self.begun.known.is_none()
     }
 
     /// The values of a property of the drive at a place with which it would have shown the same, among those that are possible.
@@ -217,7 +183,7 @@ impl Note {
 
     /// Whether drives that differ so would have shown the same; `None` where that was not compared to its end. Behind an adapter its frames and
     /// their times alone say it.
-    pub(crate) fn is_explained_by(&self, other: Other) -> Option<bool> {
+    fn is_explained_by(&self, other: Other) -> Option<bool> {
         let told = match other {
             Other::Deviates(place, deviation) if self.told.is_some() => {
                 self.told_by(place, deviation)
@@ -225,7 +191,7 @@ impl Note {
             Other::Deviates(..) => Some(true),
             Other::Right => Some(!self.wrong),
         };
-        let by_times = self.told.is_some() && !self.exact;
+        let by_times = self.told.is_some() && !self.noted.exact;
         match told {
             Some(true) if !by_times => Some(self.is_shown_by(other)),
             None if !by_times && !self.is_shown_by(other) => Some(false),
@@ -288,14 +254,43 @@ impl Note {
         let mut recording = Recording::new(&mut link, &mut forgotten);
         let mut link = Observed::new(&mut recording);
         link.noted.keep();
-        let gone = match self.was_tried() {
+        let gone = match self.noted.was_tried() {
             true => player.go(&self.own, &mut link, false),
             false => match player.learn(&mut link) {
                 Ok(()) => Gone::Skipped(Why::RunEnded.into()),
                 Err(error) => Gone::Unanswered(error),
             },
         };
-        Shown::of(&gone, &link, self.exact) == self.shown
+        Shown::of(&gone, &link, self.noted.exact) == self.shown
+    }
+}
+
+impl Note for DriveNote {
+    type Deviation = Deviation;
+
+    fn deviations() -> Vec<&'static Deviation> {
+        deviations().collect()
+    }
+
+    fn words(own: &Deviation) -> String {
+        format!("{} (UNITEK {}): {}", own.name, own.section, own.about)
+    }
+
+    fn noted(&self) -> &Noted {
+        &self.noted
+    }
+
+    fn drives(&self) -> Vec<String> {
+        let axes = self.begun.axes.iter();
+        axes.map(|own| format!("drive {}", own.node)).collect()
+    }
+
+    fn is_right(&self) -> bool {
+        self.is_explained_by(Other::Right) == Some(true)
+    }
+
+    fn explains(&self, place: usize, deviation: &'static Deviation) -> Option<bool> {
+        self.is_explained_by(Other::Deviates(place, deviation))
     }
 }
 
@@ -382,17 +377,23 @@ impl Player {
             false => own.clone(),
         });
         let exact = link.time_tolerance() == Span::ZERO;
-        let note = Note {
+        let shown = Shown::of(gone, link, exact);
+        let note = DriveNote {
             own: Arc::clone(own),
             begun,
             drives: drives.collect(),
-            shown: Shown::of(gone, link, exact),
             told: None,
             wrong: false,
-            exact,
-            verdict: Verdict::Skipped,
-            accuses: false,
-            frames: link.noted.kept().iter().map(|own| own.len()).sum(),
+            noted: Noted {
+                name: own.name.clone(),
+                verdict: Verdict::Skipped,
+                accuses: false,
+                exact,
+                received: link.noted.kept().iter().map(|own| own.len()).sum(),
+                was_ready: shown.ended.is_some(),
+                was_unanswered: shown.unanswered.is_some(),
+            },
+            shown,
         };
         self.notes.push(note);
     }

@@ -1,10 +1,11 @@
 //! A scenario of this bus, read for a rig.
 
-use super::{AT_REST, CONVERSATION, Known};
+use super::{AT_REST, Known};
 use crate::language::Unitek;
 use crate::language::plan::{Act, WantedFrame, WantedOutcome};
 use crate::rig::Axis;
 use crate::simulate::DriveSetup;
+use harness_bench::qualify::segment::CONVERSATION;
 use harness_bench::scenario::parse::parse;
 use harness_bench::scenario::pattern::Expected;
 use harness_bench::scenario::plan::{Plan, PlannedAction, PlannedStep, plan};

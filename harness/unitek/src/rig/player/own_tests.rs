@@ -1,10 +1,11 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
 use super::worlds::Shown;
-use super::{CONVERSATION, Known, Own, Player};
+use super::{Known, Own, Player};
 use crate::BUSES;
 use crate::rig::Axis;
 use crate::rig::qualify::conversations;
+use harness_bench::qualify::segment::CONVERSATION;
 use harness_bench::rig::playing::RigRun as _;
 use harness_bench::rig::playing::run::{PortPlayer as _, PortRun};
 use harness_bench::rig::{UseOptions, parse};
