@@ -167,6 +167,8 @@ struct Attempted {
 enum Named {
     /// No attempt accuses a drive.
     None,
+    /// Drives did not become ready, and no deviation explains it.
+    Unready,
     /// These deviations explain all that was compared, in words.
     Explained(Vec<String>),
 }
@@ -199,7 +201,9 @@ fn named<N: Note>(all: &Attempts<'_, N>, attempts: &[Attempted]) -> Named {
     let explaining = explaining.map(|(_, drive, own)| format!("{drive}: {}", N::words(own)));
     let explaining: Vec<_> = explaining.collect();
     let accused = unlike.iter().any(|(own, _)| own.accuses);
+    let unready = unlike.iter().all(|own| own.1.noted().was_unanswered);
     match explaining.len() {
+        0 if accused && unready => Named::Unready,
         1 => Named::Explained(explaining),
         _ if accused => Named::Explained(explaining),
         _ => Named::None,
@@ -349,6 +353,9 @@ pub fn qualified<N: Note>(
             .take(MOST_TOLD)
             .map(|own| format!("deviation: {own}\n"))
             .collect(),
+        Named::Unready => {
+            "deviations: not known; the drives did not become ready, and no known deviation explains it: the line, its adapter or the computer may be the cause\n".to_owned()
+        }
         Named::None if !contradictions.is_empty() => {
             "deviations: not known; the parts of the qualification show drives that differ\n"
                 .to_owned()
@@ -369,7 +376,7 @@ pub fn qualified<N: Note>(
     };
     let several = match &named {
         Named::Explained(all) => all.len(),
-        Named::None => 0,
+        Named::Unready | Named::None => 0,
     };
     if several > MOST_TOLD {
         let more = several - MOST_TOLD;
@@ -399,7 +406,7 @@ pub fn qualified<N: Note>(
         verdict: match named {
             _ if failed > 0 => Verdict::Failed,
             Named::Explained(all) if all.len() == 1 => Verdict::Failed,
-            Named::Explained(_) => Verdict::Inconclusive,
+            Named::Explained(_) | Named::Unready => Verdict::Inconclusive,
             Named::None if inconclusive > 0 || !whole || !contradictions.is_empty() => {
                 Verdict::Inconclusive
             }
@@ -567,6 +574,25 @@ mod tests {
         let expected = "deviations: not known; the parts of the qualification show drives that differ\n  drive 1, event-edges: they differ\n";
         assert!(own.0.starts_with(expected), "{}", own.0);
         assert_eq!(own.1, Inconclusive);
+    }
+
+    /// Drives that did not become ready are not said to differ: the line may be the cause.
+    #[test]
+    fn drives_that_do_not_become_ready_are_not_accused() {
+        let silent = |explain| {
+            let mut rows = rows(&[("a", Inconclusive, false, explain)]);
+            let noted = &mut rows[0].0;
+            (noted.accuses, noted.was_ready, noted.was_unanswered) = (true, false, true);
+            found(&[rows], &[])
+        };
+        let (text, verdict) = silent(&["three"]);
+        assert!(
+            text.starts_with("deviations: not known; the drives did not become ready"),
+            "{text}"
+        );
+        assert_eq!(verdict, Inconclusive);
+        let (text, _) = silent(&["one"]);
+        assert!(text.starts_with("deviation: drive 1: one\n"), "{text}");
     }
 
     /// A part of wrong drives and a part of right ones: no deviation explains both.
