@@ -36,6 +36,9 @@ const ECHO: Span = Span::from_millis(500);
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
+/// From this lateness on the bench was held up while it waited.
+const HELD_UP: Span = Span::from_millis(4);
+
 /// How long octets that an adapter or a computer has held up may keep coming behind the last one that was sent.
 const MOST_HELD_UP: Span = Span::from_millis(2_000);
 
@@ -468,7 +471,13 @@ impl<A: Accounting> Pump<A> {
             let came = self.listen(wake.since(now));
             let woken = time::Instant::now();
             self.late.woken(self.clock(wake), woken);
-            self.watched = if came { self.at(woken) } else { wake };
+            let woken = self.at(woken);
+            // Where it is woken behind the end of its wait, it has not watched all the time.
+            self.watched = match came {
+                true if woken > wake + HELD_UP => now,
+                true => woken,
+                false => wake,
+            };
         }
         self.look();
     }

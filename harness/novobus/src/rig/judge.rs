@@ -61,7 +61,10 @@ pub(crate) fn judge(outcome: &mut Outcome, facts: &AttemptFacts<'_>) -> Option<E
             Some(divergence),
             _,
         ) => assumed = diverged(outcome, divergence, facts),
-        (Verdict::Failed, None, untimely) => failed_alike(outcome, untimely, facts),
+        (Verdict::Failed, None, untimely) => {
+            let held_up = comparisons().find_map(|c| c.held_up.as_ref());
+            failed_alike(outcome, untimely.or(held_up), facts);
+        }
         (Verdict::Passed, None, Some(untimely)) => {
             outcome.verdict = Verdict::Marginal;
             outcome.remarks.push(format!("the model: {untimely}"));
@@ -212,13 +215,13 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, facts: &At
             "it passes on drives that have just been switched on: what was played before left these in another state; set the cell in the header, or permit resets in the rig's [limits]"
                 .to_owned(),
         );
-    } else if let Some(untimely) = untimely
+    } else if let Some(byte) = untimely
         && (finding.difference.as_ref()).is_none_or(ByteDifference::is_absence)
         && facts.exactness.tolerance > Span::ZERO
     {
         late(outcome);
         outcome.remarks.push(format!(
-            "every byte is as the model says, but the computer or the drive was late: {untimely}"
+            "every byte is as the model says, but the computer or the drive was late: {byte}"
         ));
     } else {
         outcome.remarks.push(

@@ -498,25 +498,31 @@ impl Comparer<'_> {
     ) {
         let unwatched = self.unwatched.iter().copied();
         let came = |own: &(Instant, Instant)| (own.0..=own.1).contains(&received.0);
-        let (earliest, latest) = unwatched
-            .rev()
-            .find(came)
-            .unwrap_or((received.0, received.0));
-        let apart = expected.0.since(latest).max(earliest.since(expected.0));
-        self.comparison.apart = self.comparison.apart + apart;
-        if apart > self.exactness.tolerance && self.comparison.untimely.is_none() {
-            self.comparison.untimely = Some(Divergence {
-                ring,
-                byte: index + 1,
-                what: Symptom::Time,
-                expected: Some(expected),
-                received: Some(received),
-                role,
-                rule: role.rule(),
-                step: step(),
-                drive: None,
-            });
+        let read = (received.0, received.0);
+        let (earliest, latest) = unwatched.rev().find(came).unwrap_or(read);
+        let apart = |(earliest, latest): (Instant, Instant)| {
+            expected.0.since(latest).max(earliest.since(expected.0))
+        };
+        let (times, read) = (apart((earliest, latest)), apart(read));
+        self.comparison.apart = self.comparison.apart + times;
+        if read <= self.exactness.tolerance {
+            return;
         }
+        let found = Divergence {
+            ring,
+            byte: index + 1,
+            what: Symptom::Time,
+            expected: Some(expected),
+            received: Some(received),
+            role,
+            rule: role.rule(),
+            step: step(),
+            drive: None,
+        };
+        if times > self.exactness.tolerance {
+            self.comparison.untimely.get_or_insert(found.clone());
+        }
+        self.comparison.held_up.get_or_insert(found);
     }
 }
 

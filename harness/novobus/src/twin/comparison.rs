@@ -241,6 +241,8 @@ pub(crate) struct Comparison {
     pub left_out: bool,
     /// The first byte that differs only in its time.
     pub untimely: Option<Divergence>,
+    /// The first byte that was read at another time than it was due, also where the bench had not looked for it in time.
+    pub held_up: Option<Divergence>,
     /// All differences of times together.
     pub apart: Span,
 }
