@@ -13,6 +13,9 @@ use std::hash::Hash;
 /// The most worlds at one time.
 pub(crate) const MOST_WORLDS: usize = 4_096;
 
+/// Within this number of scans of what a drive does by itself shorter ones may show something else.
+const SOON: i64 = 4;
+
 /// A right drive, by itself and on its own clock. It runs in scans: what reaches it within one of them has the same effect.
 pub trait RightDrive: Clone {
     /// A frame or a telegram.
@@ -125,6 +128,8 @@ struct World<M: RightDrive> {
     ahead: (i64, i64),
     /// How many of the pieces that were sent have reached it.
     heard: usize,
+    /// When it did something by itself for the last time.
+    stirred: i64,
     /// What it has said that has not come so far.
     said: VecDeque<Said<M::Piece>>,
     /// The places of the pieces that were lost or whose answers were, in what was sent.
@@ -197,7 +202,16 @@ impl<M: RightDrive> World<M> {
             return false;
         }
         self.ahead = (self.ahead.0.min(least), self.ahead.1.max(most));
+        self.stirred = self.stirred.max(other.stirred.saturating_sub(moved));
         true
+    }
+
+    /// Whether it does something by itself within a few scans, or moves.
+    fn stirs(&self) -> bool {
+        let near = units_of(M::SCAN) * SOON;
+        let due = self.model.due().map(units);
+        let soon = due.is_some_and(|own| own <= self.at + near);
+        soon || self.at <= self.stirred.saturating_add(near) || due.is_some() && !self.model.rests()
     }
 
     fn listen(&mut self) {
@@ -215,6 +229,9 @@ impl<M: RightDrive> World<M> {
         let drift = (to - self.at) / M::DRIFT;
         self.ahead = (self.ahead.0 - drift, self.ahead.1 + drift);
         self.at = to;
+        if self.model.due().is_some_and(|own| units(own) <= to) {
+            self.stirred = to;
+        }
         self.model.advance(instant(to));
         self.listen();
     }
@@ -281,10 +298,10 @@ pub fn judge_alive<M: RightDrive>(
     let mut first = None;
     for drive in drives {
         match lost(drive, talk, alive) {
-            Err(Judged::Wrong(place, expected)) => {
+            Err((Judged::Wrong(place, expected), _)) => {
                 first.get_or_insert(Judged::Wrong(place, expected));
             }
-            Err(other) => return other,
+            Err((other, _)) => return other,
             Ok(_) => return Judged::Right,
         }
     }
@@ -295,12 +312,12 @@ pub fn judge_alive<M: RightDrive>(
 /// explain it.
 ///
 /// # Errors
-/// What else is said of the conversation.
+/// What else is said of the conversation, and whether a world did something by itself then: within shorter scans it might have done other things.
 pub fn lost<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
     alive: &dyn Fn(),
-) -> Result<Vec<usize>, Judged<M::Piece>> {
+) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
     // When a piece has reached a drive seldom matters: a few worlds may explain what came.
     for heard in [
         Heard::AtOnce,
@@ -308,7 +325,7 @@ pub fn lost<M: RightDrive>(
         Heard::RepeatsBeforeItsStep,
     ] {
         match lost_in(model.clone(), talk, (heard, alive)) {
-            Err(Judged::Wrong(..) | Judged::TooMany) => {}
+            Err((Judged::Wrong(..) | Judged::TooMany, _)) => {}
             found => return found,
         }
     }
@@ -343,7 +360,7 @@ fn lost_in<M: RightDrive>(
     model: M,
     talk: &Dialogue<M::Piece>,
     (heard, alive): (Heard, &dyn Fn()),
-) -> Result<Vec<usize>, Judged<M::Piece>> {
+) -> Result<Vec<usize>, (Judged<M::Piece>, bool)> {
     let mut steps = 0;
     let mut worlds = Worlds::new();
     worlds.insert(World {
@@ -351,21 +368,23 @@ fn lost_in<M: RightDrive>(
         at: 0,
         ahead: (0, 0),
         heard: 0,
+        stirred: i64::MIN,
         said: VecDeque::new(),
         lost: Vec::new(),
     });
     for place in 0..=talk.came.len() {
         let mut explained = Worlds::new();
-        let mut expected = None;
+        let (mut expected, mut stirs) = (None, false);
         while let Some(world) = worlds.pop_first() {
             alive();
             if steps > talk.most_steps || worlds.all.len() + explained.all.len() > MOST_WORLDS {
-                return Err(Judged::TooMany);
+                return Err((Judged::TooMany, true));
             }
             let refuted = talk.refutes(&world, place);
             if !refuted && !world.model.knows() {
-                return Err(Judged::Unknown);
+                return Err((Judged::Unknown, true));
             }
+            stirs |= world.stirs();
             if let Some(said) = world.said.front() {
                 expected = Some(said.piece.clone());
             }
@@ -395,7 +414,7 @@ fn lost_in<M: RightDrive>(
             }
         }
         if explained.all.is_empty() {
-            return Err(Judged::Wrong(place, expected));
+            return Err((Judged::Wrong(place, expected), stirs));
         }
         worlds = explained;
     }

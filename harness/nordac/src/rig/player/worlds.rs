@@ -187,13 +187,13 @@ impl Talk {
         }
         let mut found = lost(line, &self.within(CYCLE - LONG), alive);
         // What a line has lost excuses, and need not be sought any closer.
-        if matches!(found, Err(Judged::Wrong(..))) && self.talk.most_lost == 0 {
+        if matches!(found, Err((Judged::Wrong(..), true))) && self.talk.most_lost == 0 {
             let line = Line::<SHORT>::new(slaves);
             found = lost(line, &self.within(CYCLE - SHORT), alive);
         }
         let (place, expected) = match found {
             Ok(lost) => return Ok(lost),
-            Err(Judged::Wrong(place, expected)) => (Some(place), expected),
+            Err((Judged::Wrong(place, expected), _)) => (Some(place), expected),
             Err(_) => (None, None),
         };
         let before = &came[..place.map_or(0, |own| came.len().min(own + 1))];
