@@ -106,7 +106,7 @@ pub(super) fn could_send(
     turns: &[Turn],
 ) -> Result<(), Differs> {
     let mut talk = Talk::new(rate, turns, 0);
-    talk.talk.most_steps = STEPS_OF_A_NAME;
+    (talk.talk.most_steps, talk.closely) = (STEPS_OF_A_NAME, false);
     talk.sent_by(slaves, &|| ()).map(|_| ())
 }
 
@@ -114,6 +114,8 @@ pub(super) fn could_send(
 struct Talk {
     /// Times without what the inverters do not keep.
     talk: Dialogue<Piece>,
+    /// Whether short scans are tried: what a line has lost excuses, and many deviations are tried for a name.
+    closely: bool,
     /// Behind which telegram each piece came.
     turns: Vec<usize>,
     /// When each telegram had left.
@@ -144,6 +146,7 @@ impl Talk {
                 loses_sent: true,
                 most_steps: STEPS,
             },
+            closely: most_lost == 0,
             turns: places,
             left: turns.iter().map(|own| own.left).collect(),
         }
@@ -186,8 +189,7 @@ impl Talk {
             return Ok(Vec::new());
         }
         let mut found = lost(line, &self.within(CYCLE - LONG), alive);
-        // What a line has lost excuses, and need not be sought any closer.
-        if matches!(found, Err((Judged::Wrong(..), true))) && self.talk.most_lost == 0 {
+        if matches!(found, Err((Judged::Wrong(..), true))) && self.closely {
             let line = Line::<SHORT>::new(slaves);
             found = lost(line, &self.within(CYCLE - SHORT), alive);
         }
