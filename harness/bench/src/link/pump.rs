@@ -36,8 +36,8 @@ const ECHO: Span = Span::from_millis(500);
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
-/// From this lateness on the bench was held up while it waited.
-const HELD_UP: Span = Span::from_millis(4);
+/// How long the bench does not look at its ports, or sleeps behind the end of its wait, before that counts.
+pub const HELD_UP: Span = Span::from_millis(4);
 
 /// How long octets that an adapter or a computer has held up may keep coming behind the last one that was sent.
 const MOST_HELD_UP: Span = Span::from_millis(2_000);

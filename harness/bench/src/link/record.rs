@@ -6,6 +6,7 @@
 //! Where time is real, a recorded link shows its state as of the last [`Look`], and each look is an event. The caller sees nothing that is
 //! not in the record, so that [`Replay`](super::Replay) repeats the conversation exactly, decisions that depend on time included.
 
+use super::pump::HELD_UP;
 use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
 use crate::medium::{Heard, Medium, Out, Pieces};
 use harness_proto::line::Received;
@@ -31,9 +32,6 @@ pub struct Look {
     /// Since when the bench had not looked, where that was long: what follows came between then and this look.
     pub since: Option<Instant>,
 }
-
-/// How long the bench does not look before that counts.
-const LONG: Span = Span::from_millis(4);
 
 /// Something that happened. Times are those of the conversation, but that of [`LinkEvent::Begin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -191,7 +189,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             busy: known.busy,
             lead: (lead != known.lead).then_some(lead),
             pause: known.pause,
-            since: since.filter(|own| known.now.since(*own) > LONG && !came.is_empty()),
+            since: since.filter(|own| known.now.since(*own) > HELD_UP && !came.is_empty()),
         };
         known.lead = lead;
         self.sink.take(&LinkEvent::Look(look));
