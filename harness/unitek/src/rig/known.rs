@@ -217,9 +217,8 @@ impl Known {
         words.iter().filter_map(with).collect()
     }
 
-    /// The drives that this one can be: each differs from what is assumed in one property that is not settled. With the words of the
-    /// difference.
-    pub(super) fn candidates(&self) -> Vec<(String, Properties)> {
+    /// The drives that this one can be: each differs from what is assumed in one property that is not settled.
+    pub(super) fn candidates(&self) -> Vec<Properties> {
         let mut all = Vec::new();
         let open = PROPERTIES
             .iter()
@@ -232,8 +231,7 @@ impl Known {
                 let mut other = self.properties;
                 let taken = property.set(&mut other, setting);
                 if taken && other != self.properties {
-                    let value = property.of_drive(&other);
-                    all.push((format!("{} = {value}", property.name), other));
+                    all.push(other);
                 }
             }
         }

@@ -59,6 +59,8 @@ pub(super) struct FrameNotes {
 pub(super) struct Exchange {
     /// What the clock of the link is behind that of the conversation; `None` before it begins.
     behind: Option<Span>,
+    /// How many frames had come when the clock of the link began again.
+    came_before: usize,
     /// What was sent, and when its last bit had left at the earliest.
     pub(super) sent: Vec<(Instant, Frame)>,
     /// What came: when it was on the bus by its stamp, and when it was read.
@@ -74,6 +76,7 @@ impl Exchange {
             self.behind
                 .map_or(Span::ZERO, |own| own + now.since_start()),
         );
+        self.came_before = self.came.len();
     }
 
     /// Whether a register was asked for last before the clock of the link began again: while the drives were made ready.
@@ -82,6 +85,11 @@ impl Exchange {
         let mut sent = self.sent.iter();
         let asks = |own: &&(Instant, Frame)| own.1.data().starts_with(&[READ, register]);
         sent.rfind(asks).is_some_and(|own| own.0 < began)
+    }
+
+    /// What came since the clock of the link began again.
+    pub(super) fn came_since_it_began(&self) -> impl Iterator<Item = &Frame> {
+        self.came.iter().skip(self.came_before).map(|came| &came.2)
     }
 
     /// Whether something came behind the last frame that was sent.

@@ -6,7 +6,7 @@
 use super::super::known::Known;
 use super::super::observed::Observed;
 use super::worlds::Told;
-use super::{Gone, Own, PHASES, Player};
+use super::{Gone, Own, Player};
 use crate::driver::{Driver, Error};
 use crate::gate::GuardsSegment as _;
 use crate::gate::guarded;
@@ -103,7 +103,7 @@ const MOVING: [u8; 15] = [
 
 /// Identifier, length and register of a frame, and its contents without what means nothing: the stuff byte, what follows a motor, and with
 /// `all` unset what a register that cannot be written reads, which may change by itself.
-fn meaning(frame: &Frame, all: bool) -> (String, String) {
+pub(super) fn meaning(frame: &Frame, all: bool) -> (String, String) {
     let (register, contents) = frame.data().split_at(frame.data().len().min(1));
     let changes = register.first().is_some_and(|own| {
         let read_only = Register::of(*own).access == Access::RO;
@@ -214,7 +214,7 @@ impl DriveNote {
                 heard.any(|heard| self.shows(other, &known, (Span::ZERO, heard)))
             }
             Other::Right => self.drives.iter().enumerate().any(|(place, own)| {
-                own.candidates().into_iter().any(|(_, properties)| {
+                own.candidates().into_iter().any(|properties| {
                     let mut all = known.clone();
                     all[place] = properties;
                     self.shows(other, &all, (Span::ZERO, 0))
@@ -294,10 +294,13 @@ impl Note for DriveNote {
     }
 }
 
-/// Where the clock of a drive may stand: every `each`th place.
-fn phases(each: usize) -> impl Iterator<Item = Span> {
-    let phases = std::iter::once(0).chain(PHASES.step_by(each));
-    phases.map(|own| Span::from_micros(own * 1_000 / 32))
+/// How far apart the places are at which the clock of a drive of 1 ms may stand when a scenario begins: cycles, ramps and events go by it.
+const PHASE: Span = Span::from_nanos(31_250);
+
+/// Where the clock of a drive may stand: every `each`th place, and the first one.
+pub(super) fn phases(each: usize) -> impl Iterator<Item = Span> {
+    let phases = std::iter::once(0).chain((1..32).step_by(each));
+    phases.map(|own| PHASE * own)
 }
 
 /// A drive as it is known; as delivered where nothing was read of it.

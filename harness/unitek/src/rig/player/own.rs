@@ -79,6 +79,19 @@ impl Own {
             || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
 
+    /// Whether something beside what the bench sends decides what a drive does: a fault of a frame, power, an input.
+    pub(super) fn acts_beside_the_bus(&self) -> bool {
+        let mut steps = self.plan.steps.iter();
+        steps.any(|step| {
+            matches!(
+                step.action,
+                PlannedAction::Own(
+                    Act::Frame(..) | Act::Harm(..) | Act::Outside(..) | Act::Restart(_)
+                )
+            )
+        })
+    }
+
     /// Whether right drives can be compared in all of it: how long homing takes is not known.
     pub(super) fn is_foretold(&self) -> bool {
         !self.frames().any(|frame| writes(frame, HOMING))

@@ -213,7 +213,7 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
         };
         let judged = |unlike: &[(u8, u8)]| {
             let shown = (unlike, known, Shown::Complete);
-            player.judged(&own, outcome.clone(), false, shown).verdict
+            player.judged(&own, outcome.clone(), shown).verdict
         };
         assert_eq!(judged(&[]), verdict, "{lines}");
         // What a drive reads differently at rest is not compared.
@@ -221,14 +221,20 @@ fn lines_that_worlds_compare_fail_no_right_drive() {
     }
 }
 
-/// What a drive sends does not follow from what the bench sent where a fault is put on a frame: a right drive passes by the lines.
+/// What a drive sends does not follow from what the bench sent where a fault is put on a frame: the attempt is played on right drives again.
 #[test]
-fn faults_on_frames_accuse_no_drive() {
-    let names = ["doubled", "lost", "corrupt", "late"].map(|own| format!("unitek-fault-{own}"));
-    for name in names {
-        let source = kept(&name);
-        let outcome = outcome(&mut bench(&[]), &source);
-        assert_eq!(outcome.verdict, Verdict::Passed, "{}", source.name);
+fn faults_on_frames_accuse_wrong_drives_alone() {
+    for fault in ["doubled", "lost", "corrupt", "late"] {
+        let source = kept(&format!("unitek-fault-{fault}"));
+        for right in ["reply-delay = 2ms", "map-reply = native"] {
+            let right = format!("drive 1 property {right}");
+            let outcome = outcome(&mut bench(&[&right]), &source);
+            assert_ne!(outcome.verdict, Verdict::Failed, "{fault}: {right}");
+        }
+        let passed = outcome(&mut bench(&[]), &source).verdict;
+        assert_eq!(passed, Verdict::Passed, "{fault}");
+        let wrong = outcome(&mut bench(&["drive 1 deviates answers-twice"]), &source);
+        assert_eq!(wrong.verdict, Verdict::Failed, "{fault}: {wrong:?}");
     }
 }
 

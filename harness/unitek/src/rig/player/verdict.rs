@@ -1,19 +1,19 @@
 //! The verdict of an attempt in which a line was not met, or right drives would have sent something else.
 
-use super::worlds::{STOOD_STILL, Shown};
-use super::{AtRest, Other, Own, PHASES, Player};
+use super::note::{meaning, phases};
+use super::worlds::{BESIDE_THE_BUS, STOOD_STILL, Shown, Told};
+use super::{AtRest, Other, Own, Player};
 use crate::judge::World;
 use harness_bench::scenario::problem::TextSpan;
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::run::outcome::Mismatch;
 use harness_bench::scenario::verdict::Verdict;
-use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::words::status;
 use std::collections::BTreeSet;
 
 /// Why a line that was not met accuses nothing.
-const RIGHT_ALL_THE_SAME: &str = "right drives with these registers send the same where frames are as late as these: the line is not met for that reason alone";
+const RIGHT_ALL_THE_SAME: &str = "right drives with these registers send the same, with frames as late as these and their clocks anywhere: the line is not met for that reason alone";
 
 /// In how many attempts at a scenario, one behind the other, an adapter may have lost a frame of the same register.
 const LOST_BY_THE_ADAPTER: usize = 2;
@@ -23,6 +23,10 @@ const LOST: &str = "an adapter may have lost it, and all else is what right driv
 
 /// Why a line that was not met accuses nothing, where right drives were compared.
 const NOT_COMPARED: &str = "right drives send the same as far as it is compared, and the contents of this line follow from the plant or from inputs";
+
+/// What no right drive does that the attempt is played on again.
+const NOT_REPLAYED: &str = "no right drive sends this: the attempt was played on right drives with each value of what the manual leaves open, and \
+                            their clocks at each place";
 
 /// Why a line is not judged while right drives could have sent what came.
 const UNDER_WAY: &str = "right drives could have sent this with another value of what the manual leaves open, or with frames that are still on their way";
@@ -43,13 +47,11 @@ impl Player {
         Shown::Lost(register, why)
     }
 
-    /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met: a line accuses the drive where time
-    /// is virtual and right drives were compared to the end.
+    /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met.
     pub(super) fn judged(
         &self,
         own: &Own,
         outcome: Outcome,
-        exact: bool,
         (unlike, foretold, shown): (&[(u8, u8)], &[usize], Shown),
     ) -> Outcome {
         let differs = |register| unlike.iter().any(|own| own.1 == register);
@@ -71,15 +73,9 @@ impl Player {
                 ..outcome
             },
             (Verdict::Failed, Shown::Complete) if judged_by_worlds => right_all_the_same(outcome),
-            (Verdict::Failed, Shown::Complete) if !exact => {
-                inconclusive(outcome, NOT_COMPARED.to_owned())
-            }
+            (Verdict::Failed, Shown::Complete) => inconclusive(outcome, NOT_COMPARED.to_owned()),
             (Verdict::Passed, Shown::Complete) => outcome.judged_by(&own.plan),
             (Verdict::Failed, Shown::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
-            (Verdict::Failed, Shown::Unknown(_)) if exact => match self.left_open(own, unlike) {
-                None => outcome,
-                Some(why) => inconclusive(outcome, why),
-            },
             (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
             (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || why == STOOD_STILL => {
                 inconclusive(outcome, not_to_its_end(why))
@@ -88,47 +84,33 @@ impl Player {
         }
     }
 
-    /// Why a correct drive in virtual time may not meet the scenario either: a register at rest, the place of its clock, or what the manual
-    /// leaves open.
-    fn left_open(&self, own: &Own, unlike: &[(u8, u8)]) -> Option<String> {
-        let asks_for = own.asks_for();
-        let mut unlike = unlike.iter();
-        if let Some((node, register)) = unlike.find(|own| asks_for.contains(&own.1)) {
-            return Some(format!(
-                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
-                 another firmware",
-                Register::of(*register).name
-            ));
-        }
-        let fails = |other: Other| {
-            let played = self.rehearse(own, &self.limits, other);
-            played.denied.is_some() || played.outcome.verdict != Verdict::Passed
+    /// What right drives show in virtual time where their frames alone do not tell it, as where faults are put on frames: the attempt is played
+    /// on each of them, wherever its clock stands and whatever the manual leaves open. The lines alone compare times.
+    pub(super) fn replayed(&self, own: &Own, told: &Told) -> Shown {
+        let came = told.talk.came_since_it_began();
+        let came: Vec<_> = came.map(|frame| meaning(frame, true)).collect();
+        let could_send = |other: &Other| {
+            let played = self.rehearse(own, &self.limits, *other).noted.exchange;
+            let sent = played.came_since_it_began();
+            sent.map(|frame| meaning(frame, true))
+                .eq(came.iter().cloned())
         };
-        let phases = PHASES.map(|own| Span::from_micros(own * 1_000 / 32));
-        let phases = phases.map(|phase| {
-            let words = format!("its clock of 1 ms ahead by {phase}");
-            let other = Other {
-                phase,
-                ..Other::default()
-            };
-            (words, other)
+        let phases = phases(1).map(|phase| Other {
+            phase,
+            ..Other::default()
         });
         let drives = self.known().iter().enumerate();
         let values = drives.flat_map(|(place, known)| {
-            let each = known.candidates().into_iter();
-            each.map(move |(words, properties)| {
-                let drive = Some((place, properties));
-                let other = Other {
-                    drive,
-                    ..Other::default()
-                };
-                (words, other)
+            known.candidates().into_iter().map(move |properties| Other {
+                drive: Some((place, properties)),
+                ..Other::default()
             })
         });
-        let found = phases.chain(values).find(|own| fails(own.1));
-        found.map(|(words, _)| {
-            format!("a correct drive with {words} does not meet it either, and this is not known")
-        })
+        match phases.chain(values).any(|own| could_send(&own)) {
+            true => Shown::Right,
+            false if told.unlike.is_empty() => Shown::Wrong(NOT_REPLAYED.to_owned()),
+            false => Shown::Unknown(BESIDE_THE_BUS),
+        }
     }
 }
 

@@ -117,7 +117,8 @@ const OTHER_IDENTIFIERS: &str = "two drives may have sent it";
 const NOT_AT_REST: &str = "the drive did not stand, or had the error of a time-out, before it";
 const CHANGED_INPUTS: &str = "an input has changed, or what an input is blamed for";
 const NOT_FORETOLD: &str = "what a right drive does here does not follow from what is known of it";
-pub(super) const BY_LINES: &str = "time is virtual, and its lines compare it";
+pub(super) const BESIDE_THE_BUS: &str =
+    "it puts faults on frames, or acts on drives beside the bus";
 const TOO_MANY: &str = "it has more worlds than are kept";
 pub(super) const STOOD_STILL: &str = "nothing came for a quarter of a second or more: an adapter, the computer or the drive stood still";
 
@@ -179,7 +180,7 @@ impl Player {
             }
         }
         let right = self.world((known, known.properties), &unlike, told);
-        let others = known.candidates().into_iter().map(|own| own.1);
+        let others = known.candidates().into_iter();
         let others = others.filter(|own| {
             self.beats.beat();
             let other = self.world((known, *own), &unlike, told);
