@@ -1,7 +1,7 @@
 //! What an attempt on rings has beside its outcome: how it compares with the twin, and what that says of the drives.
 
 use super::driven::Driven;
-use super::left_open::Explanation;
+use super::explanation::Explanation;
 use crate::language::syntax::Header;
 use crate::twin::{Comparison, Conversation, Divergence};
 use harness_bench::rig::{Attempt, PlayedScenario};

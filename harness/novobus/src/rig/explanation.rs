@@ -1,6 +1,6 @@
-//! What the manual leaves open, as an explanation of bytes that differ from the model with its defaults.
+//! Which values of what the manual leaves open explain every byte that came.
 //!
-//! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
+//! A drive may have any value of an open property: right drives with these values have sent just this.
 
 use super::judge::{AttemptFacts, known};
 use super::sim;
@@ -33,7 +33,7 @@ pub(crate) struct Explanation {
 }
 
 /// The choices that explain every byte of an attempt; `None` where the model's defaults explain them as well, or where no choice does.
-pub(crate) fn explanation(facts: &AttemptFacts<'_>) -> Option<Explanation> {
+pub(crate) fn of(facts: &AttemptFacts<'_>) -> Option<Explanation> {
     let real = facts.exactness.tolerance > Span::ZERO && !facts.exactness.knows_cells;
     if !real {
         return None;

@@ -1,6 +1,6 @@
 //! The verdict of an attempt, compared with its twin.
 
-use super::left_open::{self, Explanation};
+use super::explanation::{self, Explanation};
 use super::sim;
 use crate::language::plan::Plan;
 use crate::language::syntax::{DriveRange, Header, Setup};
@@ -119,7 +119,7 @@ fn diverged(
             }
             outcome.remarks.push(told(entry));
         }
-        None => match left_open::explanation(facts) {
+        None => match explanation::of(facts) {
             Some(found) if found.comparisons.iter().any(|own| own.silenced) => {
                 late(outcome);
                 outcome.remarks.push(format!(
