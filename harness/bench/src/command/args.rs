@@ -1,8 +1,11 @@
 //! Options that several commands have.
 
+use super::exit::Exit;
+use super::output::Output;
 use crate::bus_name::BusName;
 use crate::file::values::{Time, ValueError};
 use clap::{Args, ValueEnum};
+use std::io;
 use std::time::Duration;
 
 /// For `cells`.
@@ -16,6 +19,41 @@ pub struct CellsArguments {
     /// The bus: novobus for the cells of an ND21, unitek for the registers of a UNITEK drive.
     #[arg(long, value_enum, default_value_t = BusName::DEFAULT)]
     pub bus: BusName,
+}
+
+impl CellsArguments {
+    /// Shows the lines that have the filter in them, each about a `cell`. `kept` says what the EEPROM keeps if it has no cells of its own.
+    ///
+    /// # Errors
+    /// Standard output cannot be written to.
+    pub fn show(
+        &self,
+        lines: impl Iterator<Item = String>,
+        (cell, kept): (&str, Option<&str>),
+        output: &mut Output,
+    ) -> io::Result<Exit> {
+        if let Some(kept) = kept.filter(|_| self.eeprom) {
+            output.complain(&format!("--eeprom is for the bus novobus; {kept}"));
+            return Ok(Exit::Usage);
+        }
+        let filter = self.filter.as_deref().unwrap_or_default().to_lowercase();
+        let lines = lines.map(|line| format!("{}\n", line.trim_end()));
+        let wanted: String = lines
+            .filter(|line| line.to_lowercase().contains(&filter))
+            .collect();
+        if wanted.is_empty() {
+            let bus = match self.bus {
+                BusName::DEFAULT => String::new(),
+                bus => format!(" --bus {}", bus.name()),
+            };
+            output.complain(&format!(
+                "no {cell} has this text in it; `drivebench cells{bus}` shows all of them"
+            ));
+            return Ok(Exit::NothingSelected);
+        }
+        output.result(&output.fitted(&wanted))?;
+        Ok(Exit::Passed)
+    }
 }
 
 /// For `deviations`.

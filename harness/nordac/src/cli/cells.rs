@@ -9,24 +9,9 @@ use harness_proto::nordac::{PARAMETERS, Parameter};
 
 /// Shows the parameters that have the filter in their number, name, unit or section.
 pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
-    if arguments.eeprom {
-        output.complain("--eeprom is for the bus novobus; a NORDAC inverter keeps every parameter that can be written in its EEPROM");
-        return Ok(Exit::Usage);
-    }
-    let filter = arguments.filter.as_deref().unwrap_or_default();
-    let filter = filter.to_lowercase();
+    let kept = "a NORDAC inverter keeps every parameter that can be written in its EEPROM";
     let lines = PARAMETERS.iter().map(line);
-    let wanted: String = lines
-        .filter(|line| line.to_lowercase().contains(&filter))
-        .collect();
-    if wanted.is_empty() {
-        output.complain(
-            "no parameter has this text in it; `drivebench cells --bus nordac` shows all of them",
-        );
-        return Ok(Exit::NothingSelected);
-    }
-    output.result(&output.fitted(&wanted))?;
-    Ok(Exit::Passed)
+    arguments.show(lines, ("parameter", Some(kept)), output)
 }
 
 /// The numbers of all parameters, and the words of a reply: names with spaces need quotes, which a shell does not add.
@@ -66,5 +51,5 @@ fn line(own: &Parameter) -> String {
         (false, true) => line.push_str(&format!("; sets {}.1 to {}.4", own.number, own.number)),
         _ => {}
     }
-    line + "\n"
+    line
 }

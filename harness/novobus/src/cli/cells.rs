@@ -15,26 +15,13 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
 
 /// Shows the cells.
 pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let filter = arguments
-        .filter
-        .as_deref()
-        .unwrap_or_default()
-        .to_lowercase();
     let (table, digits) = if arguments.eeprom {
         (EEPROM, 2)
     } else {
         (RAM, 4)
     };
     let lines = table.iter().map(|cell| line(cell, digits));
-    let wanted: String = lines
-        .filter(|line| line.to_lowercase().contains(&filter))
-        .collect();
-    if wanted.is_empty() {
-        output.complain("no cell has this text in it; `drivebench cells` shows all of them");
-        return Ok(Exit::NothingSelected);
-    }
-    output.result(&output.fitted(&wanted))?;
-    Ok(Exit::Passed)
+    arguments.show(lines, ("cell", None), output)
 }
 
 /// Address, size, access, name, unit, section, meaning; `R` and the mask of the bits that are read only.
@@ -46,9 +33,8 @@ fn line(cell: &Cell, digits: usize) -> String {
         (Access::Write, mask) => format!("write R{mask:02X}"),
     };
     let unit = cell.scale.map_or("", |scale| scale.unit());
-    let line = format!(
+    format!(
         "{:0digits$X} {:>3} {access:9} {:16} {unit:17} {:9} {}",
         cell.address, cell.size, cell.printed, cell.section, cell.english
-    );
-    format!("{}\n", line.trim_end())
+    )
 }

@@ -13,26 +13,9 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
 
 /// Shows the registers that have the filter in their name, number or meaning.
 pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
-    if arguments.eeprom {
-        output.complain(
-            "--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM",
-        );
-        return Ok(Exit::Usage);
-    }
-    let filter = arguments.filter.as_deref().unwrap_or_default();
-    let filter = filter.to_lowercase();
+    let kept = "a UNITEK drive keeps its RW registers in its EEPROM";
     let lines = REGISTERS.iter().map(line);
-    let wanted: String = lines
-        .filter(|line| line.to_lowercase().contains(&filter))
-        .collect();
-    if wanted.is_empty() {
-        output.complain(
-            "no register has this text in it; `drivebench cells --bus unitek` shows all of them",
-        );
-        return Ok(Exit::NothingSelected);
-    }
-    output.result(&output.fitted(&wanted))?;
-    Ok(Exit::Passed)
+    arguments.show(lines, ("register", Some(kept)), output)
 }
 
 /// Number, access, bits and sign, name, unit, origin, label, meaning and other spellings.
@@ -47,7 +30,7 @@ fn line(register: &Register) -> String {
         true => String::new(),
         false => format!(" (also {})", aliases.join(", ")),
     };
-    let line = format!(
+    format!(
         "{:02X} {} {:>2}{sign} {:16} {unit:5} {:10} {} {}{aliases}",
         register.number,
         register.access,
@@ -56,6 +39,5 @@ fn line(register: &Register) -> String {
         register.origin,
         register.label,
         register.meaning
-    );
-    format!("{}\n", line.trim_end())
+    )
 }
