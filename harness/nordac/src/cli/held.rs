@@ -1,15 +1,17 @@
-//! Drives of a port that a session holds.
+//! The drives of a port, as the commands of all buses and a session use them.
 
-use crate::rig::Inverters;
-use crate::rig::Player;
+use super::bench::driver;
+use super::read::{Found, find};
+use crate::rig::{Inverters, Player, Session};
+use crate::value::{Cell, cells};
 use harness_bench::command::drive::DriveCommand;
+use harness_bench::command::drives::CommandDrives;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::held::HeldDrives;
 use harness_bench::command::output::Output;
 use harness_bench::command::port_bench::PortBench;
 use harness_bench::link::Line;
-use harness_bench::rig::port_session::PortSession;
 use harness_proto::time::Span;
 
 impl HeldDrives for Inverters {
@@ -25,8 +27,8 @@ impl HeldDrives for Inverters {
         super::drive(bench, command, output)
     }
 
-    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure> {
-        let mut driver = super::bench::driver(session);
+    fn pass(session: &mut Session, time: Span) -> Result<(), Failure> {
+        let mut driver = driver(session);
         if driver.slaves().next().is_some() {
             return Ok(driver.run(time)?);
         }
@@ -42,5 +44,24 @@ impl HeldDrives for Inverters {
             .parked
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner) = None;
+    }
+}
+
+impl CommandDrives for Inverters {
+    type Cell = Cell;
+    type Reading = Found;
+
+    fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
+        cells(texts)
+    }
+
+    fn read(session: &mut Session, slaves: &[u8], cells: &[Cell]) -> Result<Vec<Found>, Failure> {
+        let mut driver = driver(session);
+        let mut found = Vec::new();
+        for slave in slaves {
+            driver.join(*slave)?;
+            found.extend(find(&mut driver, *slave, cells)?);
+        }
+        Ok(found)
     }
 }

@@ -9,7 +9,6 @@ mod info;
 mod params;
 mod read;
 pub(crate) mod sim;
-mod watch;
 mod write;
 
 pub(super) use bench::Parked;
@@ -20,6 +19,7 @@ use crate::rig::Inverters;
 use control::Stop;
 use harness_bench::command::cyclic::CyclicCommand;
 use harness_bench::command::drive::{DriveCommand, ParamsCommand};
+use harness_bench::command::drives::{read, watch};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
@@ -41,10 +41,10 @@ pub(crate) fn drive(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     match command {
-        DriveCommand::Read(own) => read::read(bench, own, output),
+        DriveCommand::Read(own) => read(bench, own, output),
         DriveCommand::Write(own) => write::write(bench, own, output),
         DriveCommand::Info(own) => info::info(bench, own, output),
-        DriveCommand::Watch(own) => watch::watch(bench, own, output),
+        DriveCommand::Watch(own) => watch(bench, own, output),
         DriveCommand::Top(own) => info::top(bench, own, output),
         DriveCommand::Params(ParamsCommand::Save(own)) => params::save(bench, own, output),
         DriveCommand::Params(ParamsCommand::Diff(own)) => params::diff(bench, own, output),

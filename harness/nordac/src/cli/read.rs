@@ -1,23 +1,15 @@
-//! `drivebench read` on NORDAC inverters: process words and parameters, with their units.
+//! What is read of NORDAC inverters: process words and parameters, with their units.
 
-use super::bench::driver;
 use crate::driver::{Driver, Error, percent};
-use crate::rig::Inverters;
-use crate::value::{Cell, ReplyWord, cells, shown};
-use harness_bench::command::drive::{OutputForm, ReadArguments};
-use harness_bench::command::exit::Exit;
-use harness_bench::command::failure::Failure;
-use harness_bench::command::output::Output;
-use harness_bench::command::output::columns;
-use harness_bench::command::port_bench::{PortBench, on, select};
-use harness_bench::command::rig_name::Use;
-use harness_bench::command::watch::{HEX, decimal};
+use crate::value::{Cell, ReplyWord, shown};
+use harness_bench::command::reading::CellReading;
+use harness_bench::command::watch::{HEX, WatchedCell, decimal};
 use harness_proto::nordac::PkwError;
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// What was read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(crate) struct Found {
     pub(super) slave: u8,
     pub(super) cell: Cell,
     /// A word, or a number in steps of the parameter's unit.
@@ -26,7 +18,7 @@ pub(super) struct Found {
 
 impl Found {
     /// The digits as they travel.
-    pub(super) fn raw(&self) -> String {
+    fn raw(&self) -> String {
         match self.cell {
             Cell::Word(_) => format!("{:04X}", self.word()),
             Cell::Parameter(_) => self.number.to_string(),
@@ -38,7 +30,7 @@ impl Found {
     }
 
     /// Its value without its unit, and the unit.
-    pub(super) fn digits(&self) -> (String, &'static str) {
+    fn digits(&self) -> (String, &'static str) {
         match self.cell {
             Cell::Word(ReplyWord::Actual) => (decimal(percent(self.word())), "%"),
             Cell::Word(_) => (self.raw(), HEX),
@@ -58,33 +50,6 @@ impl Found {
             Cell::Parameter(own) => shown(&own, self.number),
         }
     }
-}
-
-/// Reads cells and shows them.
-pub(super) fn read(
-    bench: PortBench<'_, Inverters>,
-    arguments: &ReadArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let cells = cells(&arguments.cells).map_err(Failure::refused)?;
-    let as_what = Use::look("read");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
-        let mut driver = driver(session);
-        let mut found = Vec::new();
-        for slave in slaves {
-            driver.join(slave)?;
-            found.extend(find(&mut driver, slave, &cells)?);
-        }
-        match arguments.format {
-            OutputForm::Text => output.result(&output.fitted(&table(&found)))?,
-            OutputForm::Json => {
-                let cells: Vec<_> = found.iter().map(object).collect();
-                output.result(&format!("{}\n", json!({"schema": 1, "cells": cells})))?;
-            }
-        }
-        Ok(Exit::Passed)
-    })
 }
 
 /// Reads cells of a slave. Of many, those that need the PosiCon option are left out where it is not there, and so are double words where the
@@ -119,40 +84,55 @@ pub(super) fn find(
     Ok(found)
 }
 
-/// Slave, number, name, raw, value and section of the manual.
-fn table(found: &[Found]) -> String {
-    let row = |found: &Found| {
-        let (number, name, section) = match found.cell {
+impl CellReading for Found {
+    const COLUMNS: &'static [&'static str] = &["slave", "PNU", "name", "raw", "value", "section"];
+    const LIST: &'static str = "cells";
+
+    fn row(&self) -> Vec<String> {
+        let (number, name, section) = match self.cell {
             Cell::Word(word) => (word.name().to_owned(), "", "3.2"),
             Cell::Parameter(own) => (own.to_string(), own.parameter.name, own.parameter.section),
         };
-        [
-            found.slave.to_string(),
+        vec![
+            self.slave.to_string(),
             number,
             name.to_owned(),
-            found.raw(),
-            found.words(),
+            self.raw(),
+            self.words(),
             section.to_owned(),
         ]
-    };
-    let heading = ["slave", "PNU", "name", "raw", "value", "section"];
-    columns(&heading, &found.iter().map(row).collect::<Vec<_>>())
-}
+    }
 
-fn object(found: &Found) -> serde_json::Value {
-    let mut object = json!({
-        "slave": found.slave,
-        "raw": found.number,
-        "value": found.words(),
-    });
-    match found.cell {
-        Cell::Word(word) => object["word"] = json!(word.name()),
-        Cell::Parameter(own) => {
-            object["parameter"] = json!(own.to_string());
-            object["name"] = json!(own.parameter.name);
-            object["unit"] = json!(own.parameter.unit_of(own.index.element).name);
-            object["section"] = json!(own.parameter.section);
+    fn object(&self) -> Value {
+        let mut object = json!({
+            "slave": self.slave,
+            "raw": self.number,
+            "value": self.words(),
+        });
+        match self.cell {
+            Cell::Word(word) => object["word"] = json!(word.name()),
+            Cell::Parameter(own) => {
+                object["parameter"] = json!(own.to_string());
+                object["name"] = json!(own.parameter.name);
+                object["unit"] = json!(own.parameter.unit_of(own.index.element).name);
+                object["section"] = json!(own.parameter.section);
+            }
+        }
+        object
+    }
+
+    fn watched(&self) -> WatchedCell {
+        let words = self.words();
+        let (digits, unit) = self.digits();
+        WatchedCell {
+            drive: self.slave.to_string(),
+            name: self.cell.name(),
+            words: match words.is_empty() {
+                true => self.raw(),
+                false => words,
+            },
+            digits,
+            unit,
         }
     }
-    object
 }

@@ -3,14 +3,15 @@
 use super::axes;
 use super::rig::{self, OpenBench};
 use crate::driver::Axis;
-use crate::driver::cell::{CellFound, find};
+use crate::driver::cell::find;
 use crate::language::argument::{MemoryRange, cells};
 use harness_bench::command::drive::WatchArguments;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::output::Output;
+use harness_bench::command::reading::CellReading as _;
 use harness_bench::command::rig_name::Use;
-use harness_bench::command::watch::{HEX, WatchBench, WatchedCell, watch as show};
+use harness_bench::command::watch::{WatchBench, WatchedCell, watch as show};
 use harness_bench::counted::counted;
 use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::{Instant, Span};
@@ -61,7 +62,7 @@ impl WatchBench for WatchedCells<'_> {
         let mut found = Vec::new();
         for drive in self.drives {
             for cell in self.cells {
-                found.push(watched_cell(&find(&self.bench.bus, *drive, cell)?));
+                found.push(find(&self.bench.bus, *drive, cell)?.watched());
             }
         }
         self.bench.bus.keep();
@@ -71,27 +72,5 @@ impl WatchBench for WatchedCells<'_> {
     fn run(&mut self, time: Span) -> Result<(), Failure> {
         self.bench.bus.run(time);
         Ok(())
-    }
-}
-
-fn watched_cell(found: &CellFound<'_>) -> WatchedCell {
-    let words = found.words();
-    let (digits, unit) = match found.location.scale {
-        None => (found.raw(), HEX),
-        Some(scale) => {
-            let digits = match found.number() {
-                serde_json::Value::Null => String::new(),
-                serde_json::Value::String(text) => text,
-                number => number.to_string(),
-            };
-            (digits, scale.unit())
-        }
-    };
-    WatchedCell {
-        drive: found.axis.to_string(),
-        name: found.location.name().to_string(),
-        words: if words.is_empty() { found.raw() } else { words },
-        digits,
-        unit,
     }
 }

@@ -1,16 +1,19 @@
-//! Drives of a port that a session holds.
+//! The drives of a port, as the commands of all buses and a session use them.
 
-use crate::rig::OfUnitek as _;
-use crate::rig::Player;
-use crate::rig::UnitekDrives;
+use super::bench::scaling;
+use super::read::Found;
+use crate::rig::{Axis, OfUnitek as _, Player, Session, UnitekDrives};
+use crate::value::registers;
 use harness_bench::command::drive::DriveCommand;
+use harness_bench::command::drives::CommandDrives;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::held::HeldDrives;
 use harness_bench::command::output::Output;
 use harness_bench::command::port_bench::PortBench;
-use harness_bench::rig::port_session::PortSession;
 use harness_proto::time::Span;
+use harness_proto::unitek::Register;
+use harness_proto::unitek::units::{Scaling, usual};
 
 impl HeldDrives for UnitekDrives {
     const SPEED: &'static str = "SPEED_ACTUAL";
@@ -25,7 +28,40 @@ impl HeldDrives for UnitekDrives {
         super::drive(bench, command, output)
     }
 
-    fn pass(session: &mut PortSession<Self>, time: Span) -> Result<(), Failure> {
+    fn pass(session: &mut Session, time: Span) -> Result<(), Failure> {
         Ok(session.driver().run(time)?)
+    }
+}
+
+impl CommandDrives for UnitekDrives {
+    type Cell = &'static Register;
+    type Reading = Found;
+
+    fn cells(texts: &[String]) -> Result<Vec<Self::Cell>, String> {
+        registers(texts)
+    }
+
+    fn read(
+        session: &mut Session,
+        drives: &[Axis],
+        registers: &[Self::Cell],
+    ) -> Result<Vec<Found>, Failure> {
+        let mut driver = session.driver();
+        let mut found = Vec::new();
+        for &axis in drives {
+            let scaling = match registers.iter().any(|own| usual(own.unit).is_some()) {
+                true => scaling(&mut driver, axis)?,
+                false => Scaling::default(),
+            };
+            for register in registers {
+                let reply = driver.read(axis, register.number)?;
+                found.push(Found {
+                    axis,
+                    reply,
+                    scaling,
+                });
+            }
+        }
+        Ok(found)
     }
 }

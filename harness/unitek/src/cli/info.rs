@@ -1,13 +1,14 @@
 //! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
 
 use super::control::how;
-use super::read::{Found, find};
+use super::read::Found;
 use crate::live;
 use crate::rig::OfUnitek as _;
 use crate::rig::UnitekDrives;
 use crate::value::hex;
 use harness_bench::capture::Piece;
 use harness_bench::command::drive::{InfoArguments, OutputForm, TopArguments};
+use harness_bench::command::drives::CommandDrives as _;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::line_top::LineTop;
@@ -77,7 +78,7 @@ pub(super) fn info(
         |session, output| {
             let drives = select(std::slice::from_ref(&arguments.drives), session)?;
             let registers = SHOWN.map(|(_, register)| Register::of(register));
-            let found = find(session, &drives, &registers)?;
+            let found = UnitekDrives::read(session, &drives, &registers)?;
             let drives: Vec<_> = found.chunks_exact(SHOWN.len()).collect();
             match arguments.format {
                 OutputForm::Text => output.result(&output.fitted(&text(&drives)))?,
@@ -109,7 +110,9 @@ pub(super) fn top(
             form: &FORM,
             traffic: &["from", "frames", "frames/s", "damaged"],
             picture: live::picture("bench", names),
-            read: &mut |session, drive| Ok(row(&find(session, &[drive], &registers)?)),
+            read: &mut |session, drive| {
+                Ok(row(&UnitekDrives::read(session, &[drive], &registers)?))
+            },
             stop: &mut |session, drive| Ok(how(session.driver().stop(drive)?).to_owned()),
             rows: &mut |heard| {
                 let row = |piece: &Piece| match piece {

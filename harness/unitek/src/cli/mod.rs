@@ -11,7 +11,6 @@ mod params;
 mod position;
 mod read;
 pub(crate) mod sim;
-mod watch;
 mod write;
 
 pub(crate) use check::check;
@@ -19,6 +18,7 @@ pub(crate) use check::check;
 use super::driver;
 use crate::rig::UnitekDrives;
 use harness_bench::command::drive::{DriveCommand, ParamsCommand};
+use harness_bench::command::drives::{read, watch};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
@@ -34,10 +34,10 @@ pub(crate) fn drive(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     match command {
-        DriveCommand::Read(arguments) => read::read(bench, arguments, output),
+        DriveCommand::Read(arguments) => read(bench, arguments, output),
         DriveCommand::Write(arguments) => write::write(bench, arguments, output),
         DriveCommand::Info(arguments) => info::info(bench, arguments, output),
-        DriveCommand::Watch(arguments) => watch::watch(bench, arguments, output),
+        DriveCommand::Watch(arguments) => watch(bench, arguments, output),
         DriveCommand::Params(ParamsCommand::Save(arguments)) => {
             params::save(bench, arguments, output)
         }

@@ -6,13 +6,14 @@
 //! 0xC8 = "0E10"     # SPEED_RPMMAX  3600 rpm
 //! ```
 
-use super::read::{Found, find};
+use super::read::Found;
 use super::write::{Order, refuse_denied};
 use crate::rig::OfUnitek as _;
 use crate::rig::{Axis, Session, UnitekDrives};
 use crate::value::{hex, is_parameter, register};
 use harness_bench::command::axes::Axes;
 use harness_bench::command::drive::{LoadArguments, ParamsArguments};
+use harness_bench::command::drives::CommandDrives as _;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::file;
@@ -149,7 +150,7 @@ pub(super) fn load(
 fn parameters(session: &mut Session, drive: &Axes) -> Result<(Axis, Vec<Found>), Failure> {
     let axis = single(drive, session)?;
     let all: Vec<_> = REGISTERS.iter().filter(|own| is_parameter(own)).collect();
-    Ok((axis, find(session, &[axis], &all)?))
+    Ok((axis, UnitekDrives::read(session, &[axis], &all)?))
 }
 
 fn text(axis: Axis, found: &[Found]) -> String {
