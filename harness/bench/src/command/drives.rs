@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::failure::Failure;
 use super::held::HeldDrives;
 use super::output::Output;
+use super::params::ParameterFile;
 use super::port_bench::{PortBench, on, select};
 use super::reading::{CellReading, show};
 use super::rig_name::Use;
@@ -19,6 +20,10 @@ pub trait CommandDrives: HeldDrives {
     /// What is read of a drive: a register or a parameter.
     type Cell;
     type Reading: CellReading;
+    /// A value that a file has for a drive.
+    type Parameter;
+
+    const PARAMETERS: ParameterFile<Self, Self::Parameter>;
 
     /// What a command line names, each cell once.
     ///

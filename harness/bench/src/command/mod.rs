@@ -16,6 +16,7 @@ pub mod held;
 pub mod line_top;
 pub mod output;
 pub mod page;
+pub mod params;
 pub mod port_bench;
 pub mod progress;
 pub mod reading;

@@ -1,15 +1,17 @@
 //! The drives of a port, as the commands of all buses and a session use them.
 
 use super::bench::driver;
+use super::params::PARAMETERS;
 use super::read::{Found, find};
 use crate::rig::{Inverters, Player, Session};
-use crate::value::{Cell, cells};
+use crate::value::{Assignment, Cell, cells};
 use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::drives::CommandDrives;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::held::HeldDrives;
 use harness_bench::command::output::Output;
+use harness_bench::command::params::ParameterFile;
 use harness_bench::command::port_bench::PortBench;
 use harness_bench::link::Line;
 use harness_proto::time::Span;
@@ -50,6 +52,9 @@ impl HeldDrives for Inverters {
 impl CommandDrives for Inverters {
     type Cell = Cell;
     type Reading = Found;
+    type Parameter = Assignment;
+
+    const PARAMETERS: ParameterFile<Self, Assignment> = PARAMETERS;
 
     fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
         cells(texts)

@@ -18,11 +18,12 @@ use super::driver;
 use crate::rig::Inverters;
 use control::Stop;
 use harness_bench::command::cyclic::CyclicCommand;
-use harness_bench::command::drive::{DriveCommand, ParamsCommand};
+use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::drives::{read, watch};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
+use harness_bench::command::params::params;
 use harness_bench::command::port_bench::PortBench;
 
 /// The calls that stop motors, with their names on the command line.
@@ -46,9 +47,7 @@ pub(crate) fn drive(
         DriveCommand::Info(own) => info::info(bench, own, output),
         DriveCommand::Watch(own) => watch(bench, own, output),
         DriveCommand::Top(own) => info::top(bench, own, output),
-        DriveCommand::Params(ParamsCommand::Save(own)) => params::save(bench, own, output),
-        DriveCommand::Params(ParamsCommand::Diff(own)) => params::diff(bench, own, output),
-        DriveCommand::Params(ParamsCommand::Load(own)) => params::load(bench, own, output),
+        DriveCommand::Params(command) => params(bench, command, output),
         DriveCommand::Stop(own) => control::stop(bench, STOP, own, output),
         DriveCommand::Block(own) => control::stop(bench, BLOCK, own, output),
         DriveCommand::Cyclic(CyclicCommand::Start(own)) => control::start(bench, own, output),

@@ -6,28 +6,17 @@
 //! ```
 
 use super::bench::driver;
-use super::read::{Found, find};
+use super::read::Found;
 use super::write::refuse_denied;
 use crate::driver::{Driver, Error};
-use crate::rig::Inverters;
+use crate::rig::{Inverters, Session};
 use crate::value::{Assignment, Cell, every, parameter, shown};
-use harness_bench::command::drive::{LoadArguments, ParamsArguments};
-use harness_bench::command::exit::Exit;
+use harness_bench::command::drives::CommandDrives as _;
 use harness_bench::command::failure::Failure;
-use harness_bench::command::file;
-use harness_bench::command::output::Output;
-use harness_bench::command::port_bench::{PortBench, on, single};
-use harness_bench::command::rig_name::Use;
-use harness_bench::counted::counted;
-use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
-use harness_bench::scenario::source::Source;
+use harness_bench::command::params::{EntryMistake, ParameterFile};
 use harness_proto::nordac::parameter::Flag;
-use harness_proto::nordac::{Parameter, PkwError};
-use std::path::Path;
-use toml::de::{DeTable, DeValue};
-
-/// The table with the parameters.
-const TABLE: &str = "nordac";
+use harness_proto::nordac::{Parameter, ParameterRef, PkwError};
+use toml::de::DeValue;
 
 /// What does something and keeps nothing (970, 971, 1602), and the password: not in a file.
 const NOT_KEPT: [u16; 5] = [970, 971, 1602, 1603, 1604];
@@ -41,94 +30,29 @@ fn is_kept(own: &Parameter) -> bool {
     !own.has(Flag::ReadOnly) && !NOT_KEPT.contains(&own.number)
 }
 
-/// Writes the parameters of a slave into a file.
-pub(super) fn save(
-    bench: PortBench<'_, Inverters>,
-    arguments: &ParamsArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let as_what = Use::look("params save");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slave = single(&arguments.drive, session)?;
-        let found = parameters(&mut driver(session), slave)?;
-        file::write(&arguments.file, &text(slave, &found))?;
-        let path = arguments.file.display();
-        let count = counted(found.len(), "parameter");
-        output.say(&format!("{count} of slave {slave} in {path}\n"));
-        Ok(Exit::Passed)
-    })
-}
-
-/// Compares a slave with a file.
-pub(super) fn diff(
-    bench: PortBench<'_, Inverters>,
-    arguments: &ParamsArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let wanted = read_file(&arguments.file)?;
-    let as_what = Use::look("params diff");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slave = single(&arguments.drive, session)?;
+pub(super) const PARAMETERS: ParameterFile<Inverters, Assignment> = ParameterFile {
+    table: "nordac",
+    about: ", as the numbers that travel: number and, where it depends on them, element and set",
+    expected: [
+        "a parameter that can be written expected here",
+        "a whole number, or a value with its unit in quotes, expected here",
+    ],
+    entry,
+    no_table: |key| format!("there is no table `{key}`"),
+    read,
+    compare,
+    is_loaded: |wanted| !REACHED.contains(&wanted.parameter.parameter.number),
+    never_loaded: "say how the inverter is reached and who controls it, and are never loaded (1619 to 1624)",
+    write: |session, slave, orders, _| {
         let mut driver = driver(session);
-        driver.join(slave)?;
-        let differing = differing(&mut driver, slave, &wanted)?;
-        output.result(&page(&differing))?;
-        Ok(match differing.is_empty() {
-            true => Exit::Passed,
-            false => Exit::Failed,
-        })
-    })
-}
-
-/// Writes the parameters of a file that differ into a slave.
-pub(super) fn load(
-    bench: PortBench<'_, Inverters>,
-    arguments: &LoadArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let own = &arguments.params;
-    let wanted = read_file(&own.file)?;
-    if arguments.store {
-        return Err(Failure::refused(
-            "--store is for drives that lose what is written; this one stores every parameter at once (971)",
-        ));
-    }
-    let as_what = Use {
-        purpose: "params load",
-        moves: arguments.yes,
-        holds: arguments.hold.hold || !arguments.yes,
-    };
-    on(bench, &own.rig, as_what, output, |session, output| {
-        let slave = single(&own.drive, session)?;
-        let mut driver = driver(session);
-        driver.join(slave)?;
-        let differing = differing(&mut driver, slave, &wanted)?;
-        output.result(&page(&differing))?;
-        if !arguments.yes {
-            output.say("nothing was written; --yes writes it\n");
-            return Ok(Exit::Passed);
-        }
-        let loaded =
-            |own: &&(Assignment, i64)| !REACHED.contains(&own.0.parameter.parameter.number);
-        let orders: Vec<_> = differing.iter().filter(loaded).map(|own| own.0).collect();
-        refuse_denied(&driver, slave, &orders)?;
-        write_all(&mut driver, slave, &orders)?;
-        let kept = differing.len() - orders.len();
-        if kept > 0 {
-            output.complain(&format!(
-                "{kept} of them say how the inverter is reached and who controls it, and are never loaded (1619 to 1624)"
-            ));
-        }
-        let count = counted(orders.len(), "parameter");
-        output.say(&format!(
-            "{count} written, and the inverter answered with the values\n"
-        ));
-        Ok(match kept {
-            0 => Exit::Passed,
-            _ => Exit::Failed,
-        })
-    })
-}
+        refuse_denied(&driver, slave, orders)?;
+        Ok(write_all(&mut driver, slave, orders)?)
+    },
+    written: "written, and the inverter answered with the values",
+    stores_nothing: Some(
+        "--store is for drives that lose what is written; this one stores every parameter at once (971)",
+    ),
+};
 
 /// Writes parameters. One whose limit is another of them, such as 1204 and 1205, is written behind it.
 fn write_all(driver: &mut Driver<'_>, slave: u8, orders: &[Assignment]) -> Result<(), Error> {
@@ -159,36 +83,27 @@ fn write_all(driver: &mut Driver<'_>, slave: u8, orders: &[Assignment]) -> Resul
     }
 }
 
-/// The parameters that a file keeps, read.
-fn parameters(driver: &mut Driver<'_>, slave: u8) -> Result<Vec<Found>, Failure> {
-    driver.join(slave)?;
+/// The lines of a file with the parameters of a slave.
+fn read(session: &mut Session, slave: u8) -> Result<Vec<String>, Failure> {
     let all: Vec<_> = every(is_kept).map(Cell::Parameter).collect();
-    Ok(find(driver, slave, &all)?)
+    let found = Inverters::read(session, &[slave], &all)?;
+    Ok(found.iter().filter_map(line).collect())
 }
 
-fn text(slave: u8, found: &[Found]) -> String {
-    let mut text = format!(
-        "# Parameters of NORDAC slave {slave}, as the numbers that travel: number and, where it depends on them, element and set.\n\
-         # Behind: name and value.\n\n[{TABLE}]\n"
-    );
-    for found in found {
-        let Cell::Parameter(own) = found.cell else {
-            continue;
-        };
-        let key = format!("\"{}\"", key(&own));
-        let line = format!(
-            "{key:11} = {:6} # {:22} {}",
-            found.number,
-            own.parameter.name,
-            found.words()
-        );
-        text.push_str(&format!("{}\n", line.trim_end()));
-    }
-    text
+fn line(found: &Found) -> Option<String> {
+    let Cell::Parameter(cell) = found.cell else {
+        return None;
+    };
+    let key = format!("\"{}\"", key(&cell));
+    let (number, name) = (found.number, cell.parameter.name);
+    Some(format!(
+        "{key:11} = {number:6} # {name:22} {}",
+        found.words()
+    ))
 }
 
 /// The key of a parameter: with its set even where that is the first one.
-fn key(own: &harness_proto::nordac::ParameterRef) -> String {
+fn key(own: &ParameterRef) -> String {
     let set = own.index.set + 1;
     let number = own.parameter.number;
     match (own.parameter.is_array(), own.parameter.has(Flag::Set)) {
@@ -198,103 +113,41 @@ fn key(own: &harness_proto::nordac::ParameterRef) -> String {
     }
 }
 
-/// The parameters that read differently from a file, and what they read.
-fn differing(
-    driver: &mut Driver<'_>,
+/// The parameters that read differently from a file.
+fn compare(
+    session: &mut Session,
     slave: u8,
     wanted: &[Assignment],
-) -> Result<Vec<(Assignment, i64)>, Error> {
+) -> Result<Vec<(Assignment, String)>, Failure> {
+    let mut driver = driver(session);
+    driver.join(slave)?;
     let mut differing = Vec::new();
-    for own in wanted {
-        let reads = driver.read(slave, &own.parameter)?;
-        if reads != own.number {
-            differing.push((*own, reads));
+    for wanted in wanted {
+        let reads = driver.read(slave, &wanted.parameter)?;
+        if reads != wanted.number {
+            let line = format!(
+                "{:9} {:22} file {}  slave {}\n",
+                key(&wanted.parameter),
+                wanted.parameter.parameter.name,
+                shown(&wanted.parameter, wanted.number),
+                shown(&wanted.parameter, reads)
+            );
+            differing.push((*wanted, line));
         }
     }
     Ok(differing)
 }
 
-fn page(differing: &[(Assignment, i64)]) -> String {
-    let line = |(wanted, reads): &(Assignment, i64)| {
-        format!(
-            "{:9} {:22} file {}  slave {}\n",
-            key(&wanted.parameter),
-            wanted.parameter.parameter.name,
-            shown(&wanted.parameter, wanted.number),
-            shown(&wanted.parameter, *reads)
-        )
-    };
-    differing.iter().map(line).collect()
-}
-
-fn read_file(path: &Path) -> Result<Vec<Assignment>, Failure> {
-    let source = Source::read(path).map_err(|error| Failure::File(error.into()))?;
-    Ok(parse(&source)?)
-}
-
-/// The parameters of a file.
-fn parse(source: &Source) -> Result<Vec<Assignment>, Problems> {
-    let problem = |range: std::ops::Range<usize>, message: String, expected: &str| {
-        let span = TextSpan {
-            start: range.start,
-            end: range.end,
-        };
-        Problem::new(span, message, expected)
-    };
-    let (mut problems, mut found) = (Vec::new(), Vec::new());
-    let table = match DeTable::parse(&source.text) {
-        Ok(table) => Some(table),
-        Err(error) => {
-            let range = error.span().unwrap_or(0..0);
-            let message = error.message().to_owned();
-            problems.push(problem(range, message, "TOML expected here"));
-            None
-        }
-    };
-    for (name, value) in table.iter().flat_map(|table| table.get_ref().iter()) {
-        match value.get_ref() {
-            DeValue::Table(entries) if name.get_ref() == TABLE => {
-                for (key, value) in entries {
-                    match entry(key.get_ref(), value.get_ref()) {
-                        Ok(entry) => found.push(entry),
-                        Err((true, message)) => {
-                            let expected = "a parameter that can be written expected here";
-                            problems.push(problem(key.span(), message, expected));
-                        }
-                        Err((false, message)) => {
-                            let expected =
-                                "a whole number, or a value with its unit in quotes, expected here";
-                            problems.push(problem(value.span(), message, expected));
-                        }
-                    }
-                }
-            }
-            _ => {
-                let message = format!("there is no table `{}`", name.get_ref());
-                problems.push(problem(name.span(), message, "a table [nordac] expected"));
-            }
-        }
-    }
-    if problems.is_empty() && found.is_empty() {
-        let message = "the file has no parameters".to_owned();
-        problems.push(problem(0..0, message, "a table [nordac] expected"));
-    }
-    if problems.is_empty() {
-        return Ok(found);
-    }
-    problems.sort_by_key(|problem| problem.span.start);
-    Err(Problems::new(&source.name, source.text.clone(), problems))
-}
-
-/// A line of a file. The error says whether the key is wrong, and why.
-fn entry(key: &str, value: &DeValue<'_>) -> Result<Assignment, (bool, String)> {
-    let found = parameter(key).map_err(|why| (true, why))?;
+/// A line of a file.
+fn entry(key: &str, value: &DeValue<'_>) -> Result<Assignment, EntryMistake> {
+    let found = parameter(key).map_err(EntryMistake::Key)?;
     let own = found.parameter;
     if !is_kept(own) {
         let why = format!("parameter {found} ({}) is not kept in a file", own.name);
-        return Err((true, why));
+        return Err(EntryMistake::Key(why));
     }
-    let wrong = |why: &dyn std::fmt::Display| (false, format!("{key} ({}): {why}", own.name));
+    let wrong =
+        |why: &dyn std::fmt::Display| EntryMistake::Value(format!("{key} ({}): {why}", own.name));
     let text = match value {
         DeValue::Integer(number) => number.to_string(),
         DeValue::String(text) => text.to_string(),
@@ -315,10 +168,11 @@ fn entry(key: &str, value: &DeValue<'_>) -> Result<Assignment, (bool, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use harness_bench::scenario::source::Source;
 
     fn read(text: &str) -> Result<Vec<(String, i64)>, Vec<String>> {
         let source = Source::from_bytes("p.toml".to_owned(), text.into()).expect("a text");
-        let found = parse(&source).map_err(|problems| {
+        let found = PARAMETERS.parse(&source).map_err(|problems| {
             let all = problems.all().iter();
             all.map(|problem| format!("{}: {}", problem.span.start, problem.message))
                 .collect::<Vec<_>>()

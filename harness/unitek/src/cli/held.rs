@@ -1,6 +1,7 @@
 //! The drives of a port, as the commands of all buses and a session use them.
 
 use super::bench::scaling;
+use super::params::{PARAMETERS, RegisterValue};
 use super::read::Found;
 use crate::rig::{Axis, OfUnitek as _, Player, Session, UnitekDrives};
 use crate::value::registers;
@@ -10,6 +11,7 @@ use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::held::HeldDrives;
 use harness_bench::command::output::Output;
+use harness_bench::command::params::ParameterFile;
 use harness_bench::command::port_bench::PortBench;
 use harness_proto::time::Span;
 use harness_proto::unitek::Register;
@@ -36,6 +38,9 @@ impl HeldDrives for UnitekDrives {
 impl CommandDrives for UnitekDrives {
     type Cell = &'static Register;
     type Reading = Found;
+    type Parameter = RegisterValue;
+
+    const PARAMETERS: ParameterFile<Self, RegisterValue> = PARAMETERS;
 
     fn cells(texts: &[String]) -> Result<Vec<Self::Cell>, String> {
         registers(texts)

@@ -17,11 +17,12 @@ pub(crate) use check::check;
 
 use super::driver;
 use crate::rig::UnitekDrives;
-use harness_bench::command::drive::{DriveCommand, ParamsCommand};
+use harness_bench::command::drive::DriveCommand;
 use harness_bench::command::drives::{read, watch};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
 use harness_bench::command::output::Output;
+use harness_bench::command::params::params;
 use harness_bench::command::port_bench::PortBench;
 
 /// Runs a command on a rig, or on one that a session holds.
@@ -38,15 +39,7 @@ pub(crate) fn drive(
         DriveCommand::Write(arguments) => write::write(bench, arguments, output),
         DriveCommand::Info(arguments) => info::info(bench, arguments, output),
         DriveCommand::Watch(arguments) => watch(bench, arguments, output),
-        DriveCommand::Params(ParamsCommand::Save(arguments)) => {
-            params::save(bench, arguments, output)
-        }
-        DriveCommand::Params(ParamsCommand::Diff(arguments)) => {
-            params::diff(bench, arguments, output)
-        }
-        DriveCommand::Params(ParamsCommand::Load(arguments)) => {
-            params::load(bench, arguments, output)
-        }
+        DriveCommand::Params(command) => params(bench, command, output),
         DriveCommand::Position(arguments) => position::position(bench, arguments, output),
         DriveCommand::Go(arguments) => control::go(bench, arguments, output),
         DriveCommand::Stop(arguments) => control::stop(bench, arguments, output),

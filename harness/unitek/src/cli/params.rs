@@ -11,278 +11,110 @@ use super::write::{Order, refuse_denied};
 use crate::rig::OfUnitek as _;
 use crate::rig::{Axis, Session, UnitekDrives};
 use crate::value::{hex, is_parameter, register};
-use harness_bench::command::axes::Axes;
-use harness_bench::command::drive::{LoadArguments, ParamsArguments};
 use harness_bench::command::drives::CommandDrives as _;
-use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
-use harness_bench::command::file;
-use harness_bench::command::output::Output;
-use harness_bench::command::port_bench::{PortBench, on, single};
-use harness_bench::command::rig_name::Use;
-use harness_bench::counted::counted;
-use harness_bench::scenario::problem::{Problem, Problems, TextSpan};
-use harness_bench::scenario::source::Source;
+use harness_bench::command::params::{EntryMistake, ParameterFile};
 use harness_proto::unitek::guard::{Class, class};
 use harness_proto::unitek::{Data, REGISTERS, Register};
-use toml::de::{DeTable, DeValue};
+use toml::de::DeValue;
 
 /// Identifiers and bit rate: two drives with those of one file could not be told apart.
 const REACHED: [u8; 5] = [0x68, 0x69, 0x73, 0x88, 0x89];
 
-/// The table with the parameters.
-const TABLE: &str = "unitek";
-
 /// The register that stores all parameters, and the level that is loaded at power-up (ex 7).
 const STORE: (u8, u16) = (0x84, 0);
 
-/// Writes the parameters of a drive into a file.
-pub(super) fn save(
-    bench: PortBench<'_, UnitekDrives>,
-    arguments: &ParamsArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    on(
-        bench,
-        &arguments.rig,
-        Use::look("params save"),
-        output,
-        |session, output| {
-            let (axis, found) = parameters(session, &arguments.drive)?;
-            file::write(&arguments.file, &text(axis, &found))?;
-            let path = arguments.file.display();
-            output.say(&format!(
-                "{} of drive {} in {path}\n",
-                counted(found.len(), "parameter"),
-                axis.node
-            ));
-            Ok(Exit::Passed)
-        },
-    )
-}
+/// A register and what it is to read.
+pub(crate) type RegisterValue = (&'static Register, Data);
 
-/// Compares a drive with a file.
-pub(super) fn diff(
-    bench: PortBench<'_, UnitekDrives>,
-    arguments: &ParamsArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let wanted = read_file(&arguments.file)?;
-    on(
-        bench,
-        &arguments.rig,
-        Use::look("params diff"),
-        output,
-        |session, output| {
-            let (_, found) = parameters(session, &arguments.drive)?;
-            let differing = differing(&wanted, &found);
-            output.result(&page(&differing))?;
-            Ok(match differing.is_empty() {
-                true => Exit::Passed,
-                false => Exit::Failed,
-            })
-        },
-    )
-}
-
-/// Writes the parameters of a file that differ into a drive.
-pub(super) fn load(
-    bench: PortBench<'_, UnitekDrives>,
-    arguments: &LoadArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    let wanted = read_file(&arguments.params.file)?;
-    let as_what = Use {
-        purpose: "params load",
-        moves: arguments.yes,
-        holds: arguments.hold.hold || !arguments.yes,
-    };
-    on(
-        bench,
-        &arguments.params.rig,
-        as_what,
-        output,
-        |session, output| {
-            let (axis, found) = parameters(session, &arguments.params.drive)?;
-            let differing = differing(&wanted, &found);
-            output.result(&page(&differing))?;
-            if !arguments.yes {
-                output.say("nothing was written; --yes writes it\n");
-                return Ok(Exit::Passed);
-            }
-            let writable = |own: &&(&'static Register, Data, Data)| {
-                class(own.0.number) != Class::Never && !REACHED.contains(&own.0.number)
-            };
-            let orders: Vec<Order> = differing
-                .iter()
-                .filter(writable)
-                .map(|(register, wanted, _)| (axis, *register, *wanted))
-                .collect();
-            let store = arguments.store.then(|| {
-                let (register, level) = STORE;
-                (axis, Register::of(register), Data::Short(level))
-            });
-            let all: Vec<_> = orders.iter().copied().chain(store).collect();
-            let mut driver = session.driver();
-            refuse_denied(&mut driver, &all)?;
-            for (axis, register, data) in &all {
-                driver.write(*axis, register.number, *data)?;
-            }
-            let kept = differing.len() - orders.len();
-            if kept > 0 {
-                output.complain(&format!(
-                    "{kept} of them identify the device, or say how it is reached, and are never loaded (5A, 62, 67, 68, 69, 73, 88, 89)"
-                ));
-            }
-            output.say(&format!(
-                "{} written and read back\n",
-                counted(orders.len(), "parameter")
-            ));
-            Ok(match kept {
-                0 => Exit::Passed,
-                _ => Exit::Failed,
-            })
-        },
-    )
-}
+pub(super) const PARAMETERS: ParameterFile<UnitekDrives, RegisterValue> = ParameterFile {
+    table: "unitek",
+    about: ": the registers that it keeps in its EEPROM (RW), as hexadecimal digits",
+    expected: [
+        "a parameter (RW) expected here",
+        "hexadecimal digits in quotes expected here",
+    ],
+    entry,
+    no_table: |key| format!("`{key}` is no table"),
+    read: |session, axis| Ok(parameters(session, axis)?.iter().map(line).collect()),
+    compare: |session, axis, wanted| Ok(differing(wanted, &parameters(session, axis)?)),
+    is_loaded: |(register, _)| {
+        class(register.number) != Class::Never && !REACHED.contains(&register.number)
+    },
+    never_loaded: "identify the device, or say how it is reached, and are never loaded (5A, 62, 67, 68, 69, 73, 88, 89)",
+    write,
+    written: "written and read back",
+    stores_nothing: None,
+};
 
 /// The parameters of a drive, read.
-fn parameters(session: &mut Session, drive: &Axes) -> Result<(Axis, Vec<Found>), Failure> {
-    let axis = single(drive, session)?;
+fn parameters(session: &mut Session, axis: Axis) -> Result<Vec<Found>, Failure> {
     let all: Vec<_> = REGISTERS.iter().filter(|own| is_parameter(own)).collect();
-    Ok((axis, UnitekDrives::read(session, &[axis], &all)?))
+    UnitekDrives::read(session, &[axis], &all)
 }
 
-fn text(axis: Axis, found: &[Found]) -> String {
-    let mut text = format!(
-        "# Parameters of UNITEK drive {}: the registers that it keeps in its EEPROM (RW), as hexadecimal digits.\n\
-         # Behind: name and value.\n\n[{TABLE}]\n",
-        axis.node
-    );
-    for found in found {
-        let register = found.register();
-        let value = format!("\"{}\"", hex(found.reply.data));
-        let line = format!(
-            "0x{:02X} = {value:10} # {:14} {}",
-            register.number,
-            register.name,
-            found.words()
-        );
-        text.push_str(&format!("{}\n", line.trim_end()));
-    }
-    text
+fn line(found: &Found) -> String {
+    let register = found.register();
+    let value = format!("\"{}\"", hex(found.reply.data));
+    format!(
+        "0x{:02X} = {value:10} # {:14} {}",
+        register.number,
+        register.name,
+        found.words()
+    )
 }
 
-/// The registers that read differently from a file: register, value of the file, value of the drive.
-fn differing(
-    wanted: &[(&'static Register, Data)],
-    found: &[Found],
-) -> Vec<(&'static Register, Data, Data)> {
-    let of = |(register, wanted): &(&'static Register, Data)| {
+/// The registers that read differently from a file.
+fn differing(wanted: &[RegisterValue], found: &[Found]) -> Vec<(RegisterValue, String)> {
+    let of = |&(register, wanted): &RegisterValue| {
         let found = found
             .iter()
-            .find(|own| own.reply.register == register.number)?;
+            .find(|found| found.reply.register == register.number)?;
         let reads = Data::of(register, found.reply.data.bits());
-        (reads != *wanted).then_some((*register, *wanted, reads))
+        let line = format!(
+            "{:02X} {:14} file {}  drive {}\n",
+            register.number,
+            register.name,
+            hex(wanted),
+            hex(reads)
+        );
+        (reads != wanted).then_some(((register, wanted), line))
     };
     wanted.iter().filter_map(of).collect()
 }
 
-fn page(differing: &[(&'static Register, Data, Data)]) -> String {
-    let line = |(register, wanted, reads): &(&'static Register, Data, Data)| {
-        format!(
-            "{:02X} {:14} file {}  drive {}\n",
-            register.number,
-            register.name,
-            hex(*wanted),
-            hex(*reads)
-        )
-    };
-    differing.iter().map(line).collect()
-}
-
-fn read_file(path: &std::path::Path) -> Result<Vec<(&'static Register, Data)>, Failure> {
-    let source = Source::read(path).map_err(|error| Failure::File(error.into()))?;
-    Ok(parse(&source)?)
-}
-
-/// The parameters of a file.
-fn parse(source: &Source) -> Result<Vec<(&'static Register, Data)>, Problems> {
-    let mut problems = Vec::new();
-    let mut found = Vec::new();
-    let problem = |range: std::ops::Range<usize>, message: String, expected: &str| {
-        let span = TextSpan {
-            start: range.start,
-            end: range.end,
-        };
-        Problem::new(span, message, expected)
-    };
-    match DeTable::parse(&source.text) {
-        Err(error) => {
-            let range = error.span().unwrap_or(0..0);
-            problems.push(problem(
-                range,
-                error.message().to_owned(),
-                "TOML expected here",
-            ));
-        }
-        Ok(table) => {
-            for (name, value) in table.get_ref() {
-                let DeValue::Table(entries) = value.get_ref() else {
-                    let message = format!("`{}` is no table", name.get_ref());
-                    problems.push(problem(name.span(), message, "a table [unitek] expected"));
-                    continue;
-                };
-                if name.get_ref() != TABLE {
-                    let message = format!("there is no table `{}`", name.get_ref());
-                    problems.push(problem(name.span(), message, "a table [unitek] expected"));
-                    continue;
-                }
-                for (key, value) in entries {
-                    match entry(key.get_ref(), value.get_ref()) {
-                        Ok(entry) => found.push(entry),
-                        Err((true, message)) => {
-                            problems.push(problem(
-                                key.span(),
-                                message,
-                                "a parameter (RW) expected here",
-                            ));
-                        }
-                        Err((false, message)) => {
-                            problems.push(problem(
-                                value.span(),
-                                message,
-                                "hexadecimal digits in quotes expected here",
-                            ));
-                        }
-                    }
-                }
-            }
-            if problems.is_empty() && found.is_empty() {
-                let message = "the file has no parameters".to_owned();
-                problems.push(problem(0..0, message, "a table [unitek] expected"));
-            }
-        }
+fn write(
+    session: &mut Session,
+    axis: Axis,
+    values: &[RegisterValue],
+    stores: bool,
+) -> Result<(), Failure> {
+    let (register, level) = STORE;
+    let store = stores.then(|| (Register::of(register), Data::Short(level)));
+    let values = values.iter().copied().chain(store);
+    let orders: Vec<Order> = values
+        .map(|(register, data)| (axis, register, data))
+        .collect();
+    let mut driver = session.driver();
+    refuse_denied(&mut driver, &orders)?;
+    for (axis, register, data) in orders {
+        driver.write(axis, register.number, data)?;
     }
-    if problems.is_empty() {
-        return Ok(found);
-    }
-    problems.sort_by_key(|problem| problem.span.start);
-    Err(Problems::new(&source.name, source.text.clone(), problems))
+    Ok(())
 }
 
-/// A line of a file. The error says whether the key is wrong, and why.
-fn entry(key: &str, value: &DeValue<'_>) -> Result<(&'static Register, Data), (bool, String)> {
-    let register = register(key).map_err(|why| (true, why))?;
+/// A line of a file.
+fn entry(key: &str, value: &DeValue<'_>) -> Result<RegisterValue, EntryMistake> {
+    let register = register(key).map_err(EntryMistake::Key)?;
     if !is_parameter(register) {
         let message = format!(
             "register {:02X} ({}) is no parameter ({})",
             register.number, register.name, register.access
         );
-        return Err((true, message));
+        return Err(EntryMistake::Key(message));
     }
     let digits = register.width.bits() as usize / 4;
-    let wrong = || (false, format!("{key} needs {digits} digits"));
+    let wrong = || EntryMistake::Value(format!("{key} needs {digits} digits"));
     let text = value.as_str().ok_or_else(wrong)?;
     let plain = text.len() == digits && text.bytes().all(|digit| digit.is_ascii_hexdigit());
     let raw = u32::from_str_radix(text, 16).ok().filter(|_| plain);
@@ -293,10 +125,11 @@ fn entry(key: &str, value: &DeValue<'_>) -> Result<(&'static Register, Data), (b
 #[cfg(test)]
 mod tests {
     use super::*;
+    use harness_bench::scenario::source::Source;
 
-    fn read(text: &str) -> Result<Vec<(&'static Register, Data)>, Vec<String>> {
+    fn read(text: &str) -> Result<Vec<RegisterValue>, Vec<String>> {
         let source = Source::from_bytes("p.toml".to_owned(), text.into()).expect("a text");
-        parse(&source).map_err(|problems| {
+        PARAMETERS.parse(&source).map_err(|problems| {
             let all = problems.all().iter();
             all.map(|problem| format!("{}: {}", problem.span.start, problem.message))
                 .collect()

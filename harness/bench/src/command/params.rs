@@ -1,0 +1,225 @@
+//! `drivebench params`: the parameters of a drive in a file and back.
+
+use super::drive::{LoadArguments, ParamsArguments, ParamsCommand};
+use super::drives::CommandDrives;
+use super::exit::Exit;
+use super::failure::Failure;
+use super::file;
+use super::output::Output;
+use super::port_bench::{PortBench, on, single};
+use super::rig_name::Use;
+use crate::counted::counted;
+use crate::rig::port_session::{PortDrives, PortSession};
+use crate::scenario::problem::{Problem, Problems, TextSpan};
+use crate::scenario::source::Source;
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+
+/// What is wrong with a line of a file.
+pub enum EntryMistake {
+    Key(String),
+    Value(String),
+}
+
+/// Reads parameters of a drive and gives those that differ, each with a line that shows both values.
+type Compare<D, P> =
+    fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P]) -> Result<Vec<(P, String)>, Failure>;
+
+/// Writes parameters into a drive, unless one of them is denied; and stores them.
+type Write<D, P> =
+    fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P], bool) -> Result<(), Failure>;
+
+/// The parameters of the drives of a bus: how they stand in a file, and what is done with them.
+pub struct ParameterFile<D: PortDrives, P> {
+    /// The table of the file.
+    pub table: &'static str,
+    /// How the first line of a file ends: what its keys and values are.
+    pub about: &'static str,
+    /// What is expected as a key, and as a value.
+    pub expected: [&'static str; 2],
+    /// A line of a file.
+    pub entry: fn(&str, &DeValue<'_>) -> Result<P, EntryMistake>,
+    /// What is wrong with a key that has no table below it.
+    pub no_table: fn(&str) -> String,
+    /// Reads all parameters of a drive: the lines of a file.
+    pub read: fn(&mut PortSession<D>, D::Drive) -> Result<Vec<String>, Failure>,
+    pub compare: Compare<D, P>,
+    /// Whether a parameter is ever loaded, and what the others are.
+    pub is_loaded: fn(&P) -> bool,
+    pub never_loaded: &'static str,
+    pub write: Write<D, P>,
+    /// What was done with what is written.
+    pub written: &'static str,
+    /// Why `--store` is refused.
+    pub stores_nothing: Option<&'static str>,
+}
+
+/// Runs `params`.
+///
+/// # Errors
+/// [`Failure`].
+pub fn params<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    command: &ParamsCommand,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    match command {
+        ParamsCommand::Save(arguments) => save(bench, arguments, output),
+        ParamsCommand::Diff(arguments) => diff(bench, arguments, output),
+        ParamsCommand::Load(arguments) => load(bench, arguments, output),
+    }
+}
+
+fn save<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &ParamsArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let look = Use::look("params save");
+    on(bench, &arguments.rig, look, output, |session, output| {
+        let drive = single(&arguments.drive, session)?;
+        let lines = (D::PARAMETERS.read)(session, drive)?;
+        let named = D::named(&[drive]);
+        let ParameterFile { table, about, .. } = D::PARAMETERS;
+        let mut text = format!(
+            "# Parameters of {} {named}{about}.\n# Behind: name and value.\n\n[{table}]\n",
+            table.to_uppercase()
+        );
+        for line in &lines {
+            text.push_str(&format!("{}\n", line.trim_end()));
+        }
+        file::write(&arguments.file, &text)?;
+        let path = arguments.file.display();
+        let count = counted(lines.len(), "parameter");
+        output.say(&format!("{count} of {named} in {path}\n"));
+        Ok(Exit::Passed)
+    })
+}
+
+fn diff<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &ParamsArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let wanted = read_file::<D>(arguments)?;
+    let look = Use::look("params diff");
+    on(bench, &arguments.rig, look, output, |session, output| {
+        let drive = single(&arguments.drive, session)?;
+        Ok(match differing::<D>(session, drive, &wanted, output)?[..] {
+            [] => Exit::Passed,
+            _ => Exit::Failed,
+        })
+    })
+}
+
+/// Writes the parameters of a file that differ into a drive.
+fn load<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &LoadArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let LoadArguments { params, yes, .. } = arguments;
+    let wanted = read_file::<D>(params)?;
+    if let Some(why) = D::PARAMETERS.stores_nothing.filter(|_| arguments.store) {
+        return Err(Failure::refused(why));
+    }
+    let as_what = Use {
+        purpose: "params load",
+        moves: *yes,
+        holds: arguments.hold.hold || !yes,
+    };
+    on(bench, &params.rig, as_what, output, |session, output| {
+        let drive = single(&params.drive, session)?;
+        let mut orders = differing::<D>(session, drive, &wanted, output)?;
+        if !yes {
+            output.say("nothing was written; --yes writes it\n");
+            return Ok(Exit::Passed);
+        }
+        let all = orders.len();
+        orders.retain(D::PARAMETERS.is_loaded);
+        (D::PARAMETERS.write)(session, drive, &orders, arguments.store)?;
+        let kept = all - orders.len();
+        if kept > 0 {
+            let why = D::PARAMETERS.never_loaded;
+            output.complain(&format!("{kept} of them {why}"));
+        }
+        let count = counted(orders.len(), "parameter");
+        output.say(&format!("{count} {}\n", D::PARAMETERS.written));
+        Ok(match kept {
+            0 => Exit::Passed,
+            _ => Exit::Failed,
+        })
+    })
+}
+
+/// Shows the parameters that differ from those of a file, and gives them.
+fn differing<D: CommandDrives>(
+    session: &mut PortSession<D>,
+    drive: D::Drive,
+    wanted: &[D::Parameter],
+    output: &mut Output,
+) -> Result<Vec<D::Parameter>, Failure> {
+    let differing = (D::PARAMETERS.compare)(session, drive, wanted)?;
+    let (differing, lines): (Vec<_>, Vec<_>) = differing.into_iter().unzip();
+    output.result(&lines.concat())?;
+    Ok(differing)
+}
+
+fn read_file<D: CommandDrives>(arguments: &ParamsArguments) -> Result<Vec<D::Parameter>, Failure> {
+    let source = Source::read(&arguments.file).map_err(|error| Failure::File(error.into()))?;
+    Ok(D::PARAMETERS.parse(&source)?)
+}
+
+impl<D: PortDrives, P> ParameterFile<D, P> {
+    /// The parameters of a file.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    pub fn parse(&self, source: &Source) -> Result<Vec<P>, Problems> {
+        let (mut problems, mut found) = (Vec::new(), Vec::new());
+        let mut wrong = |range: Range<usize>, message: String, expected: &str| {
+            let (start, end) = (range.start, range.end);
+            problems.push(Problem::new(TextSpan { start, end }, message, expected));
+        };
+        let a_table = format!("a table [{}] expected", self.table);
+        match DeTable::parse(&source.text) {
+            Err(error) => {
+                let range = error.span().unwrap_or(0..0);
+                wrong(range, error.message().to_owned(), "TOML expected here");
+            }
+            Ok(table) => {
+                for (name, value) in table.get_ref() {
+                    match value.get_ref() {
+                        DeValue::Table(entries) if name.get_ref() == self.table => {
+                            for (key, value) in entries {
+                                match (self.entry)(key.get_ref(), value.get_ref()) {
+                                    Ok(entry) => found.push(entry),
+                                    Err(EntryMistake::Key(why)) => {
+                                        wrong(key.span(), why, self.expected[0]);
+                                    }
+                                    Err(EntryMistake::Value(why)) => {
+                                        wrong(value.span(), why, self.expected[1]);
+                                    }
+                                }
+                            }
+                        }
+                        DeValue::Table(_) => {
+                            let message = format!("there is no table `{}`", name.get_ref());
+                            wrong(name.span(), message, &a_table);
+                        }
+                        _ => wrong(name.span(), (self.no_table)(name.get_ref()), &a_table),
+                    }
+                }
+            }
+        }
+        if problems.is_empty() && found.is_empty() {
+            let span = TextSpan::default();
+            problems.push(Problem::new(span, "the file has no parameters", &a_table));
+        }
+        if problems.is_empty() {
+            return Ok(found);
+        }
+        problems.sort_by_key(|problem| problem.span.start);
+        Err(Problems::new(&source.name, source.text.clone(), problems))
+    }
+}
