@@ -1,5 +1,6 @@
 //! What the commands that every bus behind `[port.1]` has ask of its drives.
 
+use super::check::CheckedDrive;
 use super::drive::{ReadArguments, WatchArguments};
 use super::exit::Exit;
 use super::failure::Failure;
@@ -40,6 +41,12 @@ pub trait CommandDrives: HeldDrives {
         drives: &[Self::Drive],
         cells: &[Self::Cell],
     ) -> Result<Vec<Self::Reading>, Failure>;
+
+    /// What `rig check` says of a drive without an answer.
+    const SILENT: &'static str;
+
+    /// Asks every drive for `rig check`, unless the bench only listens.
+    fn check(session: &mut PortSession<Self>) -> Vec<CheckedDrive>;
 }
 
 /// Reads cells and shows them.

@@ -2,6 +2,7 @@
 
 pub mod args;
 pub mod axes;
+pub mod check;
 pub mod cyclic;
 pub mod deviations;
 pub mod drawing;

@@ -1,10 +1,12 @@
 //! What the commands ask of the bus of a rig.
 
+use super::check::check;
 use super::drive::DriveCommand;
+use super::drives::CommandDrives;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::fuzz::FuzzCommands;
-use super::held::{HeldBench, HeldDrives, HeldPort};
+use super::held::{HeldBench, HeldPort};
 use super::output::Output;
 use super::port_bench::PortBench;
 use super::rig_failure::exit_of;
@@ -45,7 +47,7 @@ type Check = fn(&Rig, &UseOptions, bool, &mut Output) -> Result<Exit, Failure>;
 
 impl RigCommands {
     /// Those of a bus behind `[port.1]`.
-    pub const fn of_port<D: HeldDrives, B: LineRig>(check: Check) -> Self {
+    pub const fn of_port<D: CommandDrives, B: LineRig>() -> Self {
         Self {
             // Of a file of its own the drives are set up, or the limits are to be tried.
             is_bare: |rig| rig.origin.starts_with("sim:"),
@@ -59,7 +61,7 @@ impl RigCommands {
                 let held = HeldPort::<D>::open(rig, options).map_err(unusable)?;
                 Ok(Box::new(held))
             },
-            check,
+            check: check::<D>,
             fuzz: FuzzCommands::of_line::<B>(),
         }
     }

@@ -2,7 +2,6 @@
 
 mod bench;
 pub(crate) mod cells;
-mod check;
 mod control;
 mod held;
 mod info;
@@ -11,11 +10,9 @@ mod read;
 pub(crate) mod sim;
 mod write;
 
-pub(super) use bench::Parked;
-pub(crate) use check::check;
-
 use super::driver;
 use crate::rig::Inverters;
+pub(super) use bench::Parked;
 use control::Stop;
 use harness_bench::command::cyclic::CyclicCommand;
 use harness_bench::command::drive::DriveCommand;

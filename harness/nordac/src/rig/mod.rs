@@ -70,8 +70,7 @@ pub(crate) const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub(crate) const COMMANDS: RigCommands =
-    RigCommands::of_port::<Inverters, Nordac>(super::cli::check);
+pub(crate) const COMMANDS: RigCommands = RigCommands::of_port::<Inverters, Nordac>();
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
 fn simulated(drives: u8) -> (String, String) {

@@ -2,7 +2,6 @@
 
 mod bench;
 pub(crate) mod cells;
-mod check;
 mod control;
 pub(crate) mod deviations;
 mod held;
@@ -12,8 +11,6 @@ mod position;
 mod read;
 pub(crate) mod sim;
 mod write;
-
-pub(crate) use check::check;
 
 use super::driver;
 use crate::rig::UnitekDrives;

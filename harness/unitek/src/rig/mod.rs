@@ -58,8 +58,7 @@ pub(crate) const PORT: PortRow = PortRow {
 };
 
 /// Commands on rigs of this bus.
-pub(crate) const COMMANDS: RigCommands =
-    RigCommands::of_port::<UnitekDrives, Unitek>(super::cli::check);
+pub(crate) const COMMANDS: RigCommands = RigCommands::of_port::<UnitekDrives, Unitek>();
 
 fn simulated(drives: u8) -> (String, String) {
     let nodes = (1..=drives).map(|node| format!("{{ node = {node} }}"));
