@@ -1,12 +1,13 @@
 //! What the commands that every bus behind `[port.1]` has ask of its drives.
 
 use super::check::CheckedDrive;
-use super::drive::{ReadArguments, WatchArguments};
+use super::drive::{DriveCommand, InfoArguments, OutputForm, ReadArguments, WatchArguments};
 use super::exit::Exit;
 use super::failure::Failure;
 use super::held::HeldDrives;
-use super::output::Output;
-use super::params::ParameterFile;
+use super::line_top::{LineTop, top};
+use super::output::{Output, columns};
+use super::params::{ParameterFile, params};
 use super::port_bench::{PortBench, on, select};
 use super::reading::{CellReading, show};
 use super::rig_name::Use;
@@ -14,7 +15,11 @@ use super::watch::{WatchBench, WatchedCell, watch as show_again};
 use crate::link::Line as _;
 use crate::rig::port_session::PortSession;
 use harness_proto::time::{Instant, Span};
+use serde_json::{Map, Value, json};
 use std::slice::from_ref;
+
+/// What `info` shows of a drive, by its number: each value with its heading and with where it stands.
+pub type DriveInfo = (u8, Vec<[String; 3]>);
 
 /// Drives that are read and written by the same commands as those of other buses.
 pub trait CommandDrives: HeldDrives {
@@ -42,6 +47,22 @@ pub trait CommandDrives: HeldDrives {
         cells: &[Self::Cell],
     ) -> Result<Vec<Self::Reading>, Failure>;
 
+    /// What `info` calls the place of a value.
+    const PLACE: &'static str;
+
+    /// Reads what `info` shows. A drive that may be left out without an answer is reported.
+    ///
+    /// # Errors
+    /// [`Failure`]: a drive does not answer as it must, or the port is lost.
+    fn info(
+        session: &mut PortSession<Self>,
+        drives: &[Self::Drive],
+        output: &mut Output,
+    ) -> Result<(Vec<DriveInfo>, Exit), Failure>;
+
+    /// What `top` shows of them.
+    fn top(session: &PortSession<Self>) -> LineTop<Self>;
+
     /// What `rig check` says of a drive without an answer.
     const SILENT: &'static str;
 
@@ -49,11 +70,27 @@ pub trait CommandDrives: HeldDrives {
     fn check(session: &mut PortSession<Self>) -> Vec<CheckedDrive>;
 }
 
-/// Reads cells and shows them.
+/// Runs a command.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn read<D: CommandDrives>(
+pub(super) fn perform<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    command: &DriveCommand,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    match command {
+        DriveCommand::Read(arguments) => read(bench, arguments, output),
+        DriveCommand::Info(arguments) => info(bench, arguments, output),
+        DriveCommand::Watch(arguments) => watch(bench, arguments, output),
+        DriveCommand::Top(arguments) => top(bench, arguments, output),
+        DriveCommand::Params(command) => params(bench, command, output),
+        _ => D::perform(bench, command, output),
+    }
+}
+
+/// Reads cells and shows them.
+fn read<D: CommandDrives>(
     bench: PortBench<'_, D>,
     arguments: &ReadArguments,
     output: &mut Output,
@@ -70,11 +107,44 @@ pub fn read<D: CommandDrives>(
     })
 }
 
+/// Lists drives.
+fn info<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &InfoArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let look = Use::look("info");
+    on(bench, &arguments.rig, look, output, |session, output| {
+        let drives = select(from_ref(&arguments.drives), session)?;
+        let (drives, exit) = D::info(session, &drives, output)?;
+        let mut rows = Vec::new();
+        let mut objects = Vec::new();
+        for (number, values) in drives {
+            let mut object = Map::new();
+            object.insert(D::WORDS[0].to_owned(), json!(number));
+            for [what, value, place] in values {
+                let key = what.to_lowercase().replace([' ', '-'], "_");
+                object.insert(key, json!(value));
+                rows.push([number.to_string(), what, value, place]);
+            }
+            objects.push(Value::Object(object));
+        }
+        match arguments.format {
+            OutputForm::Text => {
+                let heading = [D::WORDS[0], "what", "value", D::PLACE];
+                output.result(&output.fitted(&columns(&heading, &rows)))?;
+            }
+            OutputForm::Json => {
+                let whole = json!({"schema": 1, "drives": objects});
+                output.result(&format!("{whole}\n"))?;
+            }
+        }
+        Ok(exit)
+    })
+}
+
 /// Shows the values of cells repeatedly.
-///
-/// # Errors
-/// [`Failure`].
-pub fn watch<D: CommandDrives>(
+fn watch<D: CommandDrives>(
     bench: PortBench<'_, D>,
     arguments: &WatchArguments,
     output: &mut Output,

@@ -1,6 +1,7 @@
 //! A bench that a session holds, whatever its bus.
 
 use crate::command::drive::DriveCommand;
+use crate::command::drives::{CommandDrives, perform};
 use crate::command::exit::Exit;
 use crate::command::failure::Failure;
 use crate::command::output::Output;
@@ -125,7 +126,7 @@ pub trait HeldDrives: PortDrives {
     /// What plays scenarios on them.
     type Player: PortPlayer<Drives = Self>;
 
-    /// Runs a command.
+    /// Runs a command that has another form on every bus.
     ///
     /// # Errors
     /// [`Failure`].
@@ -164,7 +165,7 @@ impl<D: HeldDrives> HeldPort<D> {
     }
 }
 
-impl<D: HeldDrives> HeldBench for HeldPort<D> {
+impl<D: CommandDrives> HeldBench for HeldPort<D> {
     fn drives(&self) -> Vec<String> {
         let drives = self.0.session().drives().listed();
         drives
@@ -178,7 +179,7 @@ impl<D: HeldDrives> HeldBench for HeldPort<D> {
     }
 
     fn perform(&mut self, command: DriveCommand, output: &mut Output) -> Result<Exit, Failure> {
-        D::perform(PortBench::Held(self.session()), &command, output)
+        perform::<D>(PortBench::Held(self.session()), &command, output)
     }
 
     fn pass(&mut self, time: Span) -> Result<(), Failure> {

@@ -1,10 +1,13 @@
 //! `top` on drives that share a line: their table, and what each station sends.
 
+use super::drives::CommandDrives;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::held::{HeldDrives, HeldRecord};
 use super::output::Output;
-use super::top::{RateWindow, TopReader, TopScene, live, once};
+use super::port_bench::{PortBench, on};
+use super::rig_name::Use;
+use super::top::{RateWindow, TopReader, TopScene, check, live, once};
 use crate::capture::{Piece, Tape};
 use crate::command::drive::TopArguments;
 use crate::command::output::columns;
@@ -17,7 +20,7 @@ use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 
 /// What `top` shows of a bus, and how it reads it.
-pub struct LineTop<'v, D: HeldDrives> {
+pub struct LineTop<D: PortDrives> {
     /// What the bench has, for the title of a page: `drives on ...`.
     pub what: &'static str,
     /// The table. Its first state is that of a drive that does not answer.
@@ -27,30 +30,41 @@ pub struct LineTop<'v, D: HeldDrives> {
     /// The picture without a row; its columns are the stations.
     pub picture: LivePicture,
     /// Reads a drive.
-    pub read: &'v mut DriveReader<'v, D>,
+    pub read: DriveReader<D>,
     /// Stops a drive without waiting until it stands; returns what was done.
-    pub stop: &'v mut DriveStopper<'v, D>,
+    pub stop: DriveStopper<D>,
     /// The rows of the picture for what was heard.
-    pub rows: &'v mut dyn FnMut(Vec<Piece>) -> Vec<LiveRow>,
+    pub rows: Box<dyn FnMut(Vec<Piece>) -> Vec<LiveRow>>,
 }
 
 /// Reads the row of a drive.
-type DriveReader<'v, D> =
-    dyn FnMut(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<TopRow, Failure> + 'v;
+type DriveReader<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<TopRow, Failure>;
 
 /// Stops a drive.
-type DriveStopper<'v, D> =
-    dyn FnMut(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<String, Failure> + 'v;
+type DriveStopper<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<String, Failure>;
 
-impl<'v, D: HeldDrives> LineTop<'v, D> {
+/// Shows all drives, a row each.
+///
+/// # Errors
+/// [`Failure`]: the drives do not answer, the program was interrupted, or there is no page.
+pub(super) fn top<D: CommandDrives>(
+    bench: PortBench<'_, D>,
+    arguments: &TopArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    check(arguments, output)?;
+    let look = Use::look("top");
+    on(bench, &arguments.rig, look, output, |session, output| {
+        D::top(session).show(session, arguments, output)
+    })
+}
+
+impl<D: HeldDrives> LineTop<D> {
     /// Shows drives: with `--once` one page, and without it live.
-    ///
-    /// # Errors
-    /// [`Failure`]: the drives do not answer, the program was interrupted, or there is no page.
-    pub fn show(
+    fn show(
         self,
-        session: &'v mut PortSession<D>,
-        arguments: &'v TopArguments,
+        session: &mut PortSession<D>,
+        arguments: &TopArguments,
         output: &mut Output,
     ) -> Result<Exit, Failure> {
         let rig = session.rig().id().to_owned();
@@ -93,7 +107,7 @@ impl<'v, D: HeldDrives> LineTop<'v, D> {
 
 /// The drives of a port.
 struct LineReader<'v, D: HeldDrives> {
-    view: LineTop<'v, D>,
+    view: LineTop<D>,
     session: &'v mut PortSession<D>,
     drives: Vec<D::Drive>,
     traffic: LineTraffic,

@@ -58,7 +58,7 @@ pub struct ParameterFile<D: PortDrives, P> {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn params<D: CommandDrives>(
+pub(super) fn params<D: CommandDrives>(
     bench: PortBench<'_, D>,
     command: &ParamsCommand,
     output: &mut Output,

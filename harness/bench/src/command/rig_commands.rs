@@ -2,7 +2,7 @@
 
 use super::check::check;
 use super::drive::DriveCommand;
-use super::drives::CommandDrives;
+use super::drives::{CommandDrives, perform};
 use super::exit::Exit;
 use super::failure::Failure;
 use super::fuzz::FuzzCommands;
@@ -54,7 +54,7 @@ impl RigCommands {
             run: |rig, options| Ok(Box::new(PortRun::<D::Player>::open(rig, options)?)),
             judge: |rig, qualifies| Ok(Box::new(PortJudge::<D::Player>::new(rig, qualifies))),
             command: |rig, command, output| match rig {
-                Some(rig) => D::perform(PortBench::Rig(&rig), &command, output),
+                Some(rig) => perform::<D>(PortBench::Rig(&rig), &command, output),
                 None => Err(Failure::refused("--rig names no bench of this bus")),
             },
             hold: |rig, options, _| {

@@ -6,24 +6,19 @@ use super::read::{Found, find};
 use crate::driver::{Driver, Error};
 use crate::live;
 use crate::report::Reader;
-use crate::rig::Inverters;
+use crate::rig::{Inverters, Session};
 use crate::value::{Cell, ReplyWord, parameter};
 use harness_bench::capture::Piece;
 use harness_bench::capture::runs::TelegramRun;
-use harness_bench::command::axes::Axes;
-use harness_bench::command::drive::{InfoArguments, OutputForm, TopArguments};
+use harness_bench::command::drives::DriveInfo;
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
 use harness_bench::command::line_top::LineTop;
 use harness_bench::command::output::Output;
-use harness_bench::command::output::columns;
-use harness_bench::command::port_bench::{PortBench, on, select};
-use harness_bench::command::rig_name::Use;
-use harness_bench::command::top::check as check_top;
+use harness_bench::rig::port_session::PortDrives as _;
 use harness_bench::top::{TopColumn, TopForm, TopRow};
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::words::State;
-use serde_json::{Map, Value, json};
 
 /// What is shown of a slave that has a parameter channel: the heading, and the parameter.
 const SHOWN: [(&str, &str); 10] = [
@@ -50,18 +45,18 @@ struct Seen {
 
 impl Seen {
     /// What is shown, each with its heading and where it stands.
-    fn rows(&self) -> Vec<(String, String, String)> {
-        let mut rows = vec![(
+    fn rows(&self) -> Vec<[String; 3]> {
+        let mut rows = vec![[
             "PPO type".to_owned(),
             self.ppo.to_string(),
             "1622".to_owned(),
-        )];
+        ]];
         let names = ["status", "actual value"];
         for (name, found) in names.into_iter().zip(&self.words) {
-            rows.push((name.to_owned(), found.words(), found.cell.name()));
+            rows.push([name.to_owned(), found.words(), found.cell.name()]);
         }
         for (name, found) in &self.parameters {
-            rows.push(((*name).to_owned(), value(found), found.cell.name()));
+            rows.push([(*name).to_owned(), value(found), found.cell.name()]);
         }
         rows
     }
@@ -111,69 +106,48 @@ fn look(driver: &mut Driver<'_>, slave: u8, wanted: impl Fn(&str) -> bool) -> Re
     })
 }
 
-/// Lists slaves. One that does not answer is reported, and the others are listed.
+/// What is shown of slaves. One that does not answer is reported, and the others are listed.
 pub(super) fn info(
-    bench: PortBench<'_, Inverters>,
-    arguments: &InfoArguments,
+    session: &mut Session,
+    slaves: &[u8],
     output: &mut Output,
-) -> Result<Exit, Failure> {
-    let as_what = Use::look("info");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
-        let mut driver = driver(session);
-        let mut all = Vec::new();
-        let mut exit = Exit::Passed;
-        for slave in slaves {
-            match look(&mut driver, slave, |_| true) {
-                Ok(seen) => all.push(seen),
-                Err(error @ Error::Link(_)) => return Err(error.into()),
-                Err(error) => exit = exit.max(Failure::from(error).tell(output)),
-            }
+) -> Result<(Vec<DriveInfo>, Exit), Failure> {
+    let mut driver = driver(session);
+    let (mut all, mut exit) = (Vec::new(), Exit::Passed);
+    for &slave in slaves {
+        match look(&mut driver, slave, |_| true) {
+            Ok(seen) => all.push((slave, seen.rows())),
+            Err(error @ Error::Link(_)) => return Err(error.into()),
+            Err(error) => exit = exit.max(Failure::from(error).tell(output)),
         }
-        match arguments.format {
-            OutputForm::Text => output.result(&output.fitted(&text(&all)))?,
-            OutputForm::Json => {
-                let slaves: Vec<_> = all.iter().map(object).collect();
-                output.result(&format!("{}\n", json!({"schema": 1, "drives": slaves})))?;
-            }
-        }
-        Ok(exit)
-    })
+    }
+    Ok((all, exit))
 }
 
-/// Shows all slaves, a row each.
-pub(super) fn top(
-    bench: PortBench<'_, Inverters>,
-    arguments: &TopArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    check_top(arguments, output)?;
-    let as_what = Use::look("top");
-    on(bench, &arguments.rig, as_what, output, |session, output| {
-        let slaves = select(&[Axes::All], session)?;
-        let mut reader = Reader::default();
-        let view = LineTop {
-            what: "inverters on PROFIBUS",
-            form: &FORM,
-            traffic: &["from", "telegrams", "telegrams/s", "damaged"],
-            picture: live::picture_of_port(&slaves),
-            read: &mut |session, slave| {
-                let shown = |name: &str| FORM.columns.iter().any(|own| own.head == name);
-                Ok(row(&look(&mut driver(session), slave, shown)?))
-            },
-            stop: &mut send_off,
-            rows: &mut |heard| {
-                let run = |piece| match piece {
-                    Piece::Telegram(from, octets) => Some(TelegramRun { from, octets }),
-                    _ => None,
-                };
-                let runs: Vec<_> = heard.into_iter().filter_map(run).collect();
-                let row = |run| (live::at_port(run, &slaves, &mut reader), run);
-                live::without_tokens(runs.iter().map(row))
-            },
-        };
-        view.show(session, arguments, output)
-    })
+/// The table of all slaves, a row each.
+pub(super) fn top(session: &Session) -> LineTop<Inverters> {
+    let slaves = session.drives().listed();
+    let mut reader = Reader::default();
+    LineTop {
+        what: "inverters on PROFIBUS",
+        form: &FORM,
+        traffic: &["from", "telegrams", "telegrams/s", "damaged"],
+        picture: live::picture_of_port(&slaves),
+        read: |session, slave| {
+            let shown = |name: &str| FORM.columns.iter().any(|column| column.head == name);
+            Ok(row(&look(&mut driver(session), slave, shown)?))
+        },
+        stop: send_off,
+        rows: Box::new(move |heard| {
+            let run = |piece| match piece {
+                Piece::Telegram(from, octets) => Some(TelegramRun { from, octets }),
+                _ => None,
+            };
+            let runs: Vec<_> = heard.into_iter().filter_map(run).collect();
+            let row = |run| (live::at_port(run, &slaves, &mut reader), run);
+            live::without_tokens(runs.iter().map(row))
+        }),
+    }
 }
 
 /// The table of `top`. The states are those of NORDAC 3.3.
@@ -228,26 +202,4 @@ fn row(seen: &Seen) -> TopRow {
             status.unwrap_or_default(),
         ],
     }
-}
-
-fn text(all: &[Seen]) -> String {
-    let rows: Vec<_> = all
-        .iter()
-        .flat_map(|seen| {
-            let slave = seen.slave.to_string();
-            let rows = seen.rows().into_iter();
-            rows.map(move |(what, value, place)| [slave.clone(), what, value, place])
-        })
-        .collect();
-    columns(&["slave", "what", "value", "parameter"], &rows)
-}
-
-fn object(seen: &Seen) -> Value {
-    let mut object = Map::new();
-    object.insert("slave".to_owned(), json!(seen.slave));
-    for (name, value, _) in seen.rows() {
-        let name = name.to_lowercase().replace([' ', '-'], "_");
-        object.insert(name, json!(value));
-    }
-    Value::Object(object)
 }

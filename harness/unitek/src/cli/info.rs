@@ -3,24 +3,15 @@
 use super::control::how;
 use super::read::Found;
 use crate::live;
-use crate::rig::OfUnitek as _;
-use crate::rig::UnitekDrives;
+use crate::rig::{Axis, OfUnitek as _, Session, UnitekDrives};
 use crate::value::hex;
 use harness_bench::capture::Piece;
-use harness_bench::command::drive::{InfoArguments, OutputForm, TopArguments};
-use harness_bench::command::drives::CommandDrives as _;
-use harness_bench::command::exit::Exit;
+use harness_bench::command::drives::{CommandDrives as _, DriveInfo};
 use harness_bench::command::failure::Failure;
 use harness_bench::command::line_top::LineTop;
-use harness_bench::command::output::Output;
-use harness_bench::command::output::columns;
-use harness_bench::command::port_bench::{PortBench, on, select};
-use harness_bench::command::rig_name::Use;
-use harness_bench::command::top::check as check_top;
 use harness_bench::top::{TopColumn, TopForm, TopRow};
 use harness_proto::unitek::Register;
 use harness_proto::unitek::words::{ERRORS_NOT_READY, MODE_LOCK};
-use serde_json::{Map, Value, json};
 
 /// What is shown of a drive: the heading, and the register.
 const SHOWN: [(&str, u8); 11] = [
@@ -64,66 +55,41 @@ static FORM: TopForm = TopForm {
     ],
 };
 
-/// Lists drives.
-pub(super) fn info(
-    bench: PortBench<'_, UnitekDrives>,
-    arguments: &InfoArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    on(
-        bench,
-        &arguments.rig,
-        Use::look("info"),
-        output,
-        |session, output| {
-            let drives = select(std::slice::from_ref(&arguments.drives), session)?;
-            let registers = SHOWN.map(|(_, register)| Register::of(register));
-            let found = UnitekDrives::read(session, &drives, &registers)?;
-            let drives: Vec<_> = found.chunks_exact(SHOWN.len()).collect();
-            match arguments.format {
-                OutputForm::Text => output.result(&output.fitted(&text(&drives)))?,
-                OutputForm::Json => {
-                    let drives: Vec<_> = drives.into_iter().map(object).collect();
-                    let whole = json!({"schema": 1, "drives": drives});
-                    output.result(&format!("{whole}\n"))?;
-                }
-            }
-            Ok(Exit::Passed)
-        },
-    )
+/// What is shown of drives.
+pub(super) fn info(session: &mut Session, drives: &[Axis]) -> Result<Vec<DriveInfo>, Failure> {
+    let registers = SHOWN.map(|(_, register)| Register::of(register));
+    let found = UnitekDrives::read(session, drives, &registers)?;
+    let row = |(found, (name, register)): (&Found, (&str, u8))| {
+        let place = format!("{register:02X} {}", found.register().name);
+        [name.to_owned(), words(found), place]
+    };
+    let rows = found.chunks_exact(SHOWN.len());
+    let rows = rows.map(|found| found.iter().zip(SHOWN).map(row).collect());
+    Ok(drives.iter().map(|axis| axis.node).zip(rows).collect())
 }
 
-/// Shows all drives, a row each.
-pub(super) fn top(
-    bench: PortBench<'_, UnitekDrives>,
-    arguments: &TopArguments,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    check_top(arguments, output)?;
-    let look = Use::look("top");
-    on(bench, &arguments.rig, look, output, |session, output| {
-        let registers = OF_TOP.map(Register::of);
-        let drives = session.axes().to_vec();
-        let names = drives.iter().map(|own| format!("drive {}", own.node));
-        let view = LineTop {
-            what: "drives on CAN",
-            form: &FORM,
-            traffic: &["from", "frames", "frames/s", "damaged"],
-            picture: live::picture("bench", names),
-            read: &mut |session, drive| {
-                Ok(row(&UnitekDrives::read(session, &[drive], &registers)?))
-            },
-            stop: &mut |session, drive| Ok(how(session.driver().stop(drive)?).to_owned()),
-            rows: &mut |heard| {
-                let row = |piece: &Piece| match piece {
-                    Piece::Frame(own) => Some(live::at_port(own, &drives)),
-                    _ => None,
-                };
-                heard.iter().filter_map(row).collect()
-            },
-        };
-        view.show(session, arguments, output)
-    })
+/// The table of all drives, a row each.
+pub(super) fn top(session: &Session) -> LineTop<UnitekDrives> {
+    let drives = session.axes().to_vec();
+    let names = drives.iter().map(|axis| format!("drive {}", axis.node));
+    LineTop {
+        what: "drives on CAN",
+        form: &FORM,
+        traffic: &["from", "frames", "frames/s", "damaged"],
+        picture: live::picture("bench", names),
+        read: |session, drive| {
+            let registers = OF_TOP.map(Register::of);
+            Ok(row(&UnitekDrives::read(session, &[drive], &registers)?))
+        },
+        stop: |session, drive| Ok(how(session.driver().stop(drive)?).to_owned()),
+        rows: Box::new(move |heard| {
+            let row = |piece: &Piece| match piece {
+                Piece::Frame(frame) => Some(live::at_port(frame, &drives)),
+                _ => None,
+            };
+            heard.iter().filter_map(row).collect()
+        }),
+    }
 }
 
 /// The row of a drive of which the registers of `top` were read.
@@ -170,30 +136,4 @@ fn words(found: &Found) -> String {
             words => words,
         },
     }
-}
-
-fn text(drives: &[&[Found]]) -> String {
-    let rows: Vec<_> = drives
-        .iter()
-        .flat_map(|drive| {
-            drive.iter().zip(SHOWN).map(|(found, (name, register))| {
-                [
-                    found.axis.node.to_string(),
-                    name.to_owned(),
-                    words(found),
-                    format!("{register:02X} {}", found.register().name),
-                ]
-            })
-        })
-        .collect();
-    columns(&["drive", "what", "value", "register"], &rows)
-}
-
-fn object(drive: &[Found]) -> Value {
-    let mut object = Map::new();
-    for (found, (name, _)) in drive.iter().zip(SHOWN) {
-        object.insert("drive".to_owned(), json!(found.axis.node));
-        object.insert(name.replace(' ', "_"), json!(words(found)));
-    }
-    Value::Object(object)
 }

@@ -1,10 +1,10 @@
-//! Commands on UNITEK drives: one file a command, over the driver [`crate::driver`].
+//! Commands on UNITEK drives over the driver [`crate::driver`]: `drives` has what they share with other buses.
 
 mod bench;
 pub(crate) mod cells;
 mod control;
 pub(crate) mod deviations;
-mod held;
+mod drives;
 mod info;
 mod params;
 mod position;
@@ -13,43 +13,40 @@ pub(crate) mod sim;
 mod write;
 
 use super::driver;
-use crate::rig::UnitekDrives;
+use crate::rig::{OfUnitek as _, Player, Session, UnitekDrives};
 use harness_bench::command::drive::DriveCommand;
-use harness_bench::command::drives::{read, watch};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::{Failure, exit_of_trouble};
+use harness_bench::command::held::HeldDrives;
 use harness_bench::command::output::Output;
-use harness_bench::command::params::params;
 use harness_bench::command::port_bench::PortBench;
+use harness_proto::time::Span;
 
-/// Runs a command on a rig, or on one that a session holds.
-///
-/// # Errors
-/// [`Failure`].
-pub(crate) fn drive(
-    bench: PortBench<'_, UnitekDrives>,
-    command: &DriveCommand,
-    output: &mut Output,
-) -> Result<Exit, Failure> {
-    match command {
-        DriveCommand::Read(arguments) => read(bench, arguments, output),
-        DriveCommand::Write(arguments) => write::write(bench, arguments, output),
-        DriveCommand::Info(arguments) => info::info(bench, arguments, output),
-        DriveCommand::Watch(arguments) => watch(bench, arguments, output),
-        DriveCommand::Params(command) => params(bench, command, output),
-        DriveCommand::Position(arguments) => position::position(bench, arguments, output),
-        DriveCommand::Go(arguments) => control::go(bench, arguments, output),
-        DriveCommand::Stop(arguments) => control::stop(bench, arguments, output),
-        DriveCommand::Block(arguments) => control::block(bench, arguments, output),
-        DriveCommand::DeleteError(arguments) => control::delete_error(bench, arguments, output),
-        DriveCommand::Top(arguments) => info::top(bench, arguments, output),
-        DriveCommand::Scope(_)
-        | DriveCommand::Reset(_)
-        | DriveCommand::Recover(_)
-        | DriveCommand::Cyclic(_)
-        | DriveCommand::Sim(_) => Err(Failure::refused(
-            "this command is for drives of another bus; on UNITEK drives there are read, write, watch, info, top, params, position, go, stop, block and delete-error",
-        )),
+impl HeldDrives for UnitekDrives {
+    const SPEED: &'static str = "SPEED_ACTUAL";
+
+    type Player = Player;
+
+    fn perform(
+        bench: PortBench<'_, Self>,
+        command: &DriveCommand,
+        output: &mut Output,
+    ) -> Result<Exit, Failure> {
+        match command {
+            DriveCommand::Write(arguments) => write::write(bench, arguments, output),
+            DriveCommand::Position(arguments) => position::position(bench, arguments, output),
+            DriveCommand::Go(arguments) => control::go(bench, arguments, output),
+            DriveCommand::Stop(arguments) => control::stop(bench, arguments, output),
+            DriveCommand::Block(arguments) => control::block(bench, arguments, output),
+            DriveCommand::DeleteError(arguments) => control::delete_error(bench, arguments, output),
+            _ => Err(Failure::refused(
+                "this command is for drives of another bus; on UNITEK drives there are read, write, watch, info, top, params, position, go, stop, block and delete-error",
+            )),
+        }
+    }
+
+    fn pass(session: &mut Session, time: Span) -> Result<(), Failure> {
+        Ok(session.driver().run(time)?)
     }
 }
 

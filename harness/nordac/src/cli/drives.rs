@@ -1,56 +1,20 @@
-//! The drives of a port, as the commands of all buses and a session use them.
+//! What the commands that all buses share ask of the drives of a port.
 
 use super::bench::driver;
+use super::info::{info, top};
 use super::params::PARAMETERS;
 use super::read::{Found, find};
-use crate::rig::{Inverters, OfNordac as _, Player, RigSlave, Session};
+use crate::rig::{Inverters, OfNordac as _, RigSlave, Session};
 use crate::value::{Assignment, Cell, cells};
 use harness_bench::command::check::CheckedDrive;
-use harness_bench::command::drive::DriveCommand;
-use harness_bench::command::drives::CommandDrives;
+use harness_bench::command::drives::{CommandDrives, DriveInfo};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
-use harness_bench::command::held::HeldDrives;
+use harness_bench::command::line_top::LineTop;
 use harness_bench::command::output::Output;
 use harness_bench::command::params::ParameterFile;
-use harness_bench::command::port_bench::PortBench;
-use harness_bench::link::Line;
 use harness_proto::profibus::dp::Diagnosis;
-use harness_proto::time::Span;
 use serde_json::{Value, json};
-
-impl HeldDrives for Inverters {
-    const SPEED: &'static str = "HIW";
-
-    type Player = Player;
-
-    fn perform(
-        bench: PortBench<'_, Self>,
-        command: &DriveCommand,
-        output: &mut Output,
-    ) -> Result<Exit, Failure> {
-        super::drive(bench, command, output)
-    }
-
-    fn pass(session: &mut Session, time: Span) -> Result<(), Failure> {
-        let mut driver = driver(session);
-        if driver.slaves().next().is_some() {
-            return Ok(driver.run(time)?);
-        }
-        drop(driver);
-        let link = session.link();
-        let end = link.now() + time;
-        while link.now() < end && link.wait(end) {}
-        Ok(())
-    }
-
-    fn forget(&self) {
-        *self
-            .parked
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner) = None;
-    }
-}
 
 impl CommandDrives for Inverters {
     type Cell = Cell;
@@ -71,6 +35,20 @@ impl CommandDrives for Inverters {
             found.extend(find(&mut driver, *slave, cells)?);
         }
         Ok(found)
+    }
+
+    const PLACE: &'static str = "parameter";
+
+    fn info(
+        session: &mut Session,
+        slaves: &[u8],
+        output: &mut Output,
+    ) -> Result<(Vec<DriveInfo>, Exit), Failure> {
+        info(session, slaves, output)
+    }
+
+    fn top(session: &Session) -> LineTop<Self> {
+        top(session)
     }
 
     const SILENT: &'static str = "does not reply";

@@ -1,42 +1,22 @@
-//! The drives of a port, as the commands of all buses and a session use them.
+//! What the commands that all buses share ask of the drives of a port.
 
 use super::bench::scaling;
+use super::info::{info, top};
 use super::params::{PARAMETERS, RegisterValue};
 use super::read::Found;
-use crate::rig::{Axis, OfUnitek as _, Player, Session, UnitekDrives};
+use crate::rig::{Axis, OfUnitek as _, Session, UnitekDrives};
 use crate::value::registers;
 use harness_bench::command::check::{CheckAnswer, CheckedDrive};
-use harness_bench::command::drive::DriveCommand;
-use harness_bench::command::drives::CommandDrives;
+use harness_bench::command::drives::{CommandDrives, DriveInfo};
 use harness_bench::command::exit::Exit;
 use harness_bench::command::failure::Failure;
-use harness_bench::command::held::HeldDrives;
+use harness_bench::command::line_top::LineTop;
 use harness_bench::command::output::Output;
 use harness_bench::command::params::ParameterFile;
-use harness_bench::command::port_bench::PortBench;
-use harness_proto::time::Span;
 use harness_proto::unitek::Register;
 use harness_proto::unitek::units::{Scaling, usual};
 use harness_proto::unitek::words::{ERRORS, set_bits};
 use serde_json::json;
-
-impl HeldDrives for UnitekDrives {
-    const SPEED: &'static str = "SPEED_ACTUAL";
-
-    type Player = Player;
-
-    fn perform(
-        bench: PortBench<'_, Self>,
-        command: &DriveCommand,
-        output: &mut Output,
-    ) -> Result<Exit, Failure> {
-        super::drive(bench, command, output)
-    }
-
-    fn pass(session: &mut Session, time: Span) -> Result<(), Failure> {
-        Ok(session.driver().run(time)?)
-    }
-}
 
 impl CommandDrives for UnitekDrives {
     type Cell = &'static Register;
@@ -71,6 +51,20 @@ impl CommandDrives for UnitekDrives {
             }
         }
         Ok(found)
+    }
+
+    const PLACE: &'static str = "register";
+
+    fn info(
+        session: &mut Session,
+        drives: &[Axis],
+        _: &mut Output,
+    ) -> Result<(Vec<DriveInfo>, Exit), Failure> {
+        Ok((info(session, drives)?, Exit::Passed))
+    }
+
+    fn top(session: &Session) -> LineTop<Self> {
+        top(session)
     }
 
     const SILENT: &'static str = "does not answer";
