@@ -1,4 +1,4 @@
-//! What the commands that every bus behind `[port.1]` has ask of its drives.
+//! The commands that all buses behind `[port.1]` share, and what they ask of the drives of a bus.
 
 use super::check::CheckedDrive;
 use super::drive::{DriveCommand, InfoArguments, OutputForm, ReadArguments, WatchArguments};
@@ -21,7 +21,7 @@ use std::slice::from_ref;
 /// What `info` shows of a drive, by its number: each value with its heading and with where it stands.
 pub type DriveInfo = (u8, Vec<[String; 3]>);
 
-/// Drives that are read and written by the same commands as those of other buses.
+/// Drives of a bus, as the commands use them that all buses behind `[port.1]` share.
 pub trait CommandDrives: HeldDrives {
     /// What is read of a drive: a register or a parameter.
     type Cell;
@@ -30,6 +30,10 @@ pub trait CommandDrives: HeldDrives {
     type Parameter;
 
     const PARAMETERS: ParameterFile<Self, Self::Parameter>;
+    /// The heading of `info` for where a value stands.
+    const PLACE: &'static str;
+    /// What `rig check` says of a drive that does not answer.
+    const SILENT: &'static str;
 
     /// What a command line names, each cell once.
     ///
@@ -47,10 +51,7 @@ pub trait CommandDrives: HeldDrives {
         cells: &[Self::Cell],
     ) -> Result<Vec<Self::Reading>, Failure>;
 
-    /// What `info` calls the place of a value.
-    const PLACE: &'static str;
-
-    /// Reads what `info` shows. A drive that may be left out without an answer is reported.
+    /// Reads what `info` shows. The exit code is that of the drives that were reported and left out.
     ///
     /// # Errors
     /// [`Failure`]: a drive does not answer as it must, or the port is lost.
@@ -62,9 +63,6 @@ pub trait CommandDrives: HeldDrives {
 
     /// What `top` shows of them.
     fn top(session: &PortSession<Self>) -> LineTop<Self>;
-
-    /// What `rig check` says of a drive without an answer.
-    const SILENT: &'static str;
 
     /// Asks every drive for `rig check`, unless the bench only listens.
     fn check(session: &mut PortSession<Self>) -> Vec<CheckedDrive>;

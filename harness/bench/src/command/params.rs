@@ -21,11 +21,14 @@ pub enum EntryMistake {
     Value(String),
 }
 
-/// Reads parameters of a drive and gives those that differ, each with a line that shows both values.
+/// Reads all parameters of a drive and returns the lines of a file.
+type Lines<D> = fn(&mut PortSession<D>, <D as PortDrives>::Drive) -> Result<Vec<String>, Failure>;
+
+/// Reads parameters of a drive and returns those that differ, each with a line that shows both values.
 type Compare<D, P> =
     fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P]) -> Result<Vec<(P, String)>, Failure>;
 
-/// Writes parameters into a drive, unless one of them is denied; and stores them.
+/// Writes parameters into a drive, and stores them if the last argument says so. If one of them is denied, nothing is written.
 type Write<D, P> =
     fn(&mut PortSession<D>, <D as PortDrives>::Drive, &[P], bool) -> Result<(), Failure>;
 
@@ -39,16 +42,15 @@ pub struct ParameterFile<D: PortDrives, P> {
     pub expected: [&'static str; 2],
     /// A line of a file.
     pub entry: fn(&str, &DeValue<'_>) -> Result<P, EntryMistake>,
-    /// What is wrong with a key that has no table below it.
+    /// The message for a key of the file that has no table below it.
     pub no_table: fn(&str) -> String,
-    /// Reads all parameters of a drive: the lines of a file.
-    pub read: fn(&mut PortSession<D>, D::Drive) -> Result<Vec<String>, Failure>,
+    pub read: Lines<D>,
     pub compare: Compare<D, P>,
-    /// Whether a parameter is ever loaded, and what the others are.
+    /// Whether a parameter is ever loaded; `never_loaded` says why the others are not.
     pub is_loaded: fn(&P) -> bool,
     pub never_loaded: &'static str,
     pub write: Write<D, P>,
-    /// What was done with what is written.
+    /// The end of the message about what was written.
     pub written: &'static str,
     /// Why `--store` is refused.
     pub stores_nothing: Option<&'static str>,
@@ -152,7 +154,7 @@ fn load<D: CommandDrives>(
     })
 }
 
-/// Shows the parameters that differ from those of a file, and gives them.
+/// Shows the parameters that differ from those of a file, and returns them.
 fn differing<D: CommandDrives>(
     session: &mut PortSession<D>,
     drive: D::Drive,

@@ -22,6 +22,8 @@ impl CommandDrives for Inverters {
     type Parameter = Assignment;
 
     const PARAMETERS: ParameterFile<Self, Assignment> = PARAMETERS;
+    const PLACE: &'static str = "parameter";
+    const SILENT: &'static str = "does not reply";
 
     fn cells(texts: &[String]) -> Result<Vec<Cell>, String> {
         cells(texts)
@@ -37,8 +39,6 @@ impl CommandDrives for Inverters {
         Ok(found)
     }
 
-    const PLACE: &'static str = "parameter";
-
     fn info(
         session: &mut Session,
         slaves: &[u8],
@@ -50,8 +50,6 @@ impl CommandDrives for Inverters {
     fn top(session: &Session) -> LineTop<Self> {
         top(session)
     }
-
-    const SILENT: &'static str = "does not reply";
 
     fn check(session: &mut Session) -> Vec<CheckedDrive> {
         let listens = session.listens_only();

@@ -24,6 +24,8 @@ impl CommandDrives for UnitekDrives {
     type Parameter = RegisterValue;
 
     const PARAMETERS: ParameterFile<Self, RegisterValue> = PARAMETERS;
+    const PLACE: &'static str = "register";
+    const SILENT: &'static str = "does not answer";
 
     fn cells(texts: &[String]) -> Result<Vec<Self::Cell>, String> {
         registers(texts)
@@ -53,8 +55,6 @@ impl CommandDrives for UnitekDrives {
         Ok(found)
     }
 
-    const PLACE: &'static str = "register";
-
     fn info(
         session: &mut Session,
         drives: &[Axis],
@@ -66,8 +66,6 @@ impl CommandDrives for UnitekDrives {
     fn top(session: &Session) -> LineTop<Self> {
         top(session)
     }
-
-    const SILENT: &'static str = "does not answer";
 
     fn check(session: &mut Session) -> Vec<CheckedDrive> {
         let mut checked = Vec::new();
