@@ -29,7 +29,7 @@ mod value;
 
 use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;
-use harness_bench::campaign::{Campaign, CampaignError};
+use harness_bench::campaign::line;
 use harness_bench::capture::{Carries, judged_frames, replayed_frames};
 use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
@@ -62,11 +62,8 @@ pub static BUS: Bus = Bus {
     replayed: |capture, options| replayed_frames(capture::scenario, (capture, options)),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
     rigs: Some(rig::COMMANDS),
-    campaigns: campaign::names,
-    campaign: |name| {
-        let found = campaign::find(name)?.map(|own| -> Box<dyn Campaign> { Box::new(own) });
-        Some(found.map_err(CampaignError::Said))
-    },
+    campaigns: line::line_names::<campaign::Telegrams>,
+    campaign: line::found::<campaign::Telegrams>,
     embedding: None,
     rings: None,
     shared: Some(SharedLine {

@@ -12,6 +12,7 @@ pub use page::page;
 
 use crate::report::html::Section;
 use crate::scenario::problem::Problems;
+use include_dir::Dir;
 use pairs::FaultPairs;
 use std::fmt::Debug;
 
@@ -123,4 +124,13 @@ pub trait PlayedCampaign {
 /// The place of the class with this name.
 pub fn class_of(played: &dyn PlayedCampaign, name: &str) -> Option<usize> {
     played.classes().iter().position(|own| own.name == name)
+}
+
+/// The names of built-in campaigns, in order: `prefix` and the name of the file.
+pub fn names(built_in: &Dir<'_>, prefix: &str) -> Vec<String> {
+    let paths = built_in.files().map(|file| file.path());
+    let bare = paths.filter_map(|path| path.to_str()?.strip_suffix(".toml"));
+    let mut names: Vec<_> = bare.map(|name| format!("{prefix}{name}")).collect();
+    names.sort_unstable();
+    names
 }

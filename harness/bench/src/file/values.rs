@@ -1,6 +1,7 @@
 //! The values of a rig file that are written as a text: times, speeds, links, lines.
 
 use crate::scenario::quantity::{Dimension, figures, parse};
+use harness_proto::time::Span;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -40,6 +41,12 @@ impl Time {
     #[must_use]
     pub const fn seconds(seconds: u64) -> Self {
         Self(Duration::from_secs(seconds))
+    }
+
+    /// The same in virtual time.
+    #[must_use]
+    pub fn span(self) -> Span {
+        Span::from_nanos(u64::try_from(self.0.as_nanos()).unwrap_or(u64::MAX))
     }
 }
 

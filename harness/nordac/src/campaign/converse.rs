@@ -3,7 +3,9 @@
 //! The master repeats a request without a reply, and starts the slave again where that does not help, or where the slave has left the
 //! exchange. Every request begins at its own time, so that a repetition does not shift what follows.
 
-use super::file::{CampaignStep, TelegramCampaignFile};
+use super::Telegrams;
+use super::file::CampaignStep;
+use harness_bench::campaign::line::{Conversation, MasterPiece};
 use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::nordac::master::{Exchange, Startup};
@@ -18,6 +20,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::inverter::Outputs;
 use harness_sim::nordac::{Drive, InverterSetup, Member};
 use harness_sim::octet_segment::{LineFaultAt, LineHost, OctetSegment, Wish};
+use std::fmt;
 
 /// The stations.
 const MASTER: usize = 0;
@@ -41,8 +44,8 @@ const MOST_EXCHANGES: u8 = 8;
 /// Behind the last step: what is late arrives.
 const REST: Span = Span::from_millis(50);
 
-/// How a step ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What a step brought.
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) enum StepEnd {
     /// The slave exchanges data.
     Started,
@@ -52,27 +55,17 @@ pub(crate) enum StepEnd {
     Answered(String),
     /// A wait has passed.
     Waited,
-    /// The master gave up, and why.
-    GaveUp(String),
 }
 
-impl StepEnd {
-    /// Whether the master reports it as done.
-    #[must_use]
-    pub(crate) const fn is_well(&self) -> bool {
-        !matches!(self, Self::GaveUp(_))
-    }
-
-    #[must_use]
-    pub(crate) fn words(&self) -> String {
+impl fmt::Display for StepEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Started => "started".to_owned(),
+            Self::Started => f.write_str("started"),
             Self::Exchanged(image) => {
-                format!("ZSW {:04X} HIW {:04X}", image.first(), image.main())
+                write!(f, "ZSW {:04X} HIW {:04X}", image.first(), image.main())
             }
-            Self::Answered(answer) => answer.clone(),
-            Self::Waited => "waited".to_owned(),
-            Self::GaveUp(why) => format!("gave up: {why}"),
+            Self::Answered(answer) => f.write_str(answer),
+            Self::Waited => f.write_str("waited"),
         }
     }
 }
@@ -86,53 +79,26 @@ pub(crate) struct SlaveState {
     parameters: Vec<Option<i64>>,
 }
 
-/// What a conversation gave.
-#[derive(Clone, Debug)]
-pub(crate) struct Conversation {
-    /// How each step ended.
-    pub(crate) ends: Vec<StepEnd>,
-    /// Requests that were repeated.
-    pub(crate) repeats: u64,
-    /// How often the slave was started again.
-    pub(crate) starts: u64,
-    /// Telegrams on the line, in order: whether the slave sent it, and its octets.
-    pub(crate) telegrams: Vec<(bool, Vec<u8>)>,
-    /// What the slave holds at the end.
-    pub(crate) state: Option<SlaveState>,
-    /// What the master sent and received, in order.
-    pub(super) log: Vec<MasterOctets>,
-    /// How long it took.
-    pub(super) end: Instant,
-}
-
-#[derive(Clone, Debug)]
-pub(super) enum MasterOctets {
-    /// A telegram that was to be sent from this time on.
-    Sent(Instant, Vec<u8>),
-    /// What came before the next telegram.
-    Received(Vec<Received>),
-}
-
 /// Plays the steps, with a fault or without.
 pub(super) fn converse(
-    file: &TelegramCampaignFile,
-    ppo: PpoType,
-    steps: &[CampaignStep],
+    telegrams: &Telegrams,
     fault: Option<LineFaultAt>,
-) -> Option<Conversation> {
-    let mut desk = Desk::new(file, ppo)?;
+) -> Option<Conversation<Telegrams>> {
+    let mut desk = Desk::new(telegrams)?;
     if let Some(fault) = fault {
         desk.line.inject(fault);
     }
-    let ends = steps.iter().map(|step| desk.step(*step)).collect();
+    let ends = telegrams.steps.iter().map(|step| desk.step(*step));
+    let ends = ends.collect();
     desk.run(desk.now + REST);
     let _late = desk.take_heard();
     let state = desk.state();
     Some(Conversation {
         ends,
-        repeats: desk.repeated,
+        troubles: Vec::new(),
         starts: desk.starts,
-        telegrams: desk.telegrams,
+        requests: desk.repeated,
+        carried: desk.telegrams,
         state,
         log: desk.log,
         end: desk.now,
@@ -149,11 +115,12 @@ struct Desk {
     repeated: u64,
     starts: u64,
     telegrams: Vec<(bool, Vec<u8>)>,
-    log: Vec<MasterOctets>,
+    log: Vec<MasterPiece<Vec<Received>>>,
 }
 
 impl Desk {
-    fn new(file: &TelegramCampaignFile, ppo: PpoType) -> Option<Self> {
+    fn new(telegrams: &Telegrams) -> Option<Self> {
+        let ppo = telegrams.ppo;
         let none = Index::default();
         let setup = InverterSetup {
             parameters: vec![
@@ -170,7 +137,7 @@ impl Desk {
             requests: Requests::new(ADDRESSES.0, ADDRESSES.1).ok()?,
             exchange: Exchange::new(ppo),
             ppo,
-            repeats: file.repeats,
+            repeats: telegrams.repeats,
             now: Instant::START,
             repeated: 0,
             starts: 0,
@@ -199,7 +166,7 @@ impl Desk {
         self.now = self.now.max(to);
     }
 
-    fn step(&mut self, step: CampaignStep) -> StepEnd {
+    fn step(&mut self, step: CampaignStep) -> Result<StepEnd, String> {
         for _ in 0..=MOST_STARTS {
             let done = match step {
                 CampaignStep::Wait(time) => {
@@ -221,19 +188,19 @@ impl Desk {
                 }
             };
             match done {
-                Ok(end) => return end,
+                Ok(end) => return Ok(end),
                 Err(_) => {
                     self.starts += 1;
                     // What goes out stays the same.
                     if let Err(why) = self.start()
                         && self.starts > u64::from(MOST_STARTS)
                     {
-                        return StepEnd::GaveUp(why);
+                        return Err(format!("gave up: {why}"));
                     }
                 }
             }
         }
-        StepEnd::GaveUp("the slave does not stay in the exchange".to_owned())
+        Err("gave up: the slave does not stay in the exchange".to_owned())
     }
 
     /// From the diagnosis to the exchange.
@@ -294,7 +261,8 @@ impl Desk {
             idle_bits: SYN_BITS,
         };
         let _late = self.take_heard();
-        self.log.push(MasterOctets::Sent(self.now, octets.to_vec()));
+        let sent = octets.iter().copied().map(Received::good).collect();
+        self.log.push(MasterPiece::Sent(self.now, sent));
         let host = self.line.station_mut(MASTER).host_mut()?;
         host.forget();
         host.send(wish, own);
@@ -326,7 +294,7 @@ impl Desk {
         let heard = host.map(|host| std::iter::from_fn(|| host.receive()).map(|(_, own)| own));
         let heard: Vec<_> = heard.into_iter().flatten().collect();
         if !heard.is_empty() {
-            self.log.push(MasterOctets::Received(heard.clone()));
+            self.log.push(MasterPiece::Received(heard.clone()));
         }
         heard
     }

@@ -1,7 +1,7 @@
 //! What stands in a campaign file of this bus (`corpora/campaigns/nordac/*.toml`).
 
-use super::CLASSES;
-use harness_bench::bus_name::BusName;
+use super::{TABLE, Telegrams};
+use harness_bench::campaign::line::{LineKeys, LineText};
 use harness_bench::file::values::Time;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::parameter::ParameterRef;
@@ -11,38 +11,32 @@ use harness_sim::octet_segment::{LineFault, TelegramFault};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// The most steps of a conversation.
-const MOST_STEPS: usize = 100;
-
-/// The longest wait and the longest delay.
-const LONGEST: Span = Span::from_millis(10_000);
-
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct TelegramCampaignFile {
+struct TelegramCampaignFile {
     /// The version of this schema: 1.
-    pub(crate) schema: u32,
+    schema: u32,
     /// The bus: `nordac`.
-    pub(crate) bus: String,
+    bus: String,
     /// What the campaign shows, in a line.
-    pub(crate) title: String,
+    title: String,
     /// The PPO type, 1 to 4; 1 where nothing is said.
     #[serde(default = "one")]
-    pub(crate) ppo: u8,
+    ppo: u8,
     /// What the master does, see [`CampaignStep`].
-    pub(crate) steps: Vec<String>,
+    steps: Vec<String>,
     /// The kinds of faults.
-    pub(crate) faults: Vec<FaultName>,
+    faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
-    pub(crate) delays: Vec<Time>,
+    delays: Vec<Time>,
     /// How often a request without a reply is repeated; once where nothing is said.
     #[serde(default = "one")]
-    pub(crate) repeats: u8,
+    repeats: u8,
     /// How many cases there must be of each class, and of all `cases`; what is not named is not looked at.
     #[serde(default)]
-    pub(crate) expect: BTreeMap<String, u64>,
+    expect: BTreeMap<String, u64>,
 }
 
 const fn one() -> u8 {
@@ -52,7 +46,7 @@ const fn one() -> u8 {
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum FaultName {
+pub(super) enum FaultName {
     /// Each of the eleven bits of each octet, one at a time.
     Bits,
     /// Two neighbouring data bits of each octet, which parity does not show.
@@ -70,11 +64,6 @@ pub(crate) enum FaultName {
 }
 
 impl FaultName {
-    /// Whether it happens to octets.
-    pub(super) const fn is_of_octets(self) -> bool {
-        matches!(self, Self::Bits | Self::TwoBits | Self::Dropped)
-    }
-
     /// The faults of this kind.
     pub(super) fn faults(self, delays: &[Time]) -> Vec<LineFault> {
         let flip = |flips| LineFault::Octet(LinkFault::Flip(flips));
@@ -111,7 +100,7 @@ impl FaultName {
             Self::Doubled => vec![one(TelegramFault::Doubled)],
             Self::Late => delays
                 .iter()
-                .map(|time| one(TelegramFault::Late(span(*time))))
+                .map(|time| one(TelegramFault::Late(time.span())))
                 .collect(),
             Self::Former => vec![one(TelegramFault::Former)],
         }
@@ -120,7 +109,7 @@ impl FaultName {
 
 /// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum CampaignStep {
+pub(super) enum CampaignStep {
     /// `start`: Slave_Diag, Set_Prm, Chk_Cfg, Slave_Diag.
     Start,
     /// `exchange 047F 2000`: one Data_Exchange with this control word and setpoint.
@@ -133,75 +122,56 @@ pub(crate) enum CampaignStep {
     Wait(Span),
 }
 
-fn span(time: Time) -> Span {
-    Span::from_nanos(u64::try_from(time.0.as_nanos()).unwrap_or(u64::MAX))
-}
-
-/// Whether a text names this bus.
-pub(super) fn is_of_this_bus(text: &str) -> bool {
-    let table: Result<toml::Table, _> = toml::from_str(text);
-    table.is_ok_and(|table| {
-        table.get("bus").and_then(|bus| bus.as_str()) == Some(BusName::Nordac.name())
-    })
-}
-
 /// Reads a campaign file, its PPO type and its steps.
 ///
 /// # Errors
 /// What is wrong, where, and what is expected.
-pub(super) fn read(
-    text: &str,
-) -> Result<(TelegramCampaignFile, PpoType, Vec<CampaignStep>), String> {
+pub(super) fn read(text: &str) -> Result<(Telegrams, LineText), String> {
     let file: TelegramCampaignFile = toml::from_str(text).map_err(|error| error.to_string())?;
-    if file.schema != 1 {
-        return Err(format!(
-            "schema {} is not known: write schema = 1",
-            file.schema
-        ));
-    }
     let ppo = PpoType::from_number(file.ppo)
         .ok_or_else(|| format!("ppo {} is none: 1 to 4 are expected", file.ppo))?;
-    let count = file.steps.len();
-    if !(1..=MOST_STEPS).contains(&count) {
+    let known = || std::iter::once("cases").chain(TABLE.classes.iter().map(|class| class.name));
+    if let Some(name) = file
+        .expect
+        .keys()
+        .find(|name| !known().any(|known| known == *name))
+    {
+        let names: Vec<_> = known().collect();
         return Err(format!(
-            "`steps` has {count} entries: 1 to {MOST_STEPS} are expected"
-        ));
-    }
-    if file.faults.contains(&FaultName::Late) == file.delays.is_empty() {
-        return Err(
-            "`late` in `faults` needs `delays`, such as [\"5ms\"], and `delays` needs `late`"
-                .to_owned(),
-        );
-    }
-    if let Some(long) = file.delays.iter().find(|time| span(**time) > LONGEST) {
-        return Err(format!(
-            "a delay of {long} is too long: at most 10 s are expected"
-        ));
-    }
-    let known = |name: &str| name == "cases" || CLASSES.iter().any(|own| own.name == name);
-    if let Some(name) = file.expect.keys().find(|name| !known(name)) {
-        let names: Vec<_> = CLASSES.iter().map(|own| own.name).collect();
-        return Err(format!(
-            "`{name}` in [expect] is no class: cases, {} are expected",
+            "`{name}` in [expect] is no class: {} are expected",
             names.join(", ")
         ));
     }
-    let read = |(index, text): (usize, &String)| {
-        let step = step(text).and_then(|step| match step {
-            CampaignStep::Read(_) | CampaignStep::Write(..) if !ppo.has_pkw() => Err(format!(
-                "{ppo} has no parameter channel: ppo = 1 or 2 is expected"
-            )),
-            step => Ok(step),
-        });
-        step.map_err(|wrong| format!("step {} (`{text}`): {wrong}", index + 1))
+    let keys = LineKeys {
+        schema: file.schema,
+        steps: &file.steps,
+        late: file.faults.contains(&FaultName::Late),
+        delays: &file.delays,
     };
-    let steps = file
-        .steps
-        .iter()
-        .enumerate()
-        .map(read)
-        .collect::<Result<_, _>>()?;
-    Ok((file, ppo, steps))
+    let steps = keys.steps(&TABLE, |text| match step(text)? {
+        CampaignStep::Read(_) | CampaignStep::Write(..) if !ppo.has_pkw() => Err(format!(
+            "{ppo} has no parameter channel: ppo = 1 or 2 is expected"
+        )),
+        step => Ok(step),
+    })?;
+    let telegrams = Telegrams {
+        ppo,
+        steps,
+        faults: file.faults,
+        delays: file.delays,
+        repeats: file.repeats,
+    };
+    let pinned = known().filter_map(|name| Some((name, *file.expect.get(name)?)));
+    let text = LineText {
+        title: file.title,
+        steps: file.steps,
+        expect: pinned.collect(),
+        header: format!(
+            "source  nordac 3.3\nbus     nordac\nslave 8\nslave 8 ppo {}\nslave 8 parameter 1621 = 2\n",
+            ppo.number()
+        ),
+    };
+    Ok((telegrams, text))
 }
 
 /// One step.
@@ -219,9 +189,9 @@ fn step(text: &str) -> Result<CampaignStep, String> {
         ["exchange", control, setpoint] => CampaignStep::Exchange(word(control)?, word(setpoint)?),
         ["read", name] => CampaignStep::Read(parameter(name)?),
         ["write", name, "=", value] => {
-            let own = parameter(name)?;
-            let raw = value.parse().ok().and_then(|number| own.parameter.raw_of(number));
-            CampaignStep::Write(own, raw.ok_or_else(|| format!("`{value}` is no value of {name}: a raw decimal number that fits it is expected"))?)
+            let parameter = parameter(name)?;
+            let raw = value.parse().ok().and_then(|number| parameter.parameter.raw_of(number));
+            CampaignStep::Write(parameter, raw.ok_or_else(|| format!("`{value}` is no value of {name}: a raw decimal number that fits it is expected"))?)
         }
         ["wait", time] => {
             let time: Option<u64> = time.strip_suffix("ms").and_then(|digits| digits.parse().ok());

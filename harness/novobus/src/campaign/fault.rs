@@ -96,10 +96,6 @@ fn time(text: &str) -> Result<Time, ()> {
     if time.0 > LONGEST { Err(()) } else { Ok(time) }
 }
 
-fn span(time: Time) -> Span {
-    Span::from_nanos(u64::try_from(time.0.as_nanos()).unwrap_or(u64::MAX))
-}
-
 impl FaultEffect {
     /// The same as faults of a link, each with its distance in bytes.
     #[must_use]
@@ -124,8 +120,8 @@ impl FaultEffect {
             Self::Duplicate => LinkFault::Duplicate,
             Self::Overrun => LinkFault::Overrun,
             Self::Insert(byte) => LinkFault::Insert(byte),
-            Self::Delay(time) => LinkFault::Delay(span(time)),
-            Self::Break(time) => LinkFault::Break(span(time)),
+            Self::Delay(time) => LinkFault::Delay(time.span()),
+            Self::Break(time) => LinkFault::Break(time.span()),
             Self::Gap(bytes) => {
                 return vec![(0, LinkFault::Cut), (u64::from(bytes), LinkFault::Join)];
             }
@@ -139,7 +135,7 @@ impl FaultEffect {
         match self {
             Self::Gap(bytes) => u64::from(bytes),
             Self::Delay(time) | Self::Break(time) => {
-                span(time).units() / byte_time.units().max(1) + 1
+                time.span().units() / byte_time.units().max(1) + 1
             }
             _ => 1,
         }

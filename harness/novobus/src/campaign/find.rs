@@ -11,17 +11,7 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../corpora/campa
 
 /// The names of the built-in campaigns, in order.
 pub(crate) fn names() -> Vec<String> {
-    let mut names: Vec<_> = BUILT_IN
-        .files()
-        .filter_map(|file| {
-            file.path()
-                .to_str()?
-                .strip_suffix(".toml")
-                .map(str::to_owned)
-        })
-        .collect();
-    names.sort_unstable();
-    names
+    campaign::names(&BUILT_IN, "")
 }
 
 /// Finds and reads a campaign: a file, or a built-in one by its name. `None` where it is neither.

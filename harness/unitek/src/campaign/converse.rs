@@ -1,14 +1,17 @@
 //! A conversation of the master with a drive on a segment.
 
-use super::file::{CampaignStep, FrameCampaignFile};
+use super::Frames;
+use super::file::CampaignStep;
+use harness_bench::campaign::line::{Conversation, MasterPiece};
 use harness_bench::counted::counted;
 use harness_proto::can::{BitRate, CanEvent, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Outcome};
+use harness_proto::unitek::master::{Disturbance, Event, Job, Master, Options, Outcome};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::segment::{Host, Placed, Segment};
 use harness_sim::unitek::{Control, Drive, Inputs, Member};
+use std::fmt;
 
 /// The stations.
 const MASTER: usize = 0;
@@ -20,48 +23,31 @@ const PATIENCE: Span = Span::from_millis(5_000);
 /// Behind the last step: what is late arrives, and what was not stopped shows.
 const REST: Span = Span::from_millis(300);
 
-/// How a step ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a step brought.
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) enum JobEnd {
-    /// A job, by its outcome; the stuff byte of a reply is left out.
+    /// The outcome of a job; the stuff byte of a reply is left out.
     Job(Outcome),
     /// A wait has passed.
     Waited,
-    /// The job has not ended.
-    Open,
 }
 
-impl JobEnd {
-    /// Whether the master reports it as done.
-    #[must_use]
-    pub(crate) const fn is_well(&self) -> bool {
-        match self {
-            Self::Waited => true,
-            Self::Open => false,
-            Self::Job(outcome) => !matches!(
-                outcome,
-                Outcome::NoReply { .. } | Outcome::NotReady(_) | Outcome::Differs { .. }
-            ),
-        }
-    }
-
-    #[must_use]
-    pub(crate) fn words(&self) -> String {
-        match self {
-            Self::Waited => "waited".to_owned(),
-            Self::Open => "not ended".to_owned(),
-            Self::Job(outcome) => match outcome {
-                Outcome::Read(reply) => format!("read {:X}", reply.data.bits()),
-                Outcome::Written(reply) => format!("written {:X}", reply.data.bits()),
-                Outcome::Differs { wrote, reads } => {
-                    format!("wrote {:X}, reads {:X}", wrote.bits(), reads.data.bits())
-                }
-                Outcome::Sent => "sent".to_owned(),
-                Outcome::Started(_) => "started".to_owned(),
-                Outcome::Released => "released".to_owned(),
-                Outcome::NotReady(_) => "not ready".to_owned(),
-                Outcome::NoReply { tries } => format!("no reply to {}", counted(*tries, "request")),
-            },
+impl fmt::Display for JobEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self::Job(outcome) = self else {
+            return f.write_str("waited");
+        };
+        match outcome {
+            Outcome::Read(reply) => write!(f, "read {:X}", reply.data.bits()),
+            Outcome::Written(reply) => write!(f, "written {:X}", reply.data.bits()),
+            Outcome::Differs { wrote, reads } => {
+                write!(f, "wrote {:X}, reads {:X}", wrote.bits(), reads.data.bits())
+            }
+            Outcome::Sent => f.write_str("sent"),
+            Outcome::Started(_) => f.write_str("started"),
+            Outcome::Released => f.write_str("released"),
+            Outcome::NotReady(_) => f.write_str("not ready"),
+            Outcome::NoReply { tries } => write!(f, "no reply to {}", counted(*tries, "request")),
         }
     }
 }
@@ -79,52 +65,20 @@ impl DriveState {
     /// The registers in which it differs from another state, and what they hold.
     pub(super) fn differing(&self, other: &Self) -> impl Iterator<Item = (u8, u32)> {
         let cells = self.cells.into_iter().zip(other.cells).zip(0..=u8::MAX);
-        cells.filter_map(|((own, other), number)| (own != other).then_some((number, own)))
+        cells.filter_map(|((cell, other), number)| (cell != other).then_some((number, cell)))
     }
-}
-
-/// What a conversation gave.
-#[derive(Clone, Debug)]
-pub(crate) struct Conversation {
-    /// How each step ended.
-    pub(crate) ends: Vec<JobEnd>,
-    /// What the master reported besides, in its words.
-    pub(crate) disturbances: Vec<String>,
-    /// Frames that the master sent.
-    pub(crate) sent: u64,
-    /// The frames on the bus, in order; a repetition by a controller is left out.
-    pub(crate) frames: Vec<Frame>,
-    /// What the drive holds at the end.
-    pub(crate) state: Option<DriveState>,
-    /// What the master sent and received, in order.
-    pub(super) log: Vec<MasterFrame>,
-    /// How long it took.
-    pub(super) end: Instant,
-}
-
-/// A frame at the master.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum MasterFrame {
-    /// It was given to the controller at this time.
-    Sent(Instant, Frame),
-    /// It was received.
-    Received(Frame),
 }
 
 /// Plays the steps, with a fault or without.
-pub(super) fn converse(
-    file: &FrameCampaignFile,
-    steps: &[CampaignStep],
-    fault: Option<Placed>,
-) -> Conversation {
-    let mut desk = Desk::new(file);
+pub(super) fn converse(frames: &Frames, fault: Option<Placed>) -> Conversation<Frames> {
+    let mut desk = Desk::new(frames.options);
     if let Some(fault) = fault {
         desk.segment.inject(fault);
     }
-    let ends: Vec<_> = steps.iter().map(|step| desk.step(*step)).collect();
+    let ends = frames.steps.iter().map(|step| desk.step(*step)).collect();
     desk.run(desk.now + REST);
-    let frames = desk.segment.record().iter().map(|line| line.frame);
-    let frames = frames.collect();
+    let carried = desk.segment.record().iter().map(|line| line.frame);
+    let carried = carried.collect();
     let drive = desk.segment.station(DRIVE).drive();
     let state = drive.map(|drive| DriveState {
         cells: *drive.held(),
@@ -134,9 +88,10 @@ pub(super) fn converse(
     });
     Conversation {
         ends,
-        disturbances: desk.disturbances,
-        sent: desk.sent,
-        frames,
+        troubles: desk.disturbances,
+        starts: 0,
+        requests: desk.sent,
+        carried,
         state,
         log: desk.log,
         end: desk.now,
@@ -150,11 +105,11 @@ struct Desk {
     sent: u64,
     disturbances: Vec<String>,
     ended: Option<Outcome>,
-    log: Vec<MasterFrame>,
+    log: Vec<MasterPiece<Frame>>,
 }
 
 impl Desk {
-    fn new(file: &FrameCampaignFile) -> Self {
+    fn new(options: Options) -> Self {
         let drive = Drive::new(Properties::default(), Inputs::default(), Instant::START);
         let stations = vec![
             Member::Host(Host::default()),
@@ -162,7 +117,7 @@ impl Desk {
         ];
         Self {
             segment: Segment::new(BitRate::K500, stations),
-            master: Master::new(DEFAULT_RX, DEFAULT_TX, file.options()),
+            master: Master::new(DEFAULT_RX, DEFAULT_TX, options),
             now: Instant::START,
             sent: 0,
             disturbances: Vec::new(),
@@ -171,28 +126,31 @@ impl Desk {
         }
     }
 
-    fn step(&mut self, step: CampaignStep) -> JobEnd {
+    fn step(&mut self, step: CampaignStep) -> Result<JobEnd, String> {
         match step {
             CampaignStep::Wait(time) => {
                 self.run(self.now + time);
-                JobEnd::Waited
+                Ok(JobEnd::Waited)
             }
             CampaignStep::Job(job) => self.job(job),
         }
     }
 
-    fn job(&mut self, job: Job) -> JobEnd {
+    /// Does a job; what the master does not report as done is an error.
+    fn job(&mut self, job: Job) -> Result<JobEnd, String> {
+        let open = || "not ended".to_owned();
         self.ended = None;
-        if self.master.submit(job).is_err() {
-            return JobEnd::Open;
-        }
+        self.master.submit(job).map_err(|_| open())?;
         let end = self.now + PATIENCE;
         while self.ended.is_none() && self.now < end {
             self.advance(end);
         }
-        match self.ended.take() {
-            Some(outcome) => JobEnd::Job(plain(outcome)),
-            None => JobEnd::Open,
+        let done = JobEnd::Job(plain(self.ended.take().ok_or_else(open)?));
+        match done {
+            JobEnd::Job(
+                Outcome::NoReply { .. } | Outcome::NotReady(_) | Outcome::Differs { .. },
+            ) => Err(done.to_string()),
+            done => Ok(done),
         }
     }
 
@@ -219,7 +177,7 @@ impl Desk {
             }
             let heard = self.host().and_then(Host::receive);
             if let Some((at, CanEvent::Frame(frame))) = heard {
-                self.log.push(MasterFrame::Received(frame));
+                self.log.push(MasterPiece::Received(frame));
                 self.master.handle_frame(at, &frame);
             }
         }
@@ -246,7 +204,7 @@ impl Desk {
             if let Some(host) = self.host() {
                 host.send(now, frame);
             }
-            self.log.push(MasterFrame::Sent(now, frame));
+            self.log.push(MasterPiece::Sent(now, frame));
             self.sent += 1;
         }
     }

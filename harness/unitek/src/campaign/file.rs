@@ -1,6 +1,7 @@
 //! What stands in a campaign file of this bus (`corpora/campaigns/unitek/*.toml`).
 
-use super::FrameClass;
+use super::{Frames, TABLE};
+use harness_bench::campaign::line::{LineKeys, LineText};
 use harness_bench::file::values::Time;
 use harness_proto::time::Span;
 use harness_proto::unitek::master::{Job, Options};
@@ -8,42 +9,39 @@ use harness_proto::unitek::{Data, Register};
 use harness_sim::segment::FrameFault;
 use serde::Deserialize;
 
-/// The most steps of a conversation.
-const MOST_STEPS: usize = 200;
-
-/// The longest wait and the longest delay, in ms.
+/// The longest wait, in ms.
 const LONGEST: u64 = 10_000;
 
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct FrameCampaignFile {
+struct FrameCampaignFile {
     /// The version of this schema: 1.
-    pub(crate) schema: u32,
+    schema: u32,
     /// The bus: `unitek`.
-    pub(crate) bus: String,
+    bus: String,
     /// What the campaign shows, in a line.
-    pub(crate) title: String,
+    title: String,
     /// What the master does, see [`CampaignStep`].
-    pub(crate) steps: Vec<String>,
+    steps: Vec<String>,
     /// The kinds of faults.
-    pub(crate) faults: Vec<FaultName>,
+    faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
-    pub(crate) delays: Vec<Time>,
+    delays: Vec<Time>,
     /// How often a request without a reply is repeated; 2 where nothing is said.
-    pub(crate) repeats: Option<u8>,
+    repeats: Option<u8>,
     /// Whether writes are read back; they are where nothing is said.
-    pub(crate) read_back: Option<bool>,
+    read_back: Option<bool>,
     /// How many cases there must be of each class; what is not named is not looked at.
     #[serde(default)]
-    pub(crate) expect: FrameExpect,
+    expect: FrameExpect,
 }
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum FaultName {
+enum FaultName {
     /// No station receives it, and its sender does not notice.
     Lost,
     /// It arrives twice.
@@ -58,33 +56,15 @@ pub(crate) enum FaultName {
     BusOff,
 }
 
-/// The figures that a campaign pins.
+/// The figures that a campaign pins: of all cases, and of each class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(crate) struct FrameExpect {
-    /// All cases together.
-    pub(crate) cases: Option<u64>,
-    /// See [`FrameClass::Answered`].
-    pub(crate) answered: Option<u64>,
-    /// See [`FrameClass::Retried`].
-    pub(crate) retried: Option<u64>,
-    /// See [`FrameClass::Noticed`].
-    pub(crate) noticed: Option<u64>,
-    /// See [`FrameClass::Unnoticed`].
-    pub(crate) unnoticed: Option<u64>,
-}
-
-impl FrameExpect {
-    /// How many cases of a class are expected.
-    #[must_use]
-    pub(crate) const fn of(&self, class: FrameClass) -> Option<u64> {
-        match class {
-            FrameClass::Answered => self.answered,
-            FrameClass::Retried => self.retried,
-            FrameClass::Noticed => self.noticed,
-            FrameClass::Unnoticed => self.unnoticed,
-        }
-    }
+struct FrameExpect {
+    cases: Option<u64>,
+    answered: Option<u64>,
+    retried: Option<u64>,
+    noticed: Option<u64>,
+    unnoticed: Option<u64>,
 }
 
 /// A step of the conversation.
@@ -98,9 +78,8 @@ pub(crate) enum CampaignStep {
 
 impl FrameCampaignFile {
     /// The faults, each delay of its own.
-    #[must_use]
-    pub(super) fn faults(&self) -> Vec<FrameFault> {
-        let delays = || self.delays.iter().map(|time| FrameFault::Late(span(*time)));
+    fn faults(&self) -> Vec<FrameFault> {
+        let delays = || self.delays.iter().map(|time| FrameFault::Late(time.span()));
         let faults = self.faults.iter().flat_map(|name| match name {
             FaultName::Lost => vec![FrameFault::Lost],
             FaultName::Doubled => vec![FrameFault::Doubled],
@@ -113,8 +92,7 @@ impl FrameCampaignFile {
     }
 
     /// The settings of the master.
-    #[must_use]
-    pub(super) fn options(&self) -> Options {
+    fn options(&self) -> Options {
         let usual = Options::default();
         Options {
             repeats: self.repeats.unwrap_or(usual.repeats),
@@ -124,59 +102,41 @@ impl FrameCampaignFile {
     }
 }
 
-fn span(time: Time) -> Span {
-    Span::from_nanos(u64::try_from(time.0.as_nanos()).unwrap_or(u64::MAX))
-}
-
-/// Whether a text names this bus.
-pub(super) fn is_of_this_bus(text: &str) -> bool {
-    let table: Result<toml::Table, _> = toml::from_str(text);
-    table.is_ok_and(|table| table.get("bus").and_then(|bus| bus.as_str()) == Some("unitek"))
-}
-
 /// Reads a campaign file and its steps.
 ///
 /// # Errors
 /// What is wrong, where, and what is expected.
-pub(super) fn read(text: &str) -> Result<(FrameCampaignFile, Vec<CampaignStep>), String> {
+pub(super) fn read(text: &str) -> Result<(Frames, LineText), String> {
     let file: FrameCampaignFile = toml::from_str(text).map_err(|error| error.to_string())?;
-    if file.schema != 1 {
-        return Err(format!(
-            "schema {} is not known: write schema = 1",
-            file.schema
-        ));
-    }
-    if file.steps.is_empty() || file.steps.len() > MOST_STEPS {
-        return Err(format!(
-            "`steps` has {} entries: 1 to {MOST_STEPS} are expected",
-            file.steps.len()
-        ));
-    }
-    if file.faults.contains(&FaultName::Late) == file.delays.is_empty() {
-        return Err(
-            "`late` in `faults` needs `delays`, such as [\"5ms\"], and `delays` needs `late`"
-                .to_owned(),
-        );
-    }
-    if let Some(long) = file
-        .delays
-        .iter()
-        .find(|time| span(**time) > Span::from_millis(LONGEST))
-    {
-        return Err(format!(
-            "a delay of {long} is too long: at most {LONGEST} ms are expected"
-        ));
-    }
-    let read = |(index, text): (usize, &String)| {
-        step(text).map_err(|wrong| format!("step {} (`{text}`): {wrong}", index + 1))
+    let keys = LineKeys {
+        schema: file.schema,
+        steps: &file.steps,
+        late: file.faults.contains(&FaultName::Late),
+        delays: &file.delays,
     };
-    let steps = file
-        .steps
-        .iter()
-        .enumerate()
-        .map(read)
-        .collect::<Result<_, _>>()?;
-    Ok((file, steps))
+    let frames = Frames {
+        steps: keys.steps(&TABLE, step)?,
+        faults: file.faults(),
+        options: file.options(),
+    };
+    let expect = file.expect;
+    let expect = [
+        ("cases", expect.cases),
+        ("answered", expect.answered),
+        ("retried", expect.retried),
+        ("noticed", expect.noticed),
+        ("unnoticed", expect.unnoticed),
+    ];
+    let expect = expect
+        .into_iter()
+        .filter_map(|(name, count)| Some((name, count?)));
+    let text = LineText {
+        title: file.title,
+        expect: expect.collect(),
+        steps: file.steps,
+        header: "source  unitek 5.2\nbus     unitek\ndrive 1\n".to_owned(),
+    };
+    Ok((frames, text))
 }
 
 /// One step.

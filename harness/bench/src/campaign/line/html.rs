@@ -1,6 +1,7 @@
 //! The section of a campaign on a shared line in a page.
 
 use super::PlayedLine;
+use crate::campaign::PlayedCampaign as _;
 use crate::campaign::share::share;
 use crate::html::Html;
 use crate::report::html::{FoldedPart, Section};
@@ -21,7 +22,7 @@ pub(crate) fn section(number: usize, played: &PlayedLine) -> Section {
             "{} cases: 1 drive, {} {}.",
             played.outcomes.len(),
             played.count,
-            played.units
+            played.table.units
         ),
     );
     classes(&mut html, played);
@@ -44,7 +45,7 @@ pub(crate) fn section(number: usize, played: &PlayedLine) -> Section {
         html,
         parts: vec![
             part(
-                &format!("Where: faults across, {} down", played.units),
+                &format!("Where: faults across, {} down", played.table.units),
                 map(played),
             ),
             part("The worst", worst(played)),
@@ -57,7 +58,7 @@ fn classes(html: &mut Html, played: &PlayedLine) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Cases by class");
         html.heads(&["Letter", "Class", "Cases", "Share", "What it means"]);
-        for (place, class) in played.classes.iter().enumerate() {
+        for (place, class) in played.table.classes.iter().enumerate() {
             let count = played.count(place);
             html.element("tr", &[], |html| {
                 html.line("td", &[("class", &colour(class.gravity))], class.letter);
@@ -86,22 +87,25 @@ fn colour(gravity: u8) -> String {
 fn map(played: &PlayedLine) -> Html {
     let mut faults: Vec<&str> = Vec::new();
     for outcome in &played.outcomes {
-        if !faults.contains(&outcome.fault.as_str()) {
-            faults.push(&outcome.fault);
+        if !faults.contains(&outcome.case.fault.as_str()) {
+            faults.push(&outcome.case.fault);
         }
     }
     let mut html = Html::new();
     html.element("table", &[], |html| {
         html.line("caption", &[], "The class of each case");
-        let mut heads = vec!["Number", played.heading];
+        let mut heads = vec!["Number", played.table.heading];
         heads.extend(&faults);
         html.heads(&heads);
-        for row in played.outcomes.chunk_by(|a, b| a.place == b.place) {
+        for row in played
+            .outcomes
+            .chunk_by(|a, b| a.case.place == b.case.place)
+        {
             html.element("tr", &[], |html| {
-                html.line("th", &[("scope", &"row")], row[0].place);
-                html.line("td", &[], &row[0].disturbed);
+                html.line("th", &[("scope", &"row")], row[0].case.place);
+                html.line("td", &[], &row[0].case.disturbed);
                 for fault in &faults {
-                    match row.iter().find(|own| own.fault == *fault) {
+                    match row.iter().find(|own| own.case.fault == *fault) {
                         Some(own) => {
                             let class = played.of(own);
                             html.line("td", &[("class", &colour(class.gravity))], class.letter)
@@ -123,8 +127,8 @@ fn worst(played: &PlayedLine) -> Html {
         for own in played.serious().into_iter().take(WORST) {
             html.element("tr", &[], |html| {
                 html.line("th", &[("scope", &"row")], played.of(own).name);
-                html.line("td", &[], &own.case);
-                html.line("td", &[], &own.disturbed);
+                html.line("td", &[], own.case.name());
+                html.line("td", &[], &own.case.disturbed);
                 html.line("td", &[], &own.happened);
             });
         }

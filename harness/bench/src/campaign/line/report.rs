@@ -1,6 +1,7 @@
 //! The results of a campaign, for people and for tools.
 
 use super::{LineOutcome, PlayedLine};
+use crate::campaign::PlayedCampaign as _;
 use crate::campaign::share::share;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -13,11 +14,11 @@ const WORST: usize = 10;
 pub(crate) fn table(played: &PlayedLine) -> String {
     let all = played.outcomes.len() as u64;
     let (name, title) = (&played.name, &played.title);
-    let (count, units) = (played.count, played.units);
+    let (count, units) = (played.count, played.table.units);
     let mut text = format!("{title}\n{name}: {all} cases; 1 drive, {count} {units}\n\n");
     // Writing to a String cannot fail.
     let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
-    for (place, class) in played.classes.iter().enumerate() {
+    for (place, class) in played.table.classes.iter().enumerate() {
         let count = played.count(place);
         let (name, share) = (class.name, share(count, all));
         let _infallible = writeln!(text, "  {name:18} {count:>8} {share:>9}  {}", class.about);
@@ -33,16 +34,7 @@ pub(crate) fn table(played: &PlayedLine) -> String {
         text.push_str("\n  the worst\n");
     }
     for outcome in worst.into_iter().take(WORST) {
-        let (
-            class,
-            LineOutcome {
-                case,
-                disturbed,
-                happened,
-                ..
-            },
-        ) = (played.of(outcome).name, outcome);
-        let _infallible = writeln!(text, "  {class:18} {case:20} {disturbed:22} {happened}");
+        let _infallible = writeln!(text, "  {:18} {}", played.of(outcome).name, line(outcome));
     }
     text
 }
@@ -51,35 +43,30 @@ pub(crate) fn table(played: &PlayedLine) -> String {
 #[must_use]
 pub(crate) fn only(played: &PlayedLine, class: usize) -> String {
     let own = played.outcomes.iter().filter(|own| own.class == class);
-    let line = |own: &LineOutcome| {
-        let (
-            class,
-            LineOutcome {
-                case,
-                disturbed,
-                happened,
-                ..
-            },
-        ) = (played.of(own).name, own);
-        format!("{class:10} {case:20} {disturbed:22} {happened}\n")
-    };
+    let line = |own: &LineOutcome| format!("{:10} {}\n", played.of(own).name, line(own));
     own.map(line).collect()
+}
+
+/// A case, and what happened.
+fn line(outcome: &LineOutcome) -> String {
+    let (case, disturbed) = (outcome.case.name(), &outcome.case.disturbed);
+    format!("{case:20} {disturbed:22} {}", outcome.happened)
 }
 
 /// A campaign for tools.
 #[must_use]
 pub(crate) fn json(played: &PlayedLine, only: Option<usize>) -> Value {
-    let unit = played.units.trim_end_matches('s');
+    let unit = played.table.units.trim_end_matches('s');
     let case = |outcome: &LineOutcome| {
         json!({
-            "case": outcome.case,
-            unit: outcome.disturbed,
+            "case": outcome.case.name(),
+            unit: outcome.case.disturbed,
             "class": played.of(outcome).name,
             "steps": outcome.steps,
             "troubles": outcome.troubles,
         })
     };
-    let counts = played.classes.iter().enumerate();
+    let counts = played.table.classes.iter().enumerate();
     let counts =
         counts.map(|(place, class)| json!({ "class": class.name, "cases": played.count(place) }));
     let wanted = |own: &&LineOutcome| only.is_none_or(|only| own.class == only);
@@ -90,9 +77,9 @@ pub(crate) fn json(played: &PlayedLine, only: Option<usize>) -> Value {
     );
     json!({
         "name": played.name,
-        "bus": played.bus,
+        "bus": played.table.bus.name(),
         "title": played.title,
-        played.units: played.count,
+        played.table.units: played.count,
         "classes": counts.collect::<Vec<_>>(),
         "differs": differs.collect::<Vec<_>>(),
         "cases": shown.map(case).collect::<Vec<_>>(),
