@@ -29,6 +29,14 @@ pub struct OutcomeClass {
     pub gravity: u8,
 }
 
+impl OutcomeClass {
+    /// The class of its colour in pages.
+    #[must_use]
+    pub fn colour(&self) -> String {
+        format!("k{}", self.gravity)
+    }
+}
+
 /// A campaign that was read, and whose conversation was played without a fault.
 pub trait Campaign: Debug {
     /// Its name, for messages: a path, or the name of a built-in one.
@@ -102,8 +110,19 @@ pub trait PlayedCampaign {
     /// How many cases there are.
     fn cases(&self) -> u64;
 
+    /// The figures that its file pins: of a class, or of all `cases`.
+    fn pinned(&self) -> &[(&'static str, u64)];
+
     /// The pinned figures that were not met: what is counted, expected, found.
-    fn differs(&self) -> Vec<(&'static str, u64, u64)>;
+    fn differs(&self) -> Vec<(&'static str, u64, u64)> {
+        let place = |name: &str| self.classes().iter().position(|class| class.name == name);
+        let found = |name: &str| place(name).map_or(self.cases(), |place| self.count(place));
+        let pinned = self.pinned().iter();
+        let compared = pinned.map(|(name, expected)| (*name, *expected, found(name)));
+        compared
+            .filter(|(_, expected, found)| expected != found)
+            .collect()
+    }
 
     /// How many drives it has, and how much is disturbed, each with its heading.
     fn size(&self) -> [(String, u64); 2];

@@ -76,8 +76,7 @@ fn letters(html: &mut Html, classes: &[OutcomeClass]) {
         html.heads(&["Letter", "Class", "What it means"]);
         for class in classes {
             html.element("tr", &[], |html| {
-                let colour = format!("k{}", class.gravity);
-                html.line("td", &[("class", &colour)], class.letter);
+                html.line("td", &[("class", &class.colour())], class.letter);
                 html.line("th", &[("scope", &"row")], class.name);
                 html.line("td", &[], class.about);
             });

@@ -203,6 +203,15 @@ impl ExpectedCounts {
             CaseClass::SilentCorruption => self.silent_corruption,
         }
     }
+
+    /// The pinned figures: of all cases, then of the classes in order of gravity.
+    #[must_use]
+    pub(crate) fn pinned(&self) -> Vec<(&'static str, u64)> {
+        let all = self.cases.map(|count| ("cases", count));
+        let classes = CaseClass::ALL.iter();
+        let classes = classes.filter_map(|class| Some((class.name(), self.of(*class)?)));
+        all.into_iter().chain(classes).collect()
+    }
 }
 
 impl CampaignFile {

@@ -4,7 +4,7 @@ use crate::campaign::PlayedCampaign;
 use crate::campaign::class::CaseClass;
 use crate::campaign::fault::{FaultEffect, LineBit};
 use crate::campaign::report::{WORST, happened};
-use harness_bench::campaign::share::share;
+use harness_bench::campaign::share::{gravity, table};
 use harness_bench::html::Html;
 use harness_bench::report::html::{FoldedPart, Section};
 use std::collections::BTreeMap;
@@ -14,11 +14,6 @@ const CELLS: usize = 12_000;
 
 /// Maximum number of rows of the table by link: the manual's largest ring has 251 links.
 const LINKS: usize = 251;
-
-/// The class of a class's colour.
-fn colour(class: CaseClass) -> String {
-    format!("k{}", class as u8)
-}
 
 /// How many cases there are of each class.
 type Counts = BTreeMap<CaseClass, u64>;
@@ -42,7 +37,7 @@ pub(super) fn section(number: usize, finished: &PlayedCampaign) -> Section {
             finished.bytes
         ),
     );
-    classes(&mut html, finished);
+    table(&mut html, finished, false);
     let instead = format!(
         "It is in: drivebench campaign {} --format json",
         name(finished)
@@ -56,44 +51,12 @@ pub(super) fn section(number: usize, finished: &PlayedCampaign) -> Section {
     parts.extend(by_bit(finished).map(|html| part("Which bit: links across, bits down", html)));
     parts.push(part("By link", by_link(finished)));
     parts.extend(worst(finished).map(|html| part("The worst", html)));
-    let gravest = CaseClass::ALL
-        .into_iter()
-        .rfind(|class| finished.count(*class) > 0);
-    let differs = !finished.differs().is_empty();
     Section {
         heading: name(finished).to_owned(),
         id: format!("s{number}"),
-        gravity: gravest.map_or(0, |class| class as u8) + if differs { 10 } else { 0 },
+        gravity: gravity(finished),
         html,
         parts,
-    }
-}
-
-fn classes(html: &mut Html, finished: &PlayedCampaign) {
-    let all = finished.outcomes.len() as u64;
-    html.element("table", &[], |html| {
-        html.line("caption", &[], "Cases by class");
-        html.heads(&["Class", "Cases", "Share", "What it means"]);
-        for class in CaseClass::ALL {
-            let count = finished.count(class);
-            html.element("tr", &[], |html| {
-                html.line("th", &[("scope", &"row")], class.name());
-                html.line("td", &[("class", &"n")], count);
-                html.line("td", &[("class", &"n")], share(count, all));
-                html.line("td", &[], class.about());
-            });
-        }
-    });
-    for differs in finished.differs() {
-        let class = differs.class.map_or("cases", CaseClass::name);
-        html.line(
-            "p",
-            &[("class", &"bad")],
-            format_args!(
-                "{class} is {}, the file pins {}",
-                differs.found, differs.expected
-            ),
-        );
     }
 }
 
@@ -140,10 +103,11 @@ fn cell(html: &mut Html, counts: Option<&Counts>) {
         .filter(|(_, count)| **count > 0)
         .map(|(class, count)| format!("{count} {class}"))
         .collect();
+    let class = class.outcome();
     html.line(
         "td",
-        &[("class", &colour(*class)), ("title", &words.join(", "))],
-        class.outcome().letter,
+        &[("class", &class.colour()), ("title", &words.join(", "))],
+        class.letter,
     );
 }
 

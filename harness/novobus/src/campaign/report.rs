@@ -2,7 +2,8 @@
 
 use super::class::{CaseClass, CaseEvidence, Wrong};
 use crate::campaign::run::{CaseOutcome, PlayedCampaign};
-use harness_bench::campaign::share::share;
+use harness_bench::campaign::PlayedCampaign as _;
+use harness_bench::campaign::share::counts;
 use harness_bench::link::link_name;
 use harness_proto::nd21::cells::cell_at;
 use serde::Serialize;
@@ -79,7 +80,6 @@ pub(crate) fn line(outcome: &CaseOutcome, drives: u8) -> String {
 #[must_use]
 pub(crate) fn table(finished: &PlayedCampaign) -> String {
     let all = finished.outcomes.len() as u64;
-    // Writing to a String cannot fail.
     let mut text = format!(
         "{}\n{}: {all} cases; {} drives, {} bytes of {}\n\n",
         finished.title,
@@ -88,24 +88,7 @@ pub(crate) fn table(finished: &PlayedCampaign) -> String {
         finished.bytes,
         finished.scenario
     );
-    let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
-    for class in CaseClass::ALL {
-        let count = finished.count(class);
-        let share = share(count, all);
-        let _infallible = writeln!(
-            text,
-            "  {class:18} {count:>8} {share:>9}  {}",
-            class.about()
-        );
-    }
-    for differs in finished.differs() {
-        let class = differs.class.map_or("cases", CaseClass::name);
-        let _infallible = writeln!(
-            text,
-            "  differs: {class} is {}, the file pins {}",
-            differs.found, differs.expected
-        );
-    }
+    text += &counts(finished);
     let mut worst: Vec<_> = finished
         .outcomes
         .iter()
@@ -116,6 +99,7 @@ pub(crate) fn table(finished: &PlayedCampaign) -> String {
         text.push_str("\n  the worst\n");
     }
     for outcome in worst.into_iter().take(WORST) {
+        // Writing to a String cannot fail.
         let _infallible = write!(text, "  {}", line(outcome, finished.drives));
     }
     text
@@ -142,7 +126,7 @@ struct JsonClass {
 
 #[derive(Serialize)]
 struct JsonDiffers {
-    class: Option<CaseClass>,
+    class: Option<&'static str>,
     expected: u64,
     found: u64,
 }
@@ -219,10 +203,11 @@ impl<'a> Json<'a> {
             class,
             cases: finished.count(class),
         };
-        let differs = finished.differs().into_iter().map(|differs| JsonDiffers {
-            class: differs.class,
-            expected: differs.expected,
-            found: differs.found,
+        let differs = finished.differs().into_iter();
+        let differs = differs.map(|(class, expected, found)| JsonDiffers {
+            class: (class != "cases").then_some(class),
+            expected,
+            found,
         });
         Self {
             name: finished.name.trim_end_matches(".toml"),

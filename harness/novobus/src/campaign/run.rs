@@ -1,7 +1,7 @@
 //! A campaign, read and played.
 
 use super::fault::CaseFaults;
-use super::file::{CampaignFile, ExpectedCounts, read};
+use super::file::{CampaignFile, read};
 use super::plan::{Shape, cases};
 use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, Said};
@@ -85,7 +85,7 @@ pub(crate) struct PlayedCampaign {
     /// Every case, in the order of the plan.
     pub outcomes: Vec<CaseOutcome>,
     /// The figures that the file pins.
-    pub expect: ExpectedCounts,
+    pub expect: Vec<(&'static str, u64)>,
 }
 
 impl Campaign {
@@ -323,7 +323,7 @@ impl Campaign {
             drives: self.shape.drives,
             bytes: self.shape.length(),
             outcomes: outcomes.collect::<Result<_, _>>()?,
-            expect: self.file.expect,
+            expect: self.file.expect.pinned(),
         })
     }
 }
@@ -355,17 +355,6 @@ impl CasePlayer<'_> {
     }
 }
 
-/// A pinned figure that was not met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Differs {
-    /// Of which class; `None` for all cases together.
-    pub class: Option<CaseClass>,
-    /// What the file says.
-    pub expected: u64,
-    /// What came out.
-    pub found: u64,
-}
-
 impl PlayedCampaign {
     /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
     #[must_use]
@@ -378,24 +367,6 @@ impl PlayedCampaign {
     pub(crate) fn count(&self, class: CaseClass) -> u64 {
         let of_class = |outcome: &&CaseOutcome| outcome.class == class;
         self.outcomes.iter().filter(of_class).count() as u64
-    }
-
-    /// The pinned figures that were not met: the number of cases first, then the classes in order of gravity.
-    #[must_use]
-    pub(crate) fn differs(&self) -> Vec<Differs> {
-        let all =
-            CaseClass::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));
-        let cases = (None, self.expect.cases, self.outcomes.len() as u64);
-        let pinned = std::iter::once(cases).chain(all);
-        let pinned = pinned.filter_map(|(class, expected, found)| {
-            let expected = expected.filter(|expected| *expected != found)?;
-            Some(Differs {
-                class,
-                expected,
-                found,
-            })
-        });
-        pinned.collect()
     }
 
     /// How many cases of each class there are at each link and byte, where a case with two faults counts at both:

@@ -1,8 +1,7 @@
 //! The section of a campaign on a shared line in a page.
 
 use super::PlayedLine;
-use crate::campaign::PlayedCampaign as _;
-use crate::campaign::share::share;
+use crate::campaign::share::{gravity, table};
 use crate::html::Html;
 use crate::report::html::{FoldedPart, Section};
 
@@ -25,23 +24,17 @@ pub(crate) fn section(number: usize, played: &PlayedLine) -> Section {
             played.table.units
         ),
     );
-    classes(&mut html, played);
+    table(&mut html, played, true);
     let instead = format!("It is in: drivebench campaign {name} --format json");
     let part = |heading: &str, html: Html| FoldedPart {
         heading: heading.to_owned(),
         html,
         instead: instead.clone(),
     };
-    let gravest = played
-        .outcomes
-        .iter()
-        .map(|own| played.of(own).gravity)
-        .max();
-    let differs = !played.differs().is_empty();
     Section {
         heading: name.to_owned(),
         id: format!("s{number}"),
-        gravity: gravest.unwrap_or(0) + if differs { 10 } else { 0 },
+        gravity: gravity(played),
         html,
         parts: vec![
             part(
@@ -51,36 +44,6 @@ pub(crate) fn section(number: usize, played: &PlayedLine) -> Section {
             part("The worst", worst(played)),
         ],
     }
-}
-
-fn classes(html: &mut Html, played: &PlayedLine) {
-    let all = played.outcomes.len() as u64;
-    html.element("table", &[], |html| {
-        html.line("caption", &[], "Cases by class");
-        html.heads(&["Letter", "Class", "Cases", "Share", "What it means"]);
-        for (place, class) in played.table.classes.iter().enumerate() {
-            let count = played.count(place);
-            html.element("tr", &[], |html| {
-                html.line("td", &[("class", &colour(class.gravity))], class.letter);
-                html.line("th", &[("scope", &"row")], class.name);
-                html.line("td", &[("class", &"n")], count);
-                html.line("td", &[("class", &"n")], share(count, all));
-                html.line("td", &[], class.about);
-            });
-        }
-    });
-    for (name, expected, found) in played.differs() {
-        html.line(
-            "p",
-            &[("class", &"bad")],
-            format_args!("{name} is {found}, the file pins {expected}"),
-        );
-    }
-}
-
-/// The class's colour is that of a class as serious in the ring's campaigns.
-fn colour(gravity: u8) -> String {
-    format!("k{gravity}")
 }
 
 /// A row for each thing that was disturbed, a column a fault. Colours only repeat the letters.
@@ -108,7 +71,7 @@ fn map(played: &PlayedLine) -> Html {
                     match row.iter().find(|own| own.case.fault == *fault) {
                         Some(own) => {
                             let class = played.of(own);
-                            html.line("td", &[("class", &colour(class.gravity))], class.letter)
+                            html.line("td", &[("class", &class.colour())], class.letter)
                         }
                         None => html.line("td", &[], ""),
                     }

@@ -2,7 +2,7 @@
 
 use super::{LineOutcome, PlayedLine};
 use crate::campaign::PlayedCampaign as _;
-use crate::campaign::share::share;
+use crate::campaign::share::counts;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -16,24 +16,13 @@ pub(crate) fn table(played: &PlayedLine) -> String {
     let (name, title) = (&played.name, &played.title);
     let (count, units) = (played.count, played.table.units);
     let mut text = format!("{title}\n{name}: {all} cases; 1 drive, {count} {units}\n\n");
-    // Writing to a String cannot fail.
-    let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
-    for (place, class) in played.table.classes.iter().enumerate() {
-        let count = played.count(place);
-        let (name, share) = (class.name, share(count, all));
-        let _infallible = writeln!(text, "  {name:18} {count:>8} {share:>9}  {}", class.about);
-    }
-    for (name, expected, found) in played.differs() {
-        let _infallible = writeln!(
-            text,
-            "  differs: {name} is {found}, the file pins {expected}"
-        );
-    }
+    text += &counts(played);
     let worst = played.serious();
     if !worst.is_empty() {
         text.push_str("\n  the worst\n");
     }
     for outcome in worst.into_iter().take(WORST) {
+        // Writing to a String cannot fail.
         let _infallible = writeln!(text, "  {:18} {}", played.of(outcome).name, line(outcome));
     }
     text

@@ -12,6 +12,7 @@ use crate::language::read::RingScenario;
 use crate::link::BesideTheBus as _;
 use crate::simulate::simulated;
 use crate::tests::ROOT;
+use harness_bench::campaign::PlayedCampaign as _;
 use harness_bench::link::{Link, Octets};
 use harness_bench::scenario::problem::Problems;
 use harness_bench::scenario::run::{AtMismatch, play};
