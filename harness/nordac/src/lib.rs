@@ -8,7 +8,6 @@ mod captured_levels_tests;
 #[cfg(test)]
 mod captured_tests;
 mod cli;
-mod deviations;
 mod dissector;
 mod driver;
 mod explore;
@@ -31,9 +30,11 @@ use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line;
 use harness_bench::capture::{Carries, judged_frames, replayed_frames};
+use harness_bench::command::deviations::DeviationRow;
 use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
 use harness_bench::shown::SegmentReport as _;
+use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, deviations};
 use harness_sim::nordac::fuzz;
 
 /// The GSD file: the unit master file of the manual.
@@ -49,7 +50,12 @@ pub static BUS: Bus = Bus {
     comes_back: comes_back::<language::Nordac>,
     cell_names: || cli::cells::names().collect(),
     cells: cli::cells::cells,
-    deviations: deviations::rows,
+    deviations: || {
+        let drives = deviations().map(|row| DeviationRow::new(row.name, row.section, row.about));
+        let masters = MASTER_DEVIATIONS.iter();
+        let masters = masters.map(|row| DeviationRow::new(row.name, row.section, row.about));
+        [drives.collect(), masters.collect()]
+    },
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
     simulates: &simulate::Bench::CAPABILITIES,

@@ -47,13 +47,8 @@ pub static BUS: Bus = Bus {
         Ok(Exit::NothingSelected)
     },
     deviations: || {
-        let sticks = DeviationRow {
-            name: "sticks",
-            section: "2.1",
-            about: "the valve confirms a move and stays where it is",
-            models: None,
-        };
-        [vec![sticks], Vec::new()]
+        let about = "the valve confirms a move and stays where it is";
+        [vec![DeviationRow::new("sticks", "2.1", about)], Vec::new()]
     },
     dissector: || "-- there is no dissector of valves yet\n".to_owned(),
     sim: |_, _, _| Err(Failure::refused("valves are not served yet")),

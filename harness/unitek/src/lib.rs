@@ -27,9 +27,11 @@ use harness_bench::bus::{Bus, SharedLine};
 use harness_bench::bus_name::BusName;
 use harness_bench::campaign::line;
 use harness_bench::capture::{Carries, judged_frames, replayed_frames};
+use harness_bench::command::deviations::DeviationRow;
 use harness_bench::fuzz::comes_back;
 use harness_bench::scenario::settled;
 use harness_bench::shown::SegmentReport as _;
+use harness_sim::unitek::deviation::{MASTER_DEVIATIONS, deviations};
 use harness_sim::unitek::fuzz;
 
 /// UNITEK DS/BAMOCAR on CAN.
@@ -42,7 +44,12 @@ pub static BUS: Bus = Bus {
     comes_back: comes_back::<language::Unitek>,
     cell_names: || cli::cells::names().map(str::to_owned).collect(),
     cells: cli::cells::cells,
-    deviations: cli::deviations::rows,
+    deviations: || {
+        let drives = deviations().map(|row| DeviationRow::new(row.name, row.section, row.about));
+        let masters = MASTER_DEVIATIONS.iter();
+        let masters = masters.map(|row| DeviationRow::new(row.name, row.section, row.about));
+        [drives.collect(), masters.collect()]
+    },
     dissector: dissector::dissector,
     sim: |arguments, _, output| cli::sim::sim(arguments, output),
     simulates: &simulate::Bench::CAPABILITIES,

@@ -12,3 +12,16 @@ pub struct DeviationRow {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub models: Option<&'static [&'static str]>,
 }
+
+impl DeviationRow {
+    /// A row of a bus with one model of a drive.
+    #[must_use]
+    pub const fn new(name: &'static str, section: &'static str, about: &'static str) -> Self {
+        Self {
+            name,
+            section,
+            about,
+            models: None,
+        }
+    }
+}

@@ -3,7 +3,6 @@
 mod bench;
 pub(crate) mod cells;
 mod control;
-pub(crate) mod deviations;
 mod drives;
 mod info;
 mod params;
