@@ -14,7 +14,6 @@ mod junit_rules;
 mod nordac;
 mod nordac_drive;
 mod package;
-mod places;
 #[path = "../common/python.rs"]
 mod python;
 mod reports;

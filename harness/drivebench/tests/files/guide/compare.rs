@@ -8,7 +8,8 @@ pub(super) fn fits(shown: &[String], printed: &[String]) -> bool {
     })
 }
 
-fn line_fits(shown: &str, printed: &str) -> bool {
+/// The same of one line.
+pub(super) fn line_fits(shown: &str, printed: &str) -> bool {
     if !shown.contains("...") {
         return shown.trim_end() == printed.trim_end();
     }

@@ -4,6 +4,7 @@
 mod compare;
 mod page;
 mod shell;
+pub(crate) mod transcript;
 mod words;
 
 use harness::buses::BUSES;

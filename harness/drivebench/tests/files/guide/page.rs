@@ -29,8 +29,12 @@ pub(super) struct Shown {
     pub(super) line: usize,
     /// As it is typed.
     pub(super) command: String,
+    /// How many lines of the page show what it prints.
+    pub(super) height: usize,
     /// The lines below it.
     pub(super) output: Vec<String>,
+    /// The lines below `# stderr`, which only a transcript has.
+    pub(super) errors: Vec<String>,
     /// How it ends.
     pub(super) code: i32,
 }
@@ -52,11 +56,16 @@ pub(super) enum Step {
 pub(super) struct Page {
     /// Its file.
     pub(super) path: PathBuf,
+    /// What is in it.
+    pub(super) text: String,
     /// The fenced blocks.
     pub(super) blocks: Vec<Block>,
     /// The lines outside of them, with their numbers.
     pub(super) prose: Vec<(usize, String)>,
 }
+
+/// The line of a transcript above what a command prints on standard error.
+pub(super) const STDERR: &str = "# stderr";
 
 /// Languages whose blocks are not commands.
 const OTHER: [&str; 9] = [
@@ -104,6 +113,7 @@ impl Page {
         let path = path.to_owned();
         Self {
             path,
+            text,
             blocks,
             prose,
         }
@@ -144,7 +154,7 @@ impl Page {
     /// The commands of a block, whatever its mode.
     pub(super) fn commands(&self, block: &Block) -> Vec<Shown> {
         let mut commands: Vec<Shown> = Vec::new();
-        let mut continued = false;
+        let (mut continued, mut errors) = (false, false);
         for (number, line) in (block.line + 1..).zip(&block.lines) {
             if continued {
                 let last = commands.last_mut().expect("a command");
@@ -153,29 +163,41 @@ impl Page {
                 continued = line.ends_with('\\');
             } else if let Some(command) = line.strip_prefix("$ ") {
                 continued = command.ends_with('\\');
+                errors = false;
                 commands.push(Shown {
                     line: number,
                     command: command.to_owned(),
+                    height: 0,
                     output: Vec::new(),
+                    errors: Vec::new(),
                     code: 0,
                 });
             } else {
                 let place = format!("{}:{number}", self.path.display());
                 let last = commands.last_mut();
                 let last = last.unwrap_or_else(|| panic!("{place}: a block begins with `$ `"));
+                last.height += 1;
                 match line.strip_prefix("# exit code ") {
                     Some(code) => last.code = code.parse().expect("an exit code"),
+                    None if line == STDERR => errors = true,
+                    None if errors => last.errors.push(line.to_owned()),
                     None => last.output.push(line.to_owned()),
                 }
             }
         }
         // A blank line in front of the next command is for the eye.
         for command in &mut commands {
-            while command.output.last().is_some_and(String::is_empty) {
-                command.output.pop();
-            }
+            trim_end(&mut command.output);
+            trim_end(&mut command.errors);
         }
         commands
+    }
+}
+
+/// Removes the blank lines at the end.
+pub(super) fn trim_end(lines: &mut Vec<String>) {
+    while lines.last().is_some_and(|line| line.trim().is_empty()) {
+        lines.pop();
     }
 }
 

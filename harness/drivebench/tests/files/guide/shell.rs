@@ -31,8 +31,41 @@ fn module(mode: &Mode) -> Option<&'static str> {
     own.map(|(_, module)| *module)
 }
 
+/// Where the two streams of a command go.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Streams {
+    /// Into one text, in order.
+    Together,
+    /// Into one text each.
+    Apart,
+}
+
+/// What a command printed, and how it ended.
+pub(super) struct Printed {
+    pub(super) output: Vec<String>,
+    /// Empty where the streams are together.
+    pub(super) errors: Vec<String>,
+    pub(super) code: String,
+}
+
 /// Runs the steps and returns the differences from the page.
 pub(super) fn differences(steps: &[Step], page: &str) -> String {
+    let (commands, mut text) = play(steps, page, Streams::Together);
+    for (shown, printed) in commands {
+        let right = printed.code == shown.code.to_string();
+        if !(right && (shown.output.is_empty() || fits(&shown.output, &printed.output))) {
+            text.push_str(&difference(shown, &printed, page));
+        }
+    }
+    text
+}
+
+/// Runs the steps and returns what each command printed, and a complaint if they did not end.
+pub(super) fn play<'a>(
+    steps: &'a [Step],
+    page: &str,
+    streams: Streams,
+) -> (Vec<(&'a Shown, Printed)>, String) {
     let home = tempfile::tempdir().expect("a folder");
     let (work, out) = (home.path().join("work"), home.path().join("out"));
     for folder in [&work, &out, &home.path().join("bin")] {
@@ -61,7 +94,7 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
                 );
             }
             Step::Command(mode, shown) if wanted(mode, page) => {
-                script.push_str(&one(&shown.command, commands.len()));
+                script.push_str(&one(&shown.command, commands.len(), streams));
                 commands.push(shown);
             }
             Step::Command(..) => {}
@@ -73,10 +106,20 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
     if !ended {
         let _written = writeln!(text, "{page}: did not end in {PATIENCE:?}");
     }
-    for (number, shown) in commands.iter().enumerate() {
-        text.push_str(&difference(shown, &out, number, page));
-    }
-    text
+    let read = |name: String| {
+        let bytes = std::fs::read(out.join(name)).unwrap_or_default();
+        String::from_utf8_lossy(&bytes).into_owned()
+    };
+    let lines = |name: String| read(name).lines().map(str::to_owned).collect();
+    let printed = commands.into_iter().enumerate().map(|(number, shown)| {
+        let printed = Printed {
+            output: lines(number.to_string()),
+            errors: lines(format!("{number}.err")),
+            code: read(format!("{number}.code")).trim().to_owned(),
+        };
+        (shown, printed)
+    });
+    (printed.collect(), text)
 }
 
 fn wanted(mode: &Mode, page: &str) -> bool {
@@ -90,14 +133,18 @@ fn wanted(mode: &Mode, page: &str) -> bool {
 }
 
 /// One command of the script. One in the background has begun when it has said its first line.
-fn one(command: &str, number: usize) -> String {
+fn one(command: &str, number: usize, streams: Streams) -> String {
     let wait = if command.ends_with('&') {
         format!("while ! [ -s ../out/{number} ] && kill -0 $! 2>/dev/null; do sleep 0.05; done\n")
     } else {
         String::new()
     };
+    let errors = match streams {
+        Streams::Together => "&1".to_owned(),
+        Streams::Apart => format!("\"$OUT/{number}.err\""),
+    };
     format!(
-        "{{ {command}\n}} >\"$OUT/{number}\" 2>&1 </dev/null; echo $? >\"$OUT/{number}.code\"\n{}",
+        "{{ {command}\n}} >\"$OUT/{number}\" 2>{errors} </dev/null; echo $? >\"$OUT/{number}.code\"\n{}",
         wait.replace("../out", "\"$OUT\"")
     )
 }
@@ -144,23 +191,13 @@ fn run(home: &Path, python: Option<&Path>) -> bool {
     ended
 }
 
-fn difference(shown: &Shown, out: &Path, number: usize, page: &str) -> String {
-    let read = |name: String| std::fs::read_to_string(out.join(name)).unwrap_or_default();
-    let printed: Vec<_> = read(number.to_string())
-        .lines()
-        .map(str::to_owned)
-        .collect();
-    let code = read(format!("{number}.code"));
-    let code = code.trim();
-    let right = code == shown.code.to_string();
-    if right && (shown.output.is_empty() || fits(&shown.output, &printed)) {
-        return String::new();
-    }
+fn difference(shown: &Shown, printed: &Printed, page: &str) -> String {
     let Shown { line, command, .. } = shown;
     format!(
-        "{page}:{line}: $ {command}\nshown (exit code {}):\n{}\nprinted (exit code {code}):\n{}\n\n",
+        "{page}:{line}: $ {command}\nshown (exit code {}):\n{}\nprinted (exit code {}):\n{}\n\n",
         shown.code,
         shown.output.join("\n"),
-        printed.join("\n")
+        printed.code,
+        printed.output.join("\n")
     )
 }
