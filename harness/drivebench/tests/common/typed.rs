@@ -2,7 +2,8 @@
 
 use std::process::{Command, Output, Stdio};
 
-fn in_folder(folder: impl AsRef<std::path::Path>, arguments: &[&str]) -> Output {
+/// From this folder.
+pub(crate) fn in_folder(folder: impl AsRef<std::path::Path>, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_drivebench"))
         .args(arguments)
         .current_dir(folder)

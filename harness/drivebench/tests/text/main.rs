@@ -2,7 +2,6 @@
 
 mod captures;
 mod cli;
-mod cli_drive;
 mod crates;
 mod dbc;
 #[path = "../common/debian.rs"]
