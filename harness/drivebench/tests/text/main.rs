@@ -11,7 +11,6 @@ mod html;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
 mod nordac;
-mod nordac_drive;
 mod package;
 #[path = "../common/python.rs"]
 mod python;
@@ -20,4 +19,3 @@ mod rig;
 mod tidy;
 #[path = "../common/typed.rs"]
 mod typed;
-mod unitek;
