@@ -2,9 +2,7 @@
 
 mod empty;
 mod forms;
-mod frames;
 mod hostile;
-mod program;
 mod round_trip;
 mod routes;
 mod telegrams;
