@@ -11,10 +11,8 @@ mod inverters_on_rig;
 mod merge;
 mod merge_qualified;
 mod named;
-mod not_safe;
 mod on_can;
 mod on_can_qualify;
-mod on_profibus;
 mod port_interlocks;
 #[path = "../common/program.rs"]
 mod program;

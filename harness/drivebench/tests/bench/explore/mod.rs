@@ -4,4 +4,3 @@ mod command;
 mod lines;
 mod rings;
 mod shared;
-mod witness;
