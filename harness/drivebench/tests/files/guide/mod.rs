@@ -15,10 +15,10 @@ use std::panic::{self, UnwindSafe};
 use std::path::Path;
 use std::sync::Once;
 
-/// Sections of the ND21 manual that the guide cites and that have neither a table nor an erratum.
-const WITHOUT_TABLES: [&str; 15] = [
+/// Sections of the ND21 manual that the guide and transcripts cite and that have neither a table nor an erratum.
+const WITHOUT_TABLES: [&str; 16] = [
     "2", "2.3", "2.5", "5.4", "5.4.1", "5.4.2", "6.3", "6.4", "6.4.1", "6.4.2", "6.4.3", "8.3",
-    "11.5", "14.5.3.2", "14.6.4",
+    "8.4", "11.5", "14.5.3.2", "14.6.4",
 ];
 
 /// Every command does what its page shows.
