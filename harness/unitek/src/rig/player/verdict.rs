@@ -18,9 +18,6 @@ const RIGHT_ALL_THE_SAME: &str = "right drives with these registers send the sam
 /// In how many attempts at a scenario, one behind the other, an adapter may have lost a frame of the same register.
 const LOST_BY_THE_ADAPTER: usize = 2;
 
-/// Why what has not come accuses nothing.
-const LOST: &str = "an adapter may have lost it, and all else is what right drives send";
-
 /// Why a line that was not met accuses nothing, where right drives were compared.
 const NOT_COMPARED: &str = "right drives send the same as far as it is compared, and the contents of this line follow from the plant or from inputs";
 
@@ -67,9 +64,7 @@ impl Player {
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
                 verdict: Verdict::Inconclusive,
                 shows_nothing: true,
-                remarks: std::iter::once(format!("{why}: {LOST}"))
-                    .chain(outcome.remarks)
-                    .collect(),
+                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
                 ..outcome
             },
             (Verdict::Failed, Shown::Complete) if judged_by_worlds => right_all_the_same(outcome),

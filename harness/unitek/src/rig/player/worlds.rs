@@ -42,6 +42,9 @@ pub(super) const MOST_LOST: usize = 3;
 /// FW-VERSION.
 const FIRMWARE: u8 = 0x1B;
 
+/// No register.
+const NONE: u8 = 0;
+
 /// The bits of an identifier (UNITEK 3.1).
 const MOST_IDENTIFIER: u32 = 0x7FF;
 
@@ -79,6 +82,12 @@ impl Told {
         self.way.tolerance > Span::ZERO && silent >= STANDSTILL
     }
 
+    /// Whether it may have done so for nearly as long as a frame may be late: a plant that goes on meanwhile shows it as well.
+    fn may_have_stood_still(&self) -> bool {
+        let silent = self.way.late.max(self.talk.longest_standstill());
+        self.way.tolerance > Span::ZERO && silent * 2 >= self.slowest()
+    }
+
     /// How late a frame may be, and whether replies may be overtaken: few worlds explain most conversations, and the most are tried last. In
     /// virtual time nothing is late.
     fn lateness(&self) -> Vec<(Span, bool)> {
@@ -102,7 +111,7 @@ impl Told {
 pub(super) enum Shown {
     /// Something no right drive would have sent, in a sentence.
     Wrong(String),
-    /// An adapter may have lost frames, and all else is what right drives send: what has not come, with its register.
+    /// An adapter may have lost frames of a register, or something has stood still: where it comes again and again, no right drive has sent it.
     Lost(u8, String),
     /// Right drives could have sent all of it, and nothing more.
     Complete,
@@ -111,6 +120,10 @@ pub(super) enum Shown {
     /// It was not compared, or not to its end, and why.
     Unknown(&'static str),
 }
+
+/// Why what no right drive sends accuses none yet.
+const LOST: &str = "an adapter may have lost it, and all else is what right drives send";
+const HELD_UP: &str = "an adapter, the computer or the drive stood still meanwhile";
 
 /// Why what came is not compared to its end.
 const OTHER_IDENTIFIERS: &str = "two drives may have sent it";
@@ -142,6 +155,9 @@ impl Player {
         let shown = each.reduce(Shown::and);
         match shown.unwrap_or(Shown::Unknown(NOT_AT_REST)) {
             Shown::Wrong(_) if told.stood_still() => Shown::Unknown(STOOD_STILL),
+            Shown::Wrong(why) if told.may_have_stood_still() => {
+                Shown::Lost(NONE, format!("{why}: {HELD_UP}"))
+            }
             shown => shown,
         }
     }
@@ -213,7 +229,7 @@ impl Player {
         let why = words(known, (&came, place), expected);
         let asked = expected.and_then(|own| own.data().first().copied());
         match register {
-            Some(register) => Shown::Lost(register, why),
+            Some(register) => Shown::Lost(register, format!("{why}: {LOST}")),
             // The drives were made ready, and what the scenario sends has too many worlds behind a loss.
             None if unclear && asked.is_some_and(|own| talk.asks_before_it_began(own)) => {
                 Shown::Unknown(TOO_MANY)
