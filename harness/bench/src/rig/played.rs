@@ -32,9 +32,6 @@ pub fn attempts_of(rig: &Rig, real_time: bool, qualifies: bool) -> usize {
 /// How often drives are made ready before one that gives no answer has failed.
 const MOST_UNREADY: usize = 3;
 
-/// From how many scenarios on that have failed at every attempt the drive is known to fail: no other scenario is played again for having failed.
-const FAILED: usize = 8;
-
 /// One attempt at a scenario.
 #[derive(Clone, Debug)]
 pub struct Attempt {
@@ -184,8 +181,6 @@ pub struct Again {
     unready: usize,
     /// Which drives gave no answer at every attempt at a scenario: it is the drive, then, and not the computer.
     hopeless: BTreeSet<String>,
-    /// How many scenarios have failed at every one of several attempts.
-    failed: usize,
 }
 
 impl Again {
@@ -194,7 +189,6 @@ impl Again {
         Self {
             unready: if real_time { MOST_UNREADY } else { 1 },
             hopeless: BTreeSet::new(),
-            failed: 0,
         }
     }
 
@@ -224,11 +218,7 @@ impl Again {
                     .iter()
                     .filter(|own| own.failed())
                     .partition(|own| own.outcome.shows_nothing);
-                let most_failed = if self.failed < FAILED { most } else { 1 };
-                let again = failed.len() < most_failed && late.len() < most.max(MOST_LATE);
-                let all = |verdict| attempts.iter().all(|own| own.outcome.verdict == verdict);
-                self.failed += usize::from(!again && played > 1 && all(Verdict::Failed));
-                again
+                failed.len() < most && late.len() < most.max(MOST_LATE)
             }
         }
     }
@@ -314,24 +304,6 @@ mod tests {
         assert_eq!(attempts(again, 2, &late), 4);
         let turns = [(Failed, ""), (Marginal, ""), (Failed, ""), (Marginal, "")];
         assert_eq!(attempts(again, 3, &turns), 4);
-    }
-
-    #[test]
-    fn a_drive_that_is_known_to_fail_is_not_tried_again() {
-        let again = &mut Again::new(true);
-        for _ in 0..FAILED {
-            assert_eq!(attempts(again, 3, &[(Failed, "")]), 3);
-        }
-        assert_eq!(attempts(again, 3, &[(Failed, "")]), 1);
-        assert_eq!(
-            attempts(again, 3, &[(Marginal, ""), (Marginal, ""), (Passed, "")]),
-            3
-        );
-        // A line that damages something now and then does not fail every attempt.
-        let again = &mut Again::new(true);
-        for _ in 0..2 * FAILED {
-            assert_eq!(attempts(again, 3, &[(Failed, ""), (Passed, "")]), 2);
-        }
     }
 
     /// ND21 9.9: drives that monitor time-outs change their bytes behind a silence of the computer.
