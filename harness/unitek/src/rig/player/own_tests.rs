@@ -1,17 +1,21 @@
 //! Conversations in which no line waits for a frame are judged by what right drives could have sent, in virtual time too.
 
-use super::worlds::Shown;
+use super::worlds::{Shown, Told};
 use super::{Known, Own, Player};
 use crate::BUSES;
 use crate::rig::Axis;
+use crate::rig::observed::Exchange;
 use crate::rig::qualify::conversations;
 use harness_bench::qualify::segment::CONVERSATION;
 use harness_bench::rig::playing::RigRun as _;
+use harness_bench::rig::playing::observed::LinkTimes;
 use harness_bench::rig::playing::run::{PortPlayer as _, PortRun};
 use harness_bench::rig::{UseOptions, parse};
 use harness_bench::scenario::run::Outcome;
 use harness_bench::scenario::source::Source;
 use harness_bench::scenario::verdict::Verdict;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::REGISTERS;
 use harness_proto::unitek::guard::Limits;
 use std::collections::BTreeSet;
@@ -262,6 +266,41 @@ fn what_is_lost_each_time_accuses() {
     ] {
         assert_eq!(player.lost_again(&own, shown), expected);
     }
+}
+
+/// A cycle of which a frame holds something else. Where something stood still meanwhile, it accuses the drive where it comes again and again.
+#[test]
+fn what_comes_after_a_standstill_accuses_no_drive_at_once() {
+    let rig = parse(&desk(&[]), &BUSES).expect("a rig's file");
+    let mut player = Player::new(&rig, true, true);
+    let mut known = Known::new(player.axes[0]);
+    known.cells = REGISTERS.iter().map(|row| (row.number, row.dump)).collect();
+    player.known = Some(vec![known]);
+    let at = |millis| Instant::START + Span::from_millis(millis);
+    let frame = |text: &str| -> Frame { text.parse().expect("a frame") };
+    let shown = |gap: u64| {
+        let times = [10, 20, 30, 30 + gap, 40 + gap];
+        let came = times.map(|time| (at(time), at(time), frame("181#1BD80100")));
+        let mut talk = Exchange::default();
+        talk.sent = vec![(at(0), frame("201#3D1B0A"))];
+        talk.came = came.to_vec();
+        talk.read = at(45 + gap);
+        talk.came[3].2 = frame("181#1BD90100");
+        player.shown(&Told {
+            talk,
+            way: LinkTimes {
+                late: Span::ZERO,
+                longest: Span::from_millis(2),
+                tolerance: Span::from_millis(90),
+            },
+            unlike: Vec::new(),
+            explained: Vec::new(),
+            follows: false,
+        })
+    };
+    assert!(matches!(shown(10), Shown::Wrong(_)), "{:?}", shown(10));
+    assert!(matches!(shown(100), Shown::Lost(..)), "{:?}", shown(100));
+    assert!(matches!(shown(300), Shown::Unknown(_)), "{:?}", shown(300));
 }
 
 /// A walk alone finds wrong drives that no line of it describes; a right one passes.
