@@ -6,7 +6,7 @@
 
 use super::super::Axis;
 use super::super::observed::Exchange;
-use super::worlds::{AHEAD, Came, MOST_LOST, Shown};
+use super::worlds::{AHEAD, Came, LOST, MOST_LOST, Shown};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Dlc4;
@@ -158,7 +158,7 @@ pub(super) fn counted(
                 cycle.every
             );
             shown = match lossy {
-                true => Shown::Lost(*register, why),
+                true => Shown::Lost(Some(*register), format!("{why}: {LOST}")),
                 false => return Some(Shown::Wrong(why)),
             };
         }
@@ -226,7 +226,10 @@ mod tests {
         assert_eq!(judged(|_| 10, 0, 20), Some(Shown::Right));
         let six = |place: usize| if place < 6 { 12 } else { 0 };
         assert!(matches!(judged(six, 0, 0), Some(Shown::Wrong(_))));
-        assert!(matches!(judged(six, 0, 20), Some(Shown::Lost(0x79, _))));
+        assert!(matches!(
+            judged(six, 0, 20),
+            Some(Shown::Lost(Some(0x79), _))
+        ));
         assert!(matches!(judged(|_| 24, 0, 20), Some(Shown::Wrong(_))));
         // It may have begun only when the reply behind its request came.
         assert_eq!(judged(six, 590, 20), Some(Shown::Right));

@@ -119,8 +119,8 @@ pub(crate) struct Player {
     stored: bool,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
-    /// Of which register a frame may have been lost, and in how many attempts one behind the other, by scenario.
-    lost: BTreeMap<String, (u8, usize)>,
+    /// Of which register a frame may have been lost, none where something stood still, and in how many attempts one after the other, by scenario.
+    lost: BTreeMap<String, (Option<u8>, usize)>,
     /// Whether the drives are qualified.
     qualifies: bool,
     /// What shows that the program works while it plays on models.

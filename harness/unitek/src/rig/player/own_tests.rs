@@ -252,7 +252,7 @@ fn what_is_lost_each_time_accuses() {
     let mut player = Player::new(&rig, true, true);
     let (_, source) = by_frames().swap_remove(0);
     let own = Own::read(&source).expect("a conversation");
-    let lost = |register| Shown::Lost(register, "it has not come".to_owned());
+    let lost = |register| Shown::Lost(Some(register), "it has not come".to_owned());
     let wrong = Shown::Wrong("it has not come".to_owned());
     for (shown, expected) in [
         (lost(0x30), lost(0x30)),

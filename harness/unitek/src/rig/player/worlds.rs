@@ -42,9 +42,6 @@ pub(super) const MOST_LOST: usize = 3;
 /// FW-VERSION.
 const FIRMWARE: u8 = 0x1B;
 
-/// No register.
-const NONE: u8 = 0;
-
 /// The bits of an identifier (UNITEK 3.1).
 const MOST_IDENTIFIER: u32 = 0x7FF;
 
@@ -112,7 +109,7 @@ pub(super) enum Shown {
     /// Something no right drive would have sent, in a sentence.
     Wrong(String),
     /// An adapter may have lost frames of a register, or something has stood still: where it comes again and again, no right drive has sent it.
-    Lost(u8, String),
+    Lost(Option<u8>, String),
     /// Right drives could have sent all of it, and nothing more.
     Complete,
     /// Right drives could have sent all of it.
@@ -122,7 +119,7 @@ pub(super) enum Shown {
 }
 
 /// Why what no right drive sends accuses none yet.
-const LOST: &str = "an adapter may have lost it, and all else is what right drives send";
+pub(super) const LOST: &str = "an adapter may have lost it, and all else is what right drives send";
 const HELD_UP: &str = "an adapter, the computer or the drive stood still meanwhile";
 
 /// Why what came is not compared to its end.
@@ -156,7 +153,7 @@ impl Player {
         match shown.unwrap_or(Shown::Unknown(NOT_AT_REST)) {
             Shown::Wrong(_) if told.stood_still() => Shown::Unknown(STOOD_STILL),
             Shown::Wrong(why) if told.may_have_stood_still() => {
-                Shown::Lost(NONE, format!("{why}: {HELD_UP}"))
+                Shown::Lost(None, format!("{why}: {HELD_UP}"))
             }
             shown => shown,
         }
@@ -229,7 +226,7 @@ impl Player {
         let why = words(known, (&came, place), expected);
         let asked = expected.and_then(|own| own.data().first().copied());
         match register {
-            Some(register) => Shown::Lost(register, format!("{why}: {LOST}")),
+            Some(_) => Shown::Lost(register, format!("{why}: {LOST}")),
             // The drives were made ready, and what the scenario sends has too many worlds behind a loss.
             None if unclear && asked.is_some_and(|own| talk.asks_before_it_began(own)) => {
                 Shown::Unknown(TOO_MANY)
