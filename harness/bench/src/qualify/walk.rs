@@ -243,6 +243,17 @@ impl<S: Ord> Walk<S> {
         }
     }
 
+    /// This walk, and another one with other inputs, in conversations of its own.
+    #[must_use]
+    pub fn beside(mut self, other: Self) -> Self {
+        self.parts.extend(other.parts);
+        for (why, pairs) in other.denied {
+            self.denied.entry(why).or_default().extend(pairs);
+        }
+        self.left.extend(other.left);
+        self
+    }
+
     /// The lines that say what was walked and what was not, by the names of the inputs. `played` says whether the part at a place has passed or failed.
     #[must_use]
     pub fn told(&self, names: &[&str], played: impl Fn(usize) -> bool) -> String {

@@ -3,7 +3,7 @@
 use super::check::RigCheck;
 use super::condition::Mistake;
 use super::file::{Interlock, RigFile};
-use super::port_file::{Node, Port, PortBus};
+use super::port_file::{Node, Port, PortBus, PortLimits};
 use super::profile::{ProfileError, ProfileLines};
 use crate::file::schema::PathStep;
 use crate::scenario::problem::{Problem, Problems, TextSpan};
@@ -34,8 +34,8 @@ pub struct PortRow {
     pub setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
     /// The steps among lines of a header.
     pub steps: fn(&Source) -> Option<Problems>,
-    /// The register of `allow_registers`; or what is wrong, and what was expected.
-    pub special_register: fn(&str) -> Result<u8, (String, String)>,
+    /// What is wrong with the registers that `[limits]` name.
+    pub register_mistakes: fn(&PortLimits) -> Vec<RegisterMistake>,
     /// The key under which an entry of `[[interlock]]` names what it looks at, and what checks the entry.
     pub interlock: (&'static str, CheckInterlock),
 }
@@ -53,6 +53,17 @@ impl PortRow {
         let placed = problems.map(|own| (line(own), own.clone()));
         placed.collect()
     }
+}
+
+/// What is wrong with a register that a list of `[limits]` names.
+#[derive(Clone, Debug)]
+pub struct RegisterMistake {
+    /// The list.
+    pub key: &'static str,
+    /// Its entry, counted from 0.
+    pub index: usize,
+    pub message: String,
+    pub expected: String,
 }
 
 /// What is wrong with the drives of a rig's rings; `None` in place of a line of `[sim]` where it is in the profile.
@@ -104,7 +115,7 @@ impl RigBuses {
             drive: |_, _| (0, Vec::new()),
             setup_mistakes: |_, _| None,
             steps: |_| None,
-            special_register: |_| Ok(0),
+            register_mistakes: |_| Vec::new(),
             interlock: ("", |_| Ok(())),
         };
         Self {

@@ -374,11 +374,9 @@ impl RigCheck<'_> {
                 expected,
             );
         }
-        for (index, name) in limits.allow_registers.iter().enumerate() {
-            if let Err((message, expected)) = (row.special_register)(name) {
-                let path = [at("allow_registers").as_slice(), &[index.into()]].concat();
-                self.wrong(&path, message, expected);
-            }
+        for mistake in (row.register_mistakes)(limits) {
+            let path = [at(mistake.key).as_slice(), &[mistake.index.into()]].concat();
+            self.wrong(&path, mistake.message, mistake.expected);
         }
         if limits
             .bit_rate_way_back

@@ -249,6 +249,10 @@ pub struct PortLimits {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 16))]
     pub allow_registers: Vec<String>,
+    /// The values that may be written to registers; default all of them. A qualification writes both ends of a range.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 256))]
+    pub ranges: Vec<RegisterRange>,
     /// How a drive with another bit rate is reached again, in a sentence. Without it the bit rate cannot be changed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bit_rate_way_back: Option<String>,
@@ -272,12 +276,27 @@ impl PortLimits {
             ("max_eeprom_writes", self.max_eeprom_writes.is_some()),
             ("allow_other_identifiers", self.allow_other_identifiers),
             ("allow_registers", !self.allow_registers.is_empty()),
+            ("ranges", !self.ranges.is_empty()),
             ("bit_rate_way_back", self.bit_rate_way_back.is_some()),
             ("store_bus_settings", self.store_bus_settings.is_some()),
         ];
         let given = all.into_iter().filter(|(_, given)| *given);
         given.map(|(key, _)| key).collect()
     }
+}
+
+/// The values that may be written to a register, as whole numbers with its sign.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegisterRange {
+    /// The register, by name or number, such as `SPEED_KP` or `0x2C`.
+    pub register: String,
+    /// The lowest value; default the lowest that the register has room for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<i64>,
+    /// The highest value; default the highest that the register has room for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<i64>,
 }
 
 /// What [`PortLimits::store_bus_settings`] must read.

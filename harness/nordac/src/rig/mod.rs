@@ -13,6 +13,7 @@ mod run;
 mod session;
 mod settle;
 pub(crate) mod talk;
+mod values;
 mod walk;
 
 pub(crate) use held::HeldBefore;
@@ -62,10 +63,7 @@ pub(crate) const PORT: PortRow = PortRow {
     drive: |_, node| (node.address.unwrap_or_default(), Vec::new()),
     setup_mistakes: |port, source| setup(port, source).err(),
     steps: |source| header_lines::<Nordac>(source).err(),
-    special_register: |name| {
-        let expected = "no such permission expected on this bus".to_owned();
-        Err((format!("`{name}` is no register of a NORDAC"), expected))
-    },
+    register_mistakes: |_| Vec::new(),
     interlock: ("parameter", interlock::checked),
 };
 

@@ -2,7 +2,7 @@
 
 use super::known::{Known, value_of};
 use super::player::{Player, SlaveNote};
-use super::walk::{State, inputs, walk_of, walked};
+use super::walk::{State, names, walk_of, walked};
 use super::{RigSlave, limits, slaves};
 use harness_bench::qualify::segment::{
     Attempts, CONVERSATION, Note as _, Point, kept, profile, qualified,
@@ -195,7 +195,7 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
     let known: Vec<_> = known.collect();
     let walks = walks(rig);
     let walks = walks.iter().map(|own| &own.1);
-    let attempts = Attempts::new(&notes, walks, &inputs());
+    let attempts = Attempts::new(&notes, walks, &names());
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());

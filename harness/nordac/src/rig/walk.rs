@@ -1,9 +1,10 @@
 //! The conversation that walks a right inverter: each state that control words lead to (NORDAC 3.3), at rest and turning, with each word.
 //!
-//! What comes by itself (faults, time-outs, the watchdog), what writes parameters and what other services do is left to the conversations
-//! in corpora/qualify/nordac.
+//! At rest it also writes the ends of the ranges of parameters. What comes by itself (faults, time-outs, the watchdog), what parameters do
+//! and what other services do is left to the conversations in corpora/qualify/nordac.
 
 use super::RigSlave;
+use super::values::values;
 use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, walk};
 use harness_proto::nordac::guard::{Denial, Gate, GuardedSlave, Limits};
 use harness_proto::nordac::pkw::Index;
@@ -14,6 +15,7 @@ use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::inverter::Outputs;
 use harness_sim::nordac::{Inverter, InverterSetup};
+use std::sync::Arc;
 
 const BOUNDS: WalkBounds = WalkBounds {
     conversation: Span::from_millis(6_000),
@@ -35,12 +37,17 @@ enum Put {
     Setpoint(i16),
     /// A task that reads a parameter (3.4.1).
     Read(u16),
+    /// Tasks that write a parameter and read it again, or why it is not written.
+    Value(&'static Parameter, i32, Option<&'static str>),
 }
 
-use Put::{Read, Setpoint, Word};
+use Put::{Read, Setpoint, Value, Word};
 
-/// The inputs of a walk: name, and what it is.
-const INPUTS: [(&str, Put); 22] = [
+/// An input of a walk: its name, and what it is.
+type Input = (&'static str, Put);
+
+/// The inputs of a walk beside the values of parameters.
+const INPUTS: [Input; 22] = [
     ("a read of a ramp", Read(1102)),
     ("a read of the control word in force", Read(967)),
     ("a read of the present fault", Read(1800)),
@@ -83,6 +90,9 @@ struct Model {
     slave: RigSlave,
     image: Image,
     now: Instant,
+    inputs: Arc<[Input]>,
+    /// Whether it is walked with values alone: nothing turns until they are set back.
+    writes_values: bool,
 }
 
 impl Model {
@@ -105,6 +115,8 @@ impl Model {
             slave,
             image: Image::default(),
             now: Instant::START,
+            inputs: inputs().into(),
+            writes_values: false,
         })
     }
 
@@ -133,11 +145,17 @@ impl Model {
         Ok(())
     }
 
-    /// A task, until its answer has come (3.4.1).
+    /// A task that reads a parameter.
     fn read(&mut self, number: u16) -> Result<Vec<String>, String> {
         let ak = Parameter::of(number).map_or(1, |own| Task::read(own).ak());
-        let octets = Pkw::of(ak, number, 0, 0).encode();
-        let octets: String = octets.iter().map(|own| format!("{own:02X}")).collect();
+        self.task(Pkw::of(ak, number, 0, 0))
+    }
+
+    /// A task, until its answer has come (3.4.1).
+    fn task(&mut self, task: Pkw) -> Result<Vec<String>, String> {
+        let octets = task.encode();
+        let octets: String = octets.iter().map(|octet| format!("{octet:02X}")).collect();
+        self.image.pkw = task;
         for _ in 0..ANSWERED {
             self.exchange()?;
         }
@@ -176,10 +194,14 @@ impl Walked for Model {
         }
     }
 
+    fn takes(&self, input: usize) -> bool {
+        matches!(self.inputs[input].1, Value(..)) == self.writes_values
+    }
+
     fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
         let address = self.slave.address;
         let exchange = format!("exchange {address}");
-        let line = match INPUTS[input].1 {
+        let line = match self.inputs[input].1 {
             Word(stw) => {
                 self.image.words[0] = stw;
                 format!("{exchange} STW={stw:04X}")
@@ -190,6 +212,14 @@ impl Walked for Model {
                 format!("{exchange} HSW={hsw:04X}")
             }
             Read(number) => return self.read(number),
+            Value(_, _, Some(why)) => return Err(why.to_owned()),
+            Value(parameter, value, None) => {
+                let word = u32::from(value as u16);
+                let change = Task::change(parameter).ak();
+                let mut lines = self.task(Pkw::of(change, parameter.number, 0, word))?;
+                lines.extend(self.read(parameter.number)?);
+                return Ok(lines);
+            }
         };
         self.exchange()?;
         let mut lines = vec![line];
@@ -233,7 +263,12 @@ pub(super) fn walk_of(slave: RigSlave, limits: &Limits) -> Option<Walk<State>> {
     for _ in 0..2 {
         model.exchange().ok()?;
     }
-    Some(walk(&model, INPUTS.len(), BOUNDS, &[]))
+    let values = Model {
+        writes_values: true,
+        ..model.clone()
+    };
+    let walk = |model: &Model| walk(model, model.inputs.len(), BOUNDS, &[]);
+    Some(walk(&model).beside(walk(&values)))
 }
 
 /// The text of a conversation with these lines of a walk.
@@ -245,8 +280,17 @@ pub(super) fn walked(slave: RigSlave, lines: &[String]) -> String {
 }
 
 /// The inputs of a walk, in the order of their numbers.
-pub(super) fn inputs() -> [&'static str; INPUTS.len()] {
-    INPUTS.map(|(name, _)| name)
+fn inputs() -> Vec<Input> {
+    let values = values().map(|value| {
+        let put = Value(value.parameter, value.value, value.left_out);
+        (value.name, put)
+    });
+    INPUTS.into_iter().chain(values).collect()
+}
+
+/// Their names.
+pub(super) fn names() -> Vec<&'static str> {
+    inputs().into_iter().map(|(name, _)| name).collect()
 }
 
 #[cfg(test)]
@@ -267,17 +311,34 @@ mod tests {
 
     fn told(limits: &Limits) -> String {
         let walk = walk_of(SLAVE, limits).expect("a walk");
-        walk.told(&inputs(), |_| true)
+        walk.told(&names(), |_| true)
     }
 
     /// What is missing is named with what it would permit.
     #[test]
     fn what_the_rig_s_file_does_not_permit_is_named() {
         let all = told(&Limits::unlimited());
-        assert!(all.starts_with("walked: 165 of 176 "), "{all}");
+        assert!(all.starts_with("walked: 297 of 656 "), "{all}");
         assert!(!all.contains("allow_"), "{all}");
         let none = told(&Limits::default());
         assert!(none.contains("needs `allow_motion`"), "{none}");
+    }
+
+    /// No inverter is switched on with values that are tried.
+    #[test]
+    fn values_are_written_at_rest() {
+        let walk = walk_of(SLAVE, &Limits::unlimited()).expect("a walk");
+        // 1412, setpoint delay: 1001 is more than it can be.
+        let beyond = "exchange 8 PKW=25840000000003E9";
+        let part = walk
+            .parts
+            .iter()
+            .find(|part| part.lines.iter().any(|line| line == beyond));
+        let lines = &part.expect("the values").lines;
+        assert!(
+            lines.iter().all(|line| line.starts_with("exchange 8 PKW=")),
+            "{lines:?}"
+        );
     }
 
     /// What a slave sends in the whole walk, if it deviates.

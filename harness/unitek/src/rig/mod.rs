@@ -11,10 +11,11 @@ mod qualify;
 mod run;
 mod session;
 mod set_back;
+mod values;
 mod walk;
 
 pub(crate) use permitted::limits;
-use permitted::special_register;
+use permitted::register_mistakes;
 pub(crate) use player::Player;
 pub(crate) use session::{OfUnitek, Session, UnitekDrives};
 pub(crate) use set_back::HeldBefore;
@@ -41,6 +42,7 @@ pub(crate) const PORT: PortRow = PortRow {
         "allow_bus_settings",
         "allow_other_identifiers",
         "allow_registers",
+        "ranges",
         "bit_rate_way_back",
         "store_bus_settings",
     ],
@@ -53,7 +55,7 @@ pub(crate) const PORT: PortRow = PortRow {
     },
     setup_mistakes: |port, source| setup(port, source).err(),
     steps: |source| header_lines::<Unitek>(source).err(),
-    special_register,
+    register_mistakes,
     interlock: ("register", interlock::checked),
 };
 

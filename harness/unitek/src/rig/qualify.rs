@@ -3,7 +3,7 @@
 use super::Axis;
 use super::known::Known;
 use super::player::{DriveNote, Player};
-use super::walk::{State, inputs, walk_of, walked};
+use super::walk::{State, names, walk_of, walked};
 use super::{axes, limits};
 use harness_bench::qualify::segment::{
     Attempts, CONVERSATION, Note as _, Point, kept, profile, qualified,
@@ -211,12 +211,10 @@ pub(super) fn qualify(parts: &[&Player], rig: &Rig, began: &str, whole: bool) ->
         (known, player.limits())
     });
     let known: Vec<_> = known.collect();
-    let walks = walks(
-        &rig.port().map(axes).unwrap_or_default(),
-        &limits(rig, rig.file.limits.allow_motion),
-    );
+    let permitted = limits(rig, rig.file.limits.allow_motion);
+    let walks = walks(&rig.port().map(axes).unwrap_or_default(), &permitted);
     let walks = walks.iter().map(|own| &own.1);
-    let attempts = Attempts::new(&notes, walks, &inputs());
+    let attempts = Attempts::new(&notes, walks, &names(&permitted));
     let shown = known.iter().map(|(known, limits)| points(known, limits));
     let profile = profile((rig, began), shown.map(Iterator::collect).collect());
     let named = rig.file.deviation.iter().map(|own| own.name.clone());

@@ -4,13 +4,17 @@
 //! conversations in corpora/qualify/unitek.
 
 use super::Axis;
+use super::values::values;
 use harness_bench::qualify::walk::{Walk, WalkBounds, Walked, WalkedPart, walk};
 use harness_proto::can::{BadFrame, BitRate, Frame, Id};
 use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::frame::{Data, Request};
 use harness_proto::unitek::guard::{Denial, Gate, Limits};
 use harness_proto::unitek::properties::Properties;
 use harness_proto::unitek::words::MODE_EVENT;
 use harness_sim::unitek::{Drive, Inputs};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A conversation of more would have more worlds of a right drive than are kept.
 const BOUNDS: WalkBounds = WalkBounds {
@@ -37,15 +41,20 @@ enum Sent {
     Neighbour,
     /// A request with an identifier of 29 bits (4.1).
     Extended,
+    /// A value for a register, or why it is not written.
+    Value(u8, Data, Option<&'static str>),
 }
 
-use Sent::{Extended, Frames, Neighbour, Read, Remote};
+use Sent::{Extended, Frames, Neighbour, Read, Remote, Value};
+
+/// An input of a walk: its name, what is sent, and the registers that are read after it, beside STATUS.
+type Input = (&'static str, Sent, &'static [u8]);
 
 /// The register of the cycle: nothing else asks for it, so that a frame of it is one of the cycle.
 const CYCLIC: u8 = 0x34;
 
-/// The inputs of a walk: name, what is sent, and the registers that are read behind it, beside STATUS.
-const INPUTS: [(&str, Sent, &[u8]); 36] = [
+/// The inputs of a walk beside the values of registers.
+const INPUTS: [Input; 36] = [
     ("a request of firmware", Read(0x1B), &[]),
     ("a request of MODE", Read(0x51), &[]),
     ("a request of STATUS_MASK", Read(0x52), &[]),
@@ -194,6 +203,9 @@ struct Model {
     gate: Gate,
     axis: Axis,
     now: Instant,
+    inputs: Arc<[Input]>,
+    /// Whether it is walked with values alone: nothing turns until they are set back.
+    writes_values: bool,
 }
 
 impl Model {
@@ -209,6 +221,8 @@ impl Model {
             gate,
             axis,
             now: Instant::START,
+            inputs: inputs(limits).into(),
+            writes_values: false,
         }
     }
 
@@ -293,12 +307,24 @@ impl Walked for Model {
         }
     }
 
+    fn takes(&self, input: usize) -> bool {
+        matches!(self.inputs[input].1, Value(..)) == self.writes_values
+    }
+
     fn put(&mut self, input: usize) -> Result<Vec<String>, String> {
-        let (_, sent, asks) = INPUTS[input];
+        let (_, sent, asks) = self.inputs[input];
         let (rx, next) = (self.axis.rx, self.axis.rx + 1);
         let request = [0x3D, 0x40, 0];
         let mut lines = match sent {
             Read(register) => vec![self.read(register)?],
+            Value(_, _, Some(why)) => return Err(why.to_owned()),
+            Value(register, data, None) => {
+                let request = Request::Write { register, data };
+                let frame = request.encode(rx).map_err(|error| error.to_string())?;
+                let mut lines = self.bytes(frame.data(), 0)?;
+                lines.push(self.read(register)?);
+                return Ok(lines);
+            }
             Frames(frames) => {
                 let mut lines = Vec::new();
                 for (bytes, millis) in frames {
@@ -343,19 +369,26 @@ pub(super) fn walk_of(axis: Axis, limits: &Limits) -> Walk<State> {
         motion: false,
         ..limits.clone()
     };
-    let first = permitted(axis, &still, &[]);
+    let both = |limits: &Limits, before: &[WalkedPart<State>]| {
+        let states = Model::new(axis, limits);
+        let values = Model {
+            writes_values: true,
+            ..states.clone()
+        };
+        walk_from(states, before).beside(walk_from(values, before))
+    };
+    let first = both(&still, &[]);
     match limits.motion {
         true => {
-            let second = permitted(axis, limits, &first.parts);
+            let second = both(limits, &first.parts);
             first.then(second)
         }
         false => first,
     }
 }
 
-/// The walk with these limits to what was not walked before.
-fn permitted(axis: Axis, limits: &Limits, before: &[WalkedPart<State>]) -> Walk<State> {
-    let mut model = Model::new(axis, limits);
+/// The walk of a model to what was not walked before.
+fn walk_from(mut model: Model, before: &[WalkedPart<State>]) -> Walk<State> {
     let mut first = Vec::new();
     for bytes in FIRST {
         let mut tried = model.clone();
@@ -364,10 +397,23 @@ fn permitted(axis: Axis, limits: &Limits, before: &[WalkedPart<State>]) -> Walk<
             model = tried;
         }
     }
-    let mut walk = walk(&model, INPUTS.len(), BOUNDS, before);
+    let mut walk = walk(&model, model.inputs.len(), BOUNDS, before);
     for part in &mut walk.parts {
         let own = std::mem::replace(&mut part.lines, first.clone());
         part.lines.extend(own);
+        // No later value has changed an earlier one.
+        let values = part
+            .walked
+            .iter()
+            .filter_map(|(_, input)| match model.inputs[*input].1 {
+                Value(register, ..) => Some(register),
+                _ => None,
+            });
+        let values: BTreeSet<_> = values.collect();
+        let again = values
+            .into_iter()
+            .map(|register| model.clone().read(register));
+        part.lines.extend(again.flatten());
         for (bytes, millis) in LAST {
             // What is switched off needs no more than what has switched it on.
             let last = model.clone().bytes(bytes, millis);
@@ -388,8 +434,18 @@ pub(super) fn walked(axis: Axis, lines: &[String]) -> String {
 }
 
 /// The inputs of a walk, in the order of their numbers.
-pub(super) fn inputs() -> [&'static str; INPUTS.len()] {
-    INPUTS.map(|(name, ..)| name)
+fn inputs(limits: &Limits) -> Vec<Input> {
+    let values = values(limits).into_iter().map(|value| {
+        let data = Data::of(value.register, value.raw);
+        let sent = Value(value.register.number, data, value.left_out);
+        (value.name, sent, &[][..])
+    });
+    INPUTS.into_iter().chain(values).collect()
+}
+
+/// Their names.
+pub(super) fn names(limits: &Limits) -> Vec<&'static str> {
+    inputs(limits).into_iter().map(|(name, ..)| name).collect()
 }
 
 #[cfg(test)]
@@ -403,7 +459,7 @@ mod tests {
     };
 
     fn told(limits: &Limits) -> String {
-        walk_of(AXIS, limits).told(&inputs(), |_| true)
+        walk_of(AXIS, limits).told(&names(limits), |_| true)
     }
 
     /// Each limit that is missing is named with what it would permit, and nothing that it denies is planned.
@@ -420,6 +476,39 @@ mod tests {
         let lines: Vec<_> = lines.flat_map(|part| part.lines).collect();
         assert!(lines.iter().all(|line| !line.contains("> 201 31 66 06")));
         assert!(lines.iter().any(|line| line == "> 201 3D 34 0A"));
+    }
+
+    /// No drive is released with values that are tried, and each is read again at the end.
+    #[test]
+    fn values_are_written_to_a_locked_drive() {
+        let walk = walk_of(AXIS, &Limits::unlimited()).parts.into_iter();
+        let writes =
+            |part: &WalkedPart<State>| part.lines.iter().any(|line| line == "> 201 2C FF FF");
+        let parts: Vec<_> = walk.filter(writes).collect();
+        assert!(!parts.is_empty());
+        for part in parts {
+            assert_eq!(part.lines[0], "> 201 51 04 00");
+            let modes = part
+                .lines
+                .iter()
+                .filter(|line| line.starts_with("> 201 51 "));
+            assert!(
+                modes.clone().all(|line| line == "> 201 51 04 00"),
+                "{part:?}"
+            );
+            assert!(
+                !part.lines.contains(&"> 201 31 66 06".to_owned()),
+                "{part:?}"
+            );
+            assert!(
+                part.lines
+                    .iter()
+                    .filter(|line| *line == "read 1 2C")
+                    .count()
+                    > 1,
+                "{part:?}"
+            );
+        }
     }
 
     /// What needs no motion stands in conversations without it.

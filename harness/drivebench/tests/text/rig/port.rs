@@ -212,6 +212,12 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             ),
         ),
         (
+            "ranges that no register has",
+            port(
+                "slcan = \"/dev/ttyACM0\"\n[limits]\nranges = [{ register = \"SPEED_K\" }, { register = \"0x2C\", max = 65536 }, { register = \"76\", min = 3, max = -3 }, { register = \"SPEED_ACTUAL\" }, { register = \"1C\", max = 1000 }]",
+            ),
+        ),
+        (
             "what only other buses have",
             port(
                 "serial = \"/dev/ttyUSB0\"\nslcan = \"/dev/ttyACM0\"\n[limits]\nmax_setpoint = \"50%\"",

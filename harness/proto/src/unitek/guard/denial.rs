@@ -1,6 +1,6 @@
 //! Why a frame is not sent.
 
-use super::Limits;
+use super::{Limits, ValueRange};
 use crate::unitek::register::Register;
 use core::fmt;
 
@@ -68,6 +68,8 @@ pub enum Denial {
         /// The register.
         register: u8,
     },
+    /// The rig's file permits other values of the register, all of its bits written.
+    Range(ValueRange),
     /// 16 bits to 35 or ED: the upper half, the torque ramp, would become 0.
     HalfRamp {
         /// The register.
@@ -151,6 +153,11 @@ impl fmt::Display for Denial {
             Self::Never { register } => write!(
                 f,
                 "a write to register {register:02X} ({}) can make the drive unusable; no rig file permits it",
+                name(register)
+            ),
+            Self::Range(ValueRange { register, least, most }) => write!(
+                f,
+                "a write to register {register:02X} ({}) is permitted from {least} to {most}, all of its bits at once, by `ranges` in the rig's [limits]",
                 name(register)
             ),
             Self::HalfRamp { register } => write!(

@@ -8,10 +8,12 @@
 mod class;
 mod denial;
 mod drive;
+mod range;
 mod speed;
 
 pub use class::{Class, NAMED, class};
 pub use denial::{Denial, Fast, Missing};
+pub use range::ValueRange;
 
 use super::frame::{Data, Ignored, Request, low};
 use super::properties::Dlc4;
@@ -40,6 +42,8 @@ pub struct Limits {
     pub max_speed: Option<HighestSpeed>,
     /// Registers of [`Class::Named`] that the rig's file names.
     pub named: Vec<u8>,
+    /// The values that may be written to registers; to any other register each value may.
+    pub ranges: Vec<ValueRange>,
 }
 
 /// The highest speed that a drive may be told.
@@ -64,6 +68,7 @@ impl Limits {
             other_identifiers: true,
             max_speed: None,
             named: NAMED.to_vec(),
+            ranges: Vec::new(),
         }
     }
 
@@ -322,6 +327,13 @@ impl Gate {
                 register,
                 identifier,
             });
+        }
+        let range = limits
+            .ranges
+            .iter()
+            .find(|range| range.register == register);
+        if let Some(range) = range.filter(|range| !range.admits(data)) {
+            return Err(Denial::Range(*range));
         }
         let denies = |max| drive.speed.denies(max, register, low(data.bits()));
         if let Some(fast) = limits.max_speed.and_then(denies) {

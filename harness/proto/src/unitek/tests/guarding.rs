@@ -1,7 +1,10 @@
 //! The guard: classes, the lock, load, new identifiers (what a write may do to a physical drive).
 
-use super::super::guard::{Class, Denial, Fast, Gate, HighestSpeed, Limits, Missing, NAMED, class};
+use super::super::guard::{
+    Class, Denial, Fast, Gate, HighestSpeed, Limits, Missing, NAMED, ValueRange, class,
+};
 use super::*;
+use alloc::vec;
 
 fn gate(limits: Limits) -> Gate {
     Gate::new(
@@ -253,6 +256,43 @@ fn a_lock_is_booked_where_the_drive_is() {
     assert_eq!(denied(&mut gate, "210#310000"), stop);
     assert_eq!(denied(&mut gate, "210#510400"), None);
     assert_eq!(denied(&mut gate, "210#310000"), None);
+}
+
+/// No value outside of the range that the rig's file states for a register, and no part of it: what that leaves there is open.
+#[test]
+fn values_within_a_stated_range() {
+    let range = |register, least, most| ValueRange {
+        register,
+        least,
+        most,
+    };
+    let (offset, position) = (range(0x76, -3, 200), range(0xD4, 0, 70_000));
+    let mut gate = gate(Limits {
+        ranges: vec![offset, position],
+        ..Limits::unlimited()
+    });
+    for text in ["201#76FDFF", "201#76C800", "201#D470110100", "201#77FFFF"] {
+        assert_eq!(denied(&mut gate, text), None, "{text}");
+    }
+    for text in ["201#76FCFF", "201#76C900"] {
+        assert_eq!(
+            denied(&mut gate, text),
+            Some(Denial::Range(offset)),
+            "{text}"
+        );
+    }
+    for text in ["201#D471110100", "201#D4FFFFFFFF", "201#D40100"] {
+        assert_eq!(
+            denied(&mut gate, text),
+            Some(Denial::Range(position)),
+            "{text}"
+        );
+    }
+    let words = Denial::Range(offset).to_string();
+    assert!(
+        words.contains("76 (SPEED_CALIB_F) is permitted from -3 to 200"),
+        "{words}"
+    );
 }
 
 /// 84 at most once a minute; 35 and ED only whole.
