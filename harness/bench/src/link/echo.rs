@@ -60,7 +60,7 @@ mod tests {
             echo.sent(Outgoing::Byte(octet));
         }
         let good = |octets: &[u8]| -> Vec<Received> {
-            octets.iter().map(|own| Received::good(*own)).collect()
+            octets.iter().map(|octet| Received::good(*octet)).collect()
         };
         let mut first = good(&[0x10]);
         assert_eq!(echo.remove(&mut first, "tty"), Ok(()));

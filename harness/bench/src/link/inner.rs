@@ -172,8 +172,8 @@ impl InnerLink {
             let seen = if passes {
                 self.pass(at, byte, byte_time, read)
             } else {
-                let (own, error) = (Some(byte.byte), byte.error);
-                vec![LineByte::seen(at, own, own, error)]
+                let (value, error) = (Some(byte.byte), byte.error);
+                vec![LineByte::seen(at, value, value, error)]
             };
             if self.log.len() < most_recorded {
                 self.log.extend(seen);

@@ -404,11 +404,11 @@ pub trait Link: Line {
         let listens = self.listens(ring, link);
         let trace = listens.then(|| self.trace(ring))?;
         let bytes = trace.channels.get(link)?.octets().iter();
-        let arrived = bytes.filter_map(|own| {
-            let byte = own.received?;
+        let arrived = bytes.filter_map(|carried| {
+            let byte = carried.received?;
             Some(Received {
                 byte,
-                error: own.error,
+                error: carried.error,
             })
         });
         Some(arrived.collect())

@@ -153,9 +153,10 @@ impl<A: Accounting> PortEnd<A> {
         let follows = self.sent > 0 && now < self.free + octet_time;
         let wanted = self.shares_parity && follows && self.outgoing.damages_next_parity();
         let back = self.accounting.returns(octet_time).filter(|_| wanted);
-        let silence = back.map(|back| back + ADAPTER);
         let allowed = LONGEST_SILENCE.min(tolerance);
-        silence.filter(|own| *own <= allowed).unwrap_or(Span::ZERO)
+        back.map(|back| back + ADAPTER)
+            .filter(|silence| *silence <= allowed)
+            .unwrap_or(Span::ZERO)
     }
 
     /// Queues a byte of the bench's.

@@ -110,9 +110,9 @@ impl<A: Accounting> Pump<A> {
         interrupt: Arc<AtomicBool>,
     ) -> Self {
         wake_on_time();
-        let ports = wires.into_iter();
+        let end = |(wire, accounting)| PortEnd::new(wire, accounting);
         Self {
-            ports: ports.map(|(wire, own)| PortEnd::new(wire, own)).collect(),
+            ports: wires.into_iter().map(end).collect(),
             inner,
             octet_time,
             tolerance: Span::ZERO,
@@ -134,8 +134,8 @@ impl<A: Accounting> Pump<A> {
     /// Whether every port shows line errors at their byte, and sends them.
     pub fn has_line_errors(&self) -> bool {
         let has = |port: &PortEnd<A>| {
-            let own = port.wire.abilities();
-            own.shows_errors && own.sends_wrong_parity
+            let abilities = port.wire.abilities();
+            abilities.shows_errors && abilities.sends_wrong_parity
         };
         self.ports.iter().all(has) && self.inner.iter().all(InnerLink::has_line_errors)
     }
@@ -173,23 +173,23 @@ impl<A: Accounting> Pump<A> {
         let rest = !self.port_busy(port, now);
         let (octet_time, looked, tolerance) = (self.octet_time, self.looked, self.tolerance);
         let sound = self.trouble.is_none();
-        let Some(own) = self.ports.get_mut(port).filter(|_| sound) else {
+        let Some(end) = self.ports.get_mut(port).filter(|_| sound) else {
             return now;
         };
         if rest {
-            own.accounting.rest();
+            end.accounting.rest();
             let inner = self.inner.iter_mut().filter(|inner| inner.ring == port);
             inner.for_each(InnerLink::rest);
         }
         if !octets.is_empty() {
-            let echo_is_due = looked >= own.free + ECHO;
-            own.pause(now, octet_time, tolerance);
-            let silent = own
+            let echo_is_due = looked >= end.free + ECHO;
+            end.pause(now, octet_time, tolerance);
+            let silent = end
                 .echo
                 .as_ref()
                 .is_some_and(|echo| rest && echo_is_due && echo.owed() > 0);
             if silent {
-                let name = own.wire.name();
+                let name = end.wire.name();
                 let text = format!(
                     "{name}: the adapter has given back nothing of what was sent: set `echo = false`"
                 );
@@ -198,9 +198,9 @@ impl<A: Accounting> Pump<A> {
             }
         }
         for octet in octets {
-            own.send(now, *octet, octet_time);
+            end.send(now, *octet, octet_time);
         }
-        let free = own.free;
+        let free = end.free;
         self.give(now);
         free
     }
@@ -326,7 +326,7 @@ impl<A: Accounting> Pump<A> {
     /// As [`PortLink::last_words`](super::PortLink::last_words).
     pub fn last_words(&self, parts: Parts) -> std::io::Result<Vec<LastWords>> {
         let ports = self.ports.iter();
-        ports.map(|own| own.wire.last_words(parts)).collect()
+        ports.map(|end| end.wire.last_words(parts)).collect()
     }
 
     /// As [`PortLink::resume`](super::PortLink::resume).
@@ -414,9 +414,9 @@ impl<A: Accounting> Pump<A> {
 
     fn tamper(&mut self, spot: Spot) -> Option<&mut Tamper> {
         match spot {
-            Spot::Out(port) => self.ports.get_mut(port).map(|own| &mut own.outgoing),
-            Spot::In(port) => self.ports.get_mut(port).map(|own| &mut own.incoming),
-            Spot::Inner(inner) => self.inner.get_mut(inner).map(|own| &mut own.tamper),
+            Spot::Out(port) => self.ports.get_mut(port).map(|end| &mut end.outgoing),
+            Spot::In(port) => self.ports.get_mut(port).map(|end| &mut end.incoming),
+            Spot::Inner(inner) => self.inner.get_mut(inner).map(|link| &mut link.tamper),
         }
     }
 

@@ -119,9 +119,9 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             true => &[Capability::Tap, Capability::Simulator, Capability::Power][..],
             false => &[Capability::Power],
         };
-        let own = link.capabilities().iter().copied();
-        let capabilities = own
-            .filter(|own| !seen_beside_the_bus.contains(own))
+        let all = link.capabilities().iter().copied();
+        let capabilities = all
+            .filter(|capability| !seen_beside_the_bus.contains(capability))
             .collect();
         let real = link.lead() != Lead::NONE;
         Self {
@@ -189,7 +189,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             busy: known.busy,
             lead: (lead != known.lead).then_some(lead),
             pause: known.pause,
-            since: since.filter(|own| known.now.since(*own) > HELD_UP && !came.is_empty()),
+            since: since.filter(|since| known.now.since(*since) > HELD_UP && !came.is_empty()),
         };
         known.lead = lead;
         self.sink.take(&LinkEvent::Look(look));

@@ -175,7 +175,7 @@ impl Replay {
         let strayed = self
             .strayed
             .as_ref()
-            .filter(|why| !matches!(&self.trouble, Some(Trouble::Garbled(own)) if own == *why));
+            .filter(|why| !matches!(&self.trouble, Some(Trouble::Garbled(text)) if text == *why));
         match (&self.trouble, strayed) {
             (Some(_), _) if !exact => None,
             (_, Some(why)) => Some(why.clone()),
@@ -331,8 +331,8 @@ impl Line for Replay {
         }
         match self.events.front() {
             // What was denied was not sent.
-            Some(LinkEvent::Sent(own, end, sent))
-                if *own == port
+            Some(LinkEvent::Sent(at_port, end, sent))
+                if *at_port == port
                     && (sent.as_out() == what
                         || begins_with(what, sent) && self.denied_behind()) =>
             {
@@ -367,8 +367,8 @@ impl Line for Replay {
             return None;
         }
         match self.events.front() {
-            Some(LinkEvent::Received(own, at, byte))
-                if *own == port && (late || *at <= self.now) =>
+            Some(LinkEvent::Received(at_port, at, byte))
+                if *at_port == port && (late || *at <= self.now) =>
             {
                 let byte = (*at, *byte);
                 self.events.pop_front();
@@ -482,7 +482,7 @@ impl Link for Replay {
             return;
         }
         match self.events.front() {
-            Some(LinkEvent::Step(own)) if *own == place => {
+            Some(LinkEvent::Step(marked)) if *marked == place => {
                 self.events.pop_front();
             }
             _ => self.differs("the steps of the scenario"),
@@ -503,8 +503,8 @@ impl Link for Replay {
             return;
         }
         match self.events.front() {
-            Some(LinkEvent::Fault(own, at, what, then))
-                if (*own, *what, *then) == (port, fault, moment)
+            Some(LinkEvent::Fault(at_port, at, what, then))
+                if (*at_port, *what, *then) == (port, fault, moment)
                     && (self.known.is_none() || *at == self.now) =>
             {
                 self.events.pop_front();
@@ -538,7 +538,9 @@ impl Link for Replay {
             return None;
         }
         match self.events.pop_front() {
-            Some(LinkEvent::Tapped(own, place, _, bytes)) if (own, place) == (port, link) => {
+            Some(LinkEvent::Tapped(at_port, place, _, bytes))
+                if (at_port, place) == (port, link) =>
+            {
                 let all = self.tapped.entry((port, link)).or_default();
                 all.extend(bytes);
                 Some(all.clone())
@@ -562,8 +564,10 @@ impl Link for Replay {
             return Vec::new();
         }
         match self.events.pop_front() {
-            Some(LinkEvent::Probe(own, at, sent, came))
-                if own == port && sent == octets && (self.known.is_none() || at == self.now) =>
+            Some(LinkEvent::Probe(at_port, at, sent, came))
+                if at_port == port
+                    && sent == octets
+                    && (self.known.is_none() || at == self.now) =>
             {
                 self.now = self.now.max(at);
                 self.look(None);

@@ -17,7 +17,7 @@ pub struct Passed {
     /// What goes on in front of it.
     inserted: Vec<Received>,
     /// The byte itself, unless it is lost.
-    own: Option<Received>,
+    byte: Option<Received>,
     twice: bool,
     /// How long the first of them is held back.
     pub delay: Span,
@@ -29,11 +29,11 @@ impl Passed {
     /// What goes on, in order.
     pub fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
         let inserted = self.inserted.iter().copied();
-        inserted.chain(self.own).chain(self.again())
+        inserted.chain(self.byte).chain(self.again())
     }
 
     fn again(&self) -> Option<Received> {
-        self.own.filter(|_| self.twice)
+        self.byte.filter(|_| self.twice)
     }
 
     /// The wire's bytes for a record, the first of which ends at `at`: what was sent, and what arrives.
@@ -46,14 +46,14 @@ impl Passed {
         let (byte, error) = match self.hold {
             Some(_) => (Some(0), Some(LineError::Break)),
             None => (
-                self.own.map(|own| own.byte),
-                self.own.and_then(|own| own.error),
+                self.byte.map(|received| received.byte),
+                self.byte.and_then(|received| received.error),
             ),
         };
-        let own = LineByte::seen(at, Some(sent), byte, error);
+        let line_byte = LineByte::seen(at, Some(sent), byte, error);
         let other = move |other: Received| LineByte::seen(at, None, Some(other.byte), other.error);
         let inserted = self.inserted.iter().copied().map(other);
-        let all = inserted.chain([own]).chain(self.again().map(other));
+        let all = inserted.chain([line_byte]).chain(self.again().map(other));
         let times = (0..).map(move |behind| at + byte_time * behind);
         all.zip(times).map(|(mut byte, at)| {
             byte.at = at;
@@ -147,7 +147,7 @@ impl Tamper {
             };
         }
         if passed.hold.is_none() {
-            passed.own = whole.map(|b| Received {
+            passed.byte = whole.map(|b| Received {
                 error: b.error.or(flips.noticed()),
                 ..b
             });

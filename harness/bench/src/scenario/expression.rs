@@ -29,8 +29,8 @@ impl Scope {
     /// The same with another value of a counter; `None` outside its loop.
     #[must_use]
     pub fn with(mut self, counter: Counter, value: Option<i64>) -> Self {
-        if let Some(own) = self.counters.get_mut(counter.place()) {
-            *own = value;
+        if let Some(counter) = self.counters.get_mut(counter.place()) {
+            *counter = value;
         }
         self
     }
@@ -188,8 +188,7 @@ impl fmt::Display for Expression {
             Self::Last => f.write_str("last"),
             Self::Counter(counter) => counter.fmt(f),
             Self::Operation(left, operator, right) => {
-                let sum =
-                    |side: &Self| matches!(side, Self::Operation(_, own, _) if own.joins_terms());
+                let sum = |side: &Self| matches!(side, Self::Operation(_, inner, _) if inner.joins_terms());
                 let product = |side: &Self| matches!(side, Self::Operation(..)) && !sum(side);
                 let of_terms = operator.joins_terms();
                 parenthesized(f, left, sum(left) && !of_terms)?;

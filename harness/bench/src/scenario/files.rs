@@ -136,7 +136,7 @@ fn in_order(name: &str) -> (usize, Vec<(u64, &str)>) {
     let folder = name.split('/').next();
     let bus = BusName::NAMES
         .iter()
-        .position(|(own, _)| Some(*own) == folder);
+        .position(|(name, _)| Some(*name) == folder);
     (bus.unwrap_or(BusName::NAMES.len()), natural(bare(name)))
 }
 
@@ -219,15 +219,15 @@ mod tests {
         let sources = sources(&[]).expect("the built-in ones");
         let folders = sources
             .iter()
-            .map(|own| own.name.split('/').next().unwrap_or_default());
+            .map(|source| source.name.split('/').next().unwrap_or_default());
         let mut folders: Vec<_> = folders.collect();
         folders.dedup();
         assert_eq!(folders, BusName::NAMES.map(|(name, _)| name));
-        let bus = |own: &&Source| own.name.starts_with(folders[0]);
+        let bus = |source: &&Source| source.name.starts_with(folders[0]);
         let names: Vec<_> = sources
             .iter()
             .filter(bus)
-            .map(|own| natural(bare(&own.name)))
+            .map(|source| natural(bare(&source.name)))
             .collect();
         assert!(names.is_sorted());
     }

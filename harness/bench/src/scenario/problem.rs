@@ -159,7 +159,8 @@ impl Problems {
 
     /// Each mistake on a line: `file:line: what is wrong; what was expected (help)`.
     pub fn lines(&self) -> String {
-        let lines: Vec<_> = self.problems.iter().map(|own| self.line(own)).collect();
+        let problems = self.problems.iter();
+        let lines: Vec<_> = problems.map(|problem| self.line(problem)).collect();
         lines.join("\n")
     }
 

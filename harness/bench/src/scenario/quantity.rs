@@ -90,8 +90,8 @@ static UNITS: [Unit; 25] = [
 impl Dimension {
     /// The name of its first unit.
     pub fn unit(self) -> &'static str {
-        let own = |unit: &&Unit| unit.dimension == self;
-        UNITS.iter().find(own).map_or("", |unit| unit.name)
+        let of_dimension = |unit: &&Unit| unit.dimension == self;
+        UNITS.iter().find(of_dimension).map_or("", |unit| unit.name)
     }
 
     /// The names of its units, for a message: "rpm/s or rad/s2". Other spellings are not named.
@@ -111,8 +111,8 @@ impl Unit {
     #[must_use]
     pub fn show(&self, value: f64) -> String {
         #[expect(clippy::cast_precision_loss, reason = "a table of small numbers")]
-        let own = value * self.factor.1 as f64 / self.factor.0 as f64;
-        format!("{} {}", figures(own, self.name), self.name)
+        let in_unit = value * self.factor.1 as f64 / self.factor.0 as f64;
+        format!("{} {}", figures(in_unit, self.name), self.name)
     }
 }
 

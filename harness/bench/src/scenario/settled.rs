@@ -126,7 +126,7 @@ pub fn settle<L: Language>(
     let size = match size {
         BenchSize::Own => None,
         BenchSize::Of(drives) => Some(drives),
-        BenchSize::Fitting(drives) => Some(drives).filter(|own| L::fits(&scenario.header, *own)),
+        BenchSize::Fitting(drives) => L::fits(&scenario.header, drives).then_some(drives),
     };
     let plan = plan(&scenario, source, size)?;
     Ok((scenario.head(), Arc::new(plan)))

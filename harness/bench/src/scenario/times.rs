@@ -110,8 +110,8 @@ impl fmt::Display for Duration {
         let digits = format!("{:0>width$}", self.digits, width = decimals + 1);
         let (whole, fraction) = digits.split_at(digits.len() - decimals);
         let point = if decimals == 0 { "" } else { "." };
-        let own = UNITS.iter().find(|(_, unit)| *unit == self.unit);
-        let unit = own.map_or("", |(name, _)| name);
+        let row = UNITS.iter().find(|(_, unit)| *unit == self.unit);
+        let unit = row.map_or("", |(name, _)| name);
         write!(f, "{whole}{point}{fraction}{unit}")
     }
 }

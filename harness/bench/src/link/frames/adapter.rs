@@ -60,7 +60,7 @@ impl Adapter {
     /// Writes a frame; false if the language has no such frame.
     pub(super) fn send(&mut self, now: Instant, frame: &Frame, out: &mut Vec<u8>) -> bool {
         match self {
-            Self::Slcan(own) => own.command(now, SlcanCommand::Send(*frame), out),
+            Self::Slcan(slcan) => slcan.command(now, SlcanCommand::Send(*frame), out),
             Self::Socketcand(_) if frame.is_remote() => return false,
             Self::Socketcand(_) => SocketcandRequest::Send(*frame).write(out),
         }
@@ -76,41 +76,43 @@ impl Adapter {
     pub(super) fn parts(&self) -> Parts {
         match self {
             Self::Slcan(_) => {
-                |pieces| written(pieces, |own, out| SlcanCommand::Send(own).write(out))
+                |pieces| written(pieces, |frame, out| SlcanCommand::Send(frame).write(out))
             }
-            Self::Socketcand(_) => {
-                |pieces| written(pieces, |own, out| SocketcandRequest::Send(own).write(out))
-            }
+            Self::Socketcand(_) => |pieces| {
+                written(pieces, |frame, out| {
+                    SocketcandRequest::Send(frame).write(out)
+                })
+            },
         }
     }
 
     /// Whether the next frame may be handed over.
     pub(super) fn is_ready(&self) -> bool {
         match self {
-            Self::Slcan(own) => own.unanswered.len() < MOST_UNANSWERED,
+            Self::Slcan(slcan) => slcan.unanswered.len() < MOST_UNANSWERED,
             Self::Socketcand(_) => true,
         }
     }
 
     /// Writes what ends the conversation.
     pub(super) fn close(&self, out: &mut Vec<u8>) {
-        if let Self::Slcan(own) = self {
-            let commands = closing(own.silenced).iter();
+        if let Self::Slcan(slcan) = self {
+            let commands = closing(slcan.silenced).iter();
             commands.for_each(|command| command.write(out));
         }
     }
 
     /// Does what is due, and writes it.
     pub(super) fn attend(&mut self, now: Instant, out: &mut Vec<u8>) {
-        if let Self::Slcan(own) = self {
-            own.attend(now, out);
+        if let Self::Slcan(slcan) = self {
+            slcan.attend(now, out);
         }
     }
 
     /// When [`Self::attend`] is to be called again.
     pub(super) fn due(&self) -> Option<Instant> {
         match self {
-            Self::Slcan(own) => own.due(),
+            Self::Slcan(slcan) => slcan.due(),
             Self::Socketcand(_) => None,
         }
     }
@@ -118,8 +120,8 @@ impl Adapter {
     /// Takes a character that is read at `read`.
     pub(super) fn push(&mut self, character: u8, read: Instant) -> Vec<Event> {
         match self {
-            Self::Slcan(own) => own.push(character, read),
-            Self::Socketcand(own) => own.push(character, read),
+            Self::Slcan(slcan) => slcan.push(character, read),
+            Self::Socketcand(socketcand) => socketcand.push(character, read),
         }
     }
 }
@@ -309,7 +311,7 @@ impl Socketcand {
             }
             Ok(SocketcandAnswer::ErrorFrame(bits, _)) => {
                 let mut events = Vec::new();
-                decode_error(bits, None, &mut |own| events.push(Event::of(own, read)));
+                decode_error(bits, None, &mut |error| events.push(Event::of(error, read)));
                 events
             }
             Ok(SocketcandAnswer::Hi | SocketcandAnswer::Ok | SocketcandAnswer::Echo) => {
@@ -344,7 +346,7 @@ mod tests {
 
     fn events(adapter: &mut Adapter, text: &str, read: Instant) -> Vec<Event> {
         text.bytes()
-            .flat_map(|own| adapter.push(own, read))
+            .flat_map(|character| adapter.push(character, read))
             .collect()
     }
 
@@ -356,21 +358,21 @@ mod tests {
 
     #[test]
     fn an_adapter_hears_and_is_asked_for_its_status() {
-        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
+        let mut adapter = Adapter::Slcan(Slcan::new(false, true, false));
         let mut out = Vec::new();
-        own.attend(at(1), &mut out);
+        adapter.attend(at(1), &mut out);
         assert_eq!(out, b"F\r");
-        assert_eq!(events(&mut own, "F00\r", at(2)), []);
-        assert_eq!(own.due(), Some(at(251)));
-        assert_eq!(written(&mut own, at(3), "201#3D4000"), "t20133D4000\r");
-        assert_eq!(own.due(), Some(at(503)));
-        let heard = events(&mut own, "z\rt181440810100\r", at(4));
+        assert_eq!(events(&mut adapter, "F00\r", at(2)), []);
+        assert_eq!(adapter.due(), Some(at(251)));
+        assert_eq!(written(&mut adapter, at(3), "201#3D4000"), "t20133D4000\r");
+        assert_eq!(adapter.due(), Some(at(503)));
+        let heard = events(&mut adapter, "z\rt181440810100\r", at(4));
         assert_eq!(
             heard,
             [Event::Heard(at(4), CanEvent::Frame(frame("181#40810100")))]
         );
-        assert_eq!(own.due(), Some(at(251)));
-        let flags = events(&mut own, "F89\r", at(5));
+        assert_eq!(adapter.due(), Some(at(251)));
+        let flags = events(&mut adapter, "F89\r", at(5));
         assert_eq!(flags.len(), 2, "{flags:?}");
         assert_eq!(flags[0], Event::Overrun);
     }
@@ -378,77 +380,77 @@ mod tests {
     /// A buffer that has run over while the computer stood still leaves a line without its middle, and the next one is whole.
     #[test]
     fn a_damaged_line_is_lost_and_several_end_the_conversation() {
-        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
+        let mut adapter = Adapter::Slcan(Slcan::new(false, true, false));
         let text = "t1814408t1814408131005D59\rt181440810100\r";
         let frame = Event::Heard(at(4), CanEvent::Frame(frame("181#40810100")));
-        assert_eq!(events(&mut own, text, at(4)), [Event::Overrun, frame]);
+        assert_eq!(events(&mut adapter, text, at(4)), [Event::Overrun, frame]);
         let lines = "t1\r".repeat(MOST_DAMAGED);
-        let all = events(&mut own, &lines, at(5));
+        let all = events(&mut adapter, &lines, at(5));
         let (last, lost) = all.split_last().expect("an event");
-        assert!(lost.iter().all(|own| *own == Event::Overrun));
+        assert!(lost.iter().all(|event| *event == Event::Overrun));
         assert!(matches!(last, Event::Ended(_)), "{last:?}");
     }
 
     /// What is refused is the oldest command; an adapter without status is not asked again.
     #[test]
     fn refusals_belong_to_commands() {
-        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
-        own.attend(at(1), &mut Vec::new());
-        written(&mut own, at(1), "201#3D4000");
-        assert_eq!(events(&mut own, "\x07", at(2)), []);
-        assert_eq!(own.due(), Some(at(501)));
-        let refused = events(&mut own, "\x07", at(2));
+        let mut adapter = Adapter::Slcan(Slcan::new(false, true, false));
+        adapter.attend(at(1), &mut Vec::new());
+        written(&mut adapter, at(1), "201#3D4000");
+        assert_eq!(events(&mut adapter, "\x07", at(2)), []);
+        assert_eq!(adapter.due(), Some(at(501)));
+        let refused = events(&mut adapter, "\x07", at(2));
         assert!(
             matches!(&refused[..], [Event::Ended(why)] if why.contains("201#3D4000")),
             "{refused:?}"
         );
-        assert_eq!(own.due(), None);
+        assert_eq!(adapter.due(), None);
     }
 
     /// An adapter that does not answer frames is given further ones after a while.
     #[test]
     fn answers_that_do_not_come_are_not_waited_for() {
-        let mut own = Adapter::Slcan(Slcan::new(false, true, false));
+        let mut adapter = Adapter::Slcan(Slcan::new(false, true, false));
         for _ in 0..MOST_UNANSWERED {
-            assert!(own.is_ready());
-            written(&mut own, at(0), "201#3D4000");
+            assert!(adapter.is_ready());
+            written(&mut adapter, at(0), "201#3D4000");
         }
-        assert!(!own.is_ready());
-        own.attend(at(499), &mut Vec::new());
-        assert!(!own.is_ready());
-        own.attend(at(500), &mut Vec::new());
-        assert!(own.is_ready());
+        assert!(!adapter.is_ready());
+        adapter.attend(at(499), &mut Vec::new());
+        assert!(!adapter.is_ready());
+        adapter.attend(at(500), &mut Vec::new());
+        assert!(adapter.is_ready());
     }
 
     /// An adapter that answers nothing is not waited for, and not asked for its status.
     #[test]
     fn no_answers_are_expected_of_an_adapter_without() {
-        let mut own = Adapter::Slcan(Slcan::new(false, false, false));
+        let mut adapter = Adapter::Slcan(Slcan::new(false, false, false));
         let mut out = Vec::new();
-        own.attend(at(1), &mut out);
-        assert_eq!((out, own.due()), (Vec::new(), None));
+        adapter.attend(at(1), &mut out);
+        assert_eq!((out, adapter.due()), (Vec::new(), None));
         for _ in 0..=MOST_UNANSWERED {
-            assert!(own.is_ready());
-            written(&mut own, at(0), "201#3D4000");
+            assert!(adapter.is_ready());
+            written(&mut adapter, at(0), "201#3D4000");
         }
-        assert_eq!(own.due(), None);
+        assert_eq!(adapter.due(), None);
     }
 
     #[test]
     fn a_daemon_reports_frames_and_errors() {
-        let mut own = Adapter::Socketcand(Socketcand::new());
+        let mut adapter = Adapter::Socketcand(Socketcand::new());
         assert_eq!(
-            written(&mut own, at(0), "201#3D4000"),
+            written(&mut adapter, at(0), "201#3D4000"),
             "< send 201 3 3d 40 0 >"
         );
-        assert!(!own.send(at(0), &frame("201#R3"), &mut Vec::new()));
-        let heard = events(&mut own, "< frame 181 1700000000.000100 AA >", at(9));
+        assert!(!adapter.send(at(0), &frame("201#R3"), &mut Vec::new()));
+        let heard = events(&mut adapter, "< frame 181 1700000000.000100 AA >", at(9));
         assert_eq!(
             heard,
             [Event::Heard(at(9), CanEvent::Frame(frame("181#AA")))]
         );
         let errors = events(
-            &mut own,
+            &mut adapter,
             "< error 040 1.0 >< error 020 1.0 >< error 088 1.0 >< error 100 1.0 >< error 002 1.0 >< error 004 1.0 >",
             at(9),
         );
@@ -466,9 +468,9 @@ mod tests {
             ]
         );
         // A server without `echo`.
-        assert_eq!(events(&mut own, "< error unknown command >", at(9)), []);
+        assert_eq!(events(&mut adapter, "< error unknown command >", at(9)), []);
         for text in ["< error no bus >", "hello >"] {
-            let ended = events(&mut own, text, at(9));
+            let ended = events(&mut adapter, text, at(9));
             assert!(matches!(&ended[..], [Event::Ended(_)]), "{text}: {ended:?}");
         }
     }

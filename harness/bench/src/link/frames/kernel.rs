@@ -43,7 +43,7 @@ impl Kernel {
         let failed = |error: io::Error| AdapterError::Interface(lost(name, &error));
         let state = State::of(name).map_err(failed)?;
         let listening = fits(name, &state, settings).map_err(AdapterError::Interface)?;
-        let own = Self {
+        let transport = Self {
             interface: socketcan::Interface::open(state.index).map_err(failed)?,
             settings: settings.clone(),
             name: name.to_owned(),
@@ -51,7 +51,7 @@ impl Kernel {
             restarts: state.restarts,
             queue: VecDeque::new(),
         };
-        Ok((own, listening))
+        Ok((transport, listening))
     }
 
     fn lost(&self, error: &io::Error) -> Trouble {
@@ -105,11 +105,11 @@ fn fits(name: &str, state: &State, settings: &AdapterSettings) -> Result<Listeni
     if !state.up {
         return Err(lost(name, &Errno::NETDOWN.into()));
     }
-    if let Some(own) = state.rate.filter(|own| *own != bits) {
-        let own = BitRate::from_bits_per_second(own)
-            .map_or_else(|| format!("{own} bit/s"), |own| own.to_string());
+    if let Some(actual) = state.rate.filter(|actual| *actual != bits) {
+        let actual = BitRate::from_bits_per_second(actual)
+            .map_or_else(|| format!("{actual} bit/s"), |rate| rate.to_string());
         return Err(format!(
-            "{name} runs at {own}, and {rate} is expected: {}, or give its rate",
+            "{name} runs at {actual}, and {rate} is expected: {}, or give its rate",
             set(&format!("bitrate {bits}"))
         ));
     }
@@ -195,8 +195,8 @@ impl Transport for Kernel {
         let fd = self.interface.as_fd().try_clone_to_owned()?;
         // The kernel takes one frame at a time.
         Ok(LastWords::plain(fd, self.name.clone(), |pieces| {
-            let frames = pieces.as_out().frames().iter();
-            frames.map(|own| socketcan::encode(own).to_vec()).collect()
+            let coded = pieces.as_out().frames().iter().map(socketcan::encode);
+            coded.map(|bytes| bytes.to_vec()).collect()
         }))
     }
 
@@ -209,8 +209,8 @@ impl Transport for Kernel {
         let end = time::Instant::now() + BACK_WITHIN;
         loop {
             let (name, settings) = (self.name.clone(), self.settings.clone());
-            if let Ok((own, _)) = Self::open(&name, &settings) {
-                *self = own;
+            if let Ok((transport, _)) = Self::open(&name, &settings) {
+                *self = transport;
                 return true;
             }
             if time::Instant::now() >= end {
@@ -326,7 +326,7 @@ mod tests {
             (off(true), &sends, may),
         ] {
             match (fits("can3", &state, settings), expected) {
-                (Ok(own), expected) => assert_eq!(Ok(own), expected, "{state:?}"),
+                (Ok(listening), expected) => assert_eq!(Ok(listening), expected, "{state:?}"),
                 (Err(why), Err(words)) => assert!(why.contains(words), "{why}"),
                 (Err(why), Ok(_)) => panic!("{why}"),
             }
@@ -416,7 +416,7 @@ mod tests {
             let lost = link.trouble().expect("trouble").to_string();
             assert!(lost.contains(words), "{lost}");
             let last = std::iter::from_fn(|| link.receive(0)).last();
-            assert_eq!(last.map(|own| own.1), Some(Heard::Frame(heard())));
+            assert_eq!(last.map(|(_, heard)| heard), Some(Heard::Frame(heard())));
             assert_eq!(link.take_unplaced(), unplaced);
             link.resume();
             let now = link.now();

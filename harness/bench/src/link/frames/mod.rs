@@ -110,9 +110,9 @@ impl FrameLink {
     ) -> Result<Self, AdapterError> {
         wake_on_time();
         let (transport, listening) = open::open(settings, &interrupt)?;
-        let mut own = Self::over(transport, settings, senders, interrupt);
-        own.listening = listening;
-        Ok(own)
+        let mut link = Self::over(transport, settings, senders, interrupt);
+        link.listening = listening;
+        Ok(link)
     }
 
     fn over(
@@ -251,8 +251,8 @@ impl FrameLink {
 
     fn hear(&mut self, at: Instant, heard: can::CanEvent) {
         let last = self.received.back();
-        let repeats =
-            matches!(heard, can::CanEvent::Error(_)) && last.is_some_and(|own| own.1 == heard);
+        let again = last.is_some_and(|(_, last)| *last == heard);
+        let repeats = again && matches!(heard, can::CanEvent::Error(_));
         if !repeats {
             self.received.push_back((at, heard));
         }
@@ -338,8 +338,8 @@ impl Line for FrameLink {
 
     /// Nothing while the bench only listens, and only what the adapter's language carries.
     fn permits(&self, port: usize, what: Out<'_>) -> bool {
-        let carried =
-            what.octets().is_empty() && what.frames().iter().all(|own| self.transport.carries(own));
+        let mut frames = what.frames().iter();
+        let carried = what.octets().is_empty() && frames.all(|frame| self.transport.carries(frame));
         let speaks = !self.listen_only || what.is_empty();
         carried && speaks && port == 0 && self.is_sound()
     }
@@ -401,7 +401,7 @@ impl Link for FrameLink {
     fn busy(&self) -> bool {
         let answers = self.free + SLACK;
         let waits = !self.queue.is_empty() || self.transport.waits();
-        let sent = self.log.iter().any(|own| own.from.is_none());
+        let sent = self.log.iter().any(|frame| frame.from.is_none());
         self.is_sound() && (waits || (sent && self.clock_now() < answers))
     }
 
@@ -445,7 +445,7 @@ impl PortLink for FrameLink {
     }
 
     fn last_words(&self) -> io::Result<Vec<LastWords>> {
-        self.transport.last_words().map(|own| vec![own])
+        self.transport.last_words().map(|words| vec![words])
     }
 
     fn resume(&mut self) {

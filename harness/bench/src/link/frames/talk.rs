@@ -116,8 +116,8 @@ impl<'a> Talk<'a> {
                 Listening::MayAcknowledge
             }
         };
-        let own = Slcan::new(settings.listen_only, self.answers, self.silenced);
-        Ok((own, listening))
+        let slcan = Slcan::new(settings.listen_only, self.answers, self.silenced);
+        Ok((slcan, listening))
     }
 
     /// Ends what another program has begun, by a line that is none of a frame; ends its channel; then asks who is there. An empty line would
@@ -136,10 +136,10 @@ impl<'a> Talk<'a> {
             .try_for_each(|command| self.say(command))?;
             let texts = self.greetings(PATIENCE)?;
             self.name = texts.first().cloned().unwrap_or_default();
-            let lawicel = |own: &String| own.len() == 5 && own.starts_with('V');
+            let lawicel = |text: &String| text.len() == 5 && text.starts_with('V');
             self.own_dialect = !texts.is_empty() && !texts.iter().any(lawicel);
             match texts.len() {
-                _ if texts.iter().any(|own| own == "C" || own == "V") => {
+                _ if texts.iter().any(|text| text == "C" || text == "V") => {
                     return Err(self.other(SLCAN, "its own commands come back"));
                 }
                 _ if self.answers => return Ok(()),
@@ -346,7 +346,7 @@ impl<'a> Talk<'a> {
             if self.read > MOST_READ {
                 return Err(self.other("adapter", "a flood of characters"));
             }
-            self.come.extend(read.iter().map(|own| own.byte));
+            self.come.extend(read.iter().map(|received| received.byte));
             if !self.come.is_empty() {
                 continue;
             }

@@ -131,14 +131,14 @@ fn an_adapter_is_opened_asked_and_closed() {
     let carried: Vec<_> = trace.channels[0]
         .frames()
         .iter()
-        .map(|own| (own.from, own.frame))
+        .map(|carried| (carried.from, carried.frame))
         .collect();
     assert_eq!(carried, [(None, asked), (Some(1), frame("181#40810100"))]);
     drop(link);
     let commands: Vec<_> = loop {
         let all = said.lock().expect("a list").clone();
         if all.last().is_some_and(|last| last == "C\r") && all.len() > 4 {
-            break all.into_iter().filter(|own| own != "F\r").collect();
+            break all.into_iter().filter(|line| line != "F\r").collect();
         }
         std::thread::yield_now();
     };
@@ -235,7 +235,7 @@ fn the_firmware_of_canable_is_an_adapter() {
         for _ in 0..10 {
             link.send(0, Out::Frames(&[frame("201#3D4000")]));
             let reply = Some(can::CanEvent::Frame(frame("181#40810100")));
-            assert!(std::iter::from_fn(|| next(&mut link)).any(|own| Some(own) == reply));
+            assert!(std::iter::from_fn(|| next(&mut link)).any(|event| Some(event) == reply));
         }
         assert_eq!(
             (link.listening(), link.trouble()),

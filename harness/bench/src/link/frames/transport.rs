@@ -117,7 +117,7 @@ impl Transport for Stream {
         let mut read = Vec::new();
         let result = self.wire.receive(&mut read);
         let come = self.come.drain(..);
-        for byte in come.chain(read.iter().map(|own| own.byte)) {
+        for byte in come.chain(read.iter().map(|received| received.byte)) {
             events.extend(self.adapter.push(byte, now));
         }
         result

@@ -179,11 +179,11 @@ impl<L: Language> Reader<L> {
     }
 
     fn finish(mut self, part: Part) -> Result<Scenario<L>, Vec<Problem>> {
-        let other = self.bus.as_ref().filter(|own| own.value != L::BUS);
+        let other = self.bus.as_ref().filter(|named| named.value != L::BUS);
         if let (Part::Header, Some(other)) = (part, other) {
             self.problems.push(for_another_bus(other, L::BUS));
         }
-        let bus = self.bus.map_or(BusName::DEFAULT, |own| own.value);
+        let bus = self.bus.map_or(BusName::DEFAULT, |named| named.value);
         if part == Part::Whole && self.problems.is_empty() {
             let no_step = self.steps.is_empty().then(|| no_step(L::EXAMPLE));
             self.problems
@@ -228,9 +228,9 @@ fn no_header_line<L: Language>(step: &Step<L>) -> Problem {
     Problem::new(step.span, what, expected)
 }
 
-fn for_another_bus(named: &Spanned<BusName>, own: BusName) -> Problem {
-    let what = format!("these drives are on the bus `{}`", own.name());
-    let expected = format!("no `bus` line, or `bus {}`, expected here", own.name());
+fn for_another_bus(named: &Spanned<BusName>, wanted: BusName) -> Problem {
+    let what = format!("these drives are on the bus `{}`", wanted.name());
+    let expected = format!("no `bus` line, or `bus {}`, expected here", wanted.name());
     Problem::new(named.span, what, expected)
 }
 

@@ -65,18 +65,21 @@ fn action<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> 
         }
         Some('!') => {
             scanner.eat("!");
-            own(Opening::Fault, scanner)
+            bus_step(Opening::Fault, scanner)
         }
         Some('?') => {
             scanner.eat("?");
-            own(Opening::Check, scanner)
+            bus_step(Opening::Check, scanner)
         }
         _ => word_action(scanner),
     }
 }
 
 /// What stands behind a symbol of which every bus says what it means.
-fn own<L: Language>(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> {
+fn bus_step<L: Language>(
+    opening: Opening<'_>,
+    scanner: &mut Scanner<'_>,
+) -> Result<Action<L>, Problem> {
     let step = L::step(opening, scanner);
     step.unwrap_or_else(|| Err(scanner.unexpected(EXPECTED)))
         .map(Action::Own)

@@ -185,9 +185,9 @@ fn steps<L: Language>(
         };
         match action::<L>(planner, step, needs) {
             Ok(action) => {
-                let own = action.pieces();
-                sent += own.0;
-                expected += own.1;
+                let (to_send, to_receive) = action.pieces();
+                sent += to_send;
+                expected += to_receive;
                 if let Some(problem) = too_long((sent, room), expected, step.span) {
                     found.push(problem);
                     break;
@@ -253,7 +253,7 @@ fn action<L: Language>(
             PlannedAction::Receive(*port, planner.receive(*port, message)?)
         }
         Action::Wait(time) => PlannedAction::Wait(time.on(planner.byte_time())),
-        Action::Own(own) => PlannedAction::Own(planner.act(own, step.span, needs)?),
+        Action::Own(task) => PlannedAction::Own(planner.act(task, step.span, needs)?),
         Action::For(..) | Action::End => {
             let what = "a loop is not one step";
             return Err(Problem::new(step.span, what, "a step expected here"));
@@ -262,7 +262,7 @@ fn action<L: Language>(
 }
 
 fn when(when: When, byte_time: Span) -> PlannedWhen {
-    let window = |window: Window| {
+    let planned = |window: Window| {
         let tolerance = if window.is_exact() {
             window.from.tolerance(byte_time)
         } else {
@@ -276,7 +276,7 @@ fn when(when: When, byte_time: Span) -> PlannedWhen {
     };
     match when {
         When::Now => PlannedWhen::Now,
-        When::After(own) => PlannedWhen::After(window(own)),
-        When::At(own) => PlannedWhen::At(window(own)),
+        When::After(window) => PlannedWhen::After(planned(window)),
+        When::At(window) => PlannedWhen::At(planned(window)),
     }
 }

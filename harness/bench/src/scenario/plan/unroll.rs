@@ -59,17 +59,17 @@ impl<'s, L: Language> Unroll<'s, L> {
     }
 
     fn end(&mut self) {
-        let Some(own) = self.loops.last_mut() else {
+        let Some(innermost) = self.loops.last_mut() else {
             return;
         };
-        if own.now == own.to {
-            self.scope = self.scope.with(own.counter, own.outside);
+        if innermost.now == innermost.to {
+            self.scope = self.scope.with(innermost.counter, innermost.outside);
             self.loops.pop();
             return;
         }
-        own.now += (own.to - own.now).signum();
-        self.scope = self.scope.with(own.counter, Some(own.now));
-        self.next = own.body;
+        innermost.now += (innermost.to - innermost.now).signum();
+        self.scope = self.scope.with(innermost.counter, Some(innermost.now));
+        self.next = innermost.body;
     }
 }
 

@@ -69,7 +69,7 @@ impl<L: Language> Runner<'_, L> {
         let too_much = carried.or_else(|| L::too_much(&self.own));
         let interrupted = self
             .interrupt
-            .is_some_and(|own| own.load(Ordering::Relaxed));
+            .is_some_and(|flag| flag.load(Ordering::Relaxed));
         let interrupted = interrupted.then_some(Trouble::Interrupted);
         let trouble = || self.link.trouble().cloned().or(interrupted);
         self.full = too_much

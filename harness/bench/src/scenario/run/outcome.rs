@@ -75,11 +75,11 @@ impl Outcome {
     pub fn ended_by(self, trouble: &Trouble) -> Self {
         let before = format!("before that: {}", self.verdict);
         let found = self.finding.map(|finding| finding.message);
-        let own = [trouble.to_string(), before];
+        let remarks = [trouble.to_string(), before].into_iter();
         Self {
             verdict: trouble.verdict(),
             finding: None,
-            remarks: own.into_iter().chain(found).chain(self.remarks).collect(),
+            remarks: remarks.chain(found).chain(self.remarks).collect(),
             ..self
         }
     }

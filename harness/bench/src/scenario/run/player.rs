@@ -320,7 +320,7 @@ impl<L: Language> Runner<'_, L> {
     ) -> Result<(), Stop> {
         let first = self.ports[port].next;
         let tolerance = self.link.time_tolerance();
-        for (index, own) in wanted.iter().enumerate() {
+        for (index, wanted_piece) in wanted.iter().enumerate() {
             let until = match window {
                 Some((base, window)) if index == 0 => {
                     base + window.to + window.tolerance + tolerance
@@ -347,10 +347,10 @@ impl<L: Language> Runner<'_, L> {
                 return Err(failed(format!(
                     "nothing more was received up to {}, where {} is expected",
                     until.min(self.link.now()),
-                    L::describe(own)
+                    L::describe(wanted_piece)
                 )));
             };
-            let resolved = L::resolve(own, &received[..index]);
+            let resolved = L::resolve(wanted_piece, &received[..index]);
             if !L::matches(&resolved, piece) {
                 return Err(failed(format!(
                     "the master received {} where {} is expected",

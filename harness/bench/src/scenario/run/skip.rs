@@ -88,10 +88,10 @@ impl Skip {
 
     /// A scenario for rings of these sizes, on a rig of those.
     #[must_use]
-    pub fn other_size(own: Vec<(u8, u8)>, rig: Vec<u8>) -> Self {
+    pub fn other_size(sizes: Vec<(u8, u8)>, rig: Vec<u8>) -> Self {
         Self {
-            unlocks: [Unlock::Rings(own.clone())].into(),
-            why: Why::OtherSize(own, rig),
+            unlocks: [Unlock::Rings(sizes.clone())].into(),
+            why: Why::OtherSize(sizes, rig),
         }
     }
 
@@ -136,7 +136,7 @@ impl Why {
             Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
             Self::OtherDrives(_) => "it is for drives in another state than the rig's".to_owned(),
             // Whatever else is missing, a simulated rig has it.
-            Self::Lacks(missing) if missing.iter().any(|own| simulated(*own)) => {
+            Self::Lacks(missing) if missing.iter().any(|capability| simulated(*capability)) => {
                 "the rig has no simulator".to_owned()
             }
             Self::Lacks(_) | Self::NoBus(_) | Self::NotOnRig | Self::RunEnded => self.to_string(),
@@ -154,7 +154,7 @@ impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Lacks(missing) => {
-                let names: Vec<_> = missing.iter().map(|own| own.name()).collect();
+                let names: Vec<_> = missing.iter().map(|capability| capability.name()).collect();
                 write!(f, "the rig has no {}", names.join(", no "))
             }
             Self::NoTap(place) => write!(f, "the rig has no tap at {place}"),
@@ -162,15 +162,15 @@ impl fmt::Display for Why {
                 write!(f, "the interposer at {place} has one port: {ONE_PARITY}")
             }
             Self::NoInterposer(place) => write!(f, "the rig has no interposer at {place}"),
-            Self::OtherSize(own, rig) => write!(
+            Self::OtherSize(wanted, rig) => write!(
                 f,
                 "it is for rings of another size ({}, the rig has {})",
-                in_words(own),
+                in_words(wanted),
                 sizes(rig)
             ),
             Self::Denied(words) => write!(f, "{DENIED}{words}"),
             Self::OtherDrives(words) => f.write_str(words),
-            Self::NoBus(bus) => write!(f, "the bench has no bus `{}` yet", name(*bus)),
+            Self::NoBus(bus) => write!(f, "the bench has no bus `{}` yet", bus.name()),
             Self::NotOnRig => f.write_str("the rig has no such bus"),
             Self::RunEnded => f.write_str("the run ended before it"),
         }
@@ -199,12 +199,12 @@ fn in_words(sizes: &[(u8, u8)]) -> String {
 /// What is needed together, in words.
 #[must_use]
 pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
-    let setting = |own: &Unlock| match own {
+    let setting = |unlock: &Unlock| match unlock {
         Unlock::Limit(setting) => Some(*setting),
         _ => None,
     };
     let settings: Vec<_> = unlocks.iter().filter_map(setting).collect();
-    let everything = |all: &[LimitSetting]| all.iter().all(|own| settings.contains(own));
+    let everything = |all: &[LimitSetting]| all.iter().all(|setting| settings.contains(setting));
     let mut limits = match everything(&LimitSetting::PERMISSIONS) {
         true => vec!["every permission".to_owned()],
         false => settings.iter().map(LimitSetting::to_string).collect(),
@@ -217,7 +217,7 @@ pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
     let option = motion.then(|| "--allow-motion".to_owned());
     let taps = at_places("tap", unlocks.iter().filter_map(Unlock::tap));
     let interposers = at_places("interposer", unlocks.iter().filter_map(Unlock::interposer));
-    let others = unlocks.iter().filter(|own| !own.is_grouped());
+    let others = unlocks.iter().filter(|unlock| !unlock.is_grouped());
     let all = limits
         .into_iter()
         .chain(option)
@@ -308,14 +308,9 @@ impl fmt::Display for Unlock {
             Self::SecondRing => f.write_str("a second ring"),
             Self::Simulated => f.write_str("a simulated rig"),
             Self::NoRig => f.write_str("`run` without --rig"),
-            Self::Bus(bus) => write!(f, "a rig with the bus `{}`", name(*bus)),
+            Self::Bus(bus) => write!(f, "a rig with the bus `{}`", bus.name()),
         }
     }
-}
-
-fn name(bus: BusName) -> &'static str {
-    let own = BusName::NAMES.iter().find(|(_, known)| *known == bus);
-    own.map_or("", |(name, _)| name)
 }
 
 /// What a link lacks for a plan; `None` where the plan can be played.
@@ -355,7 +350,7 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
         ([], (None, None, Some(place))) => Why::OneUart(name(place)),
         (missing, _) => Why::Lacks(missing.to_vec()),
     };
-    let unlocks = missing.iter().filter_map(|own| unlock(*own));
+    let unlocks = missing.iter().filter_map(|capability| unlock(*capability));
     let interposers = unreached.iter().map(name).map(Unlock::Interposer);
     let taps = unheard.iter().map(name).map(Unlock::Tap);
     let ports = one_uart.iter().map(name).map(Unlock::TwoPorts);
@@ -378,8 +373,9 @@ pub fn lacks_as_well<L: Language>(
         names.collect::<Vec<_>>()
     };
     let missing: Vec<_> = plan.needs.iter().filter(|need| lacks(need)).collect();
-    let unlocks = missing.iter().filter_map(|own| unlock(**own));
-    let mut unlocks: Vec<_> = unlocks.filter(|own| *own != Unlock::SecondRing).collect();
+    let unlocks = missing.iter().filter_map(|capability| unlock(**capability));
+    let unlocks = unlocks.filter(|unlock| *unlock != Unlock::SecondRing);
+    let mut unlocks: Vec<_> = unlocks.collect();
     if lacks(&Capability::Interposer) {
         let places = L::fault_links(plan).into_iter();
         let places = inner(places.map(|(ring, place, _)| (ring, place)).collect());
