@@ -32,8 +32,8 @@ pub struct Files {
 /// The name of a file by its number: `ring_00001.pcapng`.
 fn numbered(path: &Path, number: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let ending = path.extension().map(|own| own.to_string_lossy());
-    let ending = ending.map_or(String::new(), |own| format!(".{own}"));
+    let ending = path.extension().map(|ending| ending.to_string_lossy());
+    let ending = ending.map_or(String::new(), |ending| format!(".{ending}"));
     path.with_file_name(format!("{stem}_{number:05}{ending}"))
 }
 
@@ -180,7 +180,7 @@ mod tests {
         files.rotate(1).expect("a new file");
         files.flush(2_000_000_000).expect("written");
         assert_eq!(files.paths().count(), before);
-        assert!(files.paths().last().is_some_and(|own| own != kept[1]));
+        assert!(files.paths().last().is_some_and(|path| path != kept[1]));
     }
     /// A file says for how long the line was listened to in front of its first byte and behind its last.
     #[test]

@@ -70,7 +70,7 @@ impl FrameSummary {
 #[must_use]
 pub fn frame_diff(left: &Capture, right: &Capture, tolerance: Span) -> FrameSummary {
     let sides = [frames(left), frames(right)];
-    let seams = |own: &Capture| own.traces.iter().any(|trace| !trace.seams.is_empty());
+    let seams = |capture: &Capture| capture.traces.iter().any(|trace| !trace.seams.is_empty());
     let mut summary = FrameSummary {
         untimed: seams(left) || seams(right) || !left.timed || !right.timed,
         ..FrameSummary::default()
@@ -92,10 +92,10 @@ pub fn frame_diff(left: &Capture, right: &Capture, tolerance: Span) -> FrameSumm
         let skip = next_common(&sides[0][at[0]..], &sides[1][at[1]..]);
         for side in [0, 1] {
             let end = skip.map_or(sides[side].len(), |skip| at[side] + skip[side]);
-            let own = sides[side][at[side]..end].iter();
+            let skipped = sides[side][at[side]..end].iter();
             summary
                 .alone
-                .extend(own.map(|own| (side, own.at, shown(own))));
+                .extend(skipped.map(|frame| (side, frame.at, shown(frame))));
             at[side] = end;
         }
     }
@@ -119,20 +119,20 @@ fn frames(capture: &Capture) -> Vec<&LineFrame> {
     channels.flat_map(|channel| channel.frames()).collect()
 }
 
-fn since_first(side: &[&LineFrame], own: &LineFrame) -> Span {
+fn since_first(side: &[&LineFrame], frame: &LineFrame) -> Span {
     side.first()
-        .map_or(Span::ZERO, |first| own.at.since(first.at))
+        .map_or(Span::ZERO, |first| frame.at.since(first.at))
 }
 
-fn key(own: &LineFrame) -> (harness_proto::can::Frame, FrameEnd) {
-    (own.frame, own.ended)
+fn key(frame: &LineFrame) -> (harness_proto::can::Frame, FrameEnd) {
+    (frame.frame, frame.ended)
 }
 
-fn shown(own: &LineFrame) -> String {
-    match own.ended {
-        FrameEnd::Good => own.frame.to_string(),
-        FrameEnd::Lost => format!("{} (lost)", own.frame),
-        FrameEnd::Error(error) => format!("{} ({error})", own.frame),
+fn shown(frame: &LineFrame) -> String {
+    match frame.ended {
+        FrameEnd::Good => frame.frame.to_string(),
+        FrameEnd::Lost => format!("{} (lost)", frame.frame),
+        FrameEnd::Error(error) => format!("{} ({error})", frame.frame),
     }
 }
 
@@ -183,7 +183,7 @@ mod tests {
         let alone: Vec<_> = summary
             .alone
             .iter()
-            .map(|(side, _, own)| (*side, own.as_str()))
+            .map(|(side, _, text)| (*side, text.as_str()))
             .collect();
         assert_eq!(alone, [(0, "181#AA"), (1, "203#")]);
         let text = summary.show(["a", "b"]);

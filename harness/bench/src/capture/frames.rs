@@ -25,7 +25,7 @@ pub(super) enum Sender {
 impl Sender {
     /// By the name of an interface.
     pub(super) fn named(name: &str) -> Self {
-        let drive = name.strip_prefix(DRIVE).and_then(|own| own.parse().ok());
+        let drive = name.strip_prefix(DRIVE).and_then(|text| text.parse().ok());
         match (name, drive) {
             (MASTER, _) => Self::Known(None),
             (_, Some(drive)) => Self::Known(Some(drive)),
@@ -49,19 +49,19 @@ pub(super) struct FrameRead {
 pub(super) fn assemble(frames: Vec<FrameRead>, counts: Counts, rate: Option<BitRate>) -> Imported {
     let rate = rate.unwrap_or(BitRate::K500);
     let length = |frame: &Frame| rate.time_of(frame.wire_bits());
-    let ordered = ordered(frames, counts, |own| length(&own.frame));
-    let line = ordered.frames.into_iter().map(|(at, own)| LineFrame {
-        from: match own.sender {
+    let ordered = ordered(frames, counts, |read| length(&read.frame));
+    let line = ordered.frames.into_iter().map(|(at, read)| LineFrame {
+        from: match read.sender {
             Sender::Known(from) => from,
-            Sender::ByIdentifier => sender_of(&own.frame),
+            Sender::ByIdentifier => sender_of(&read.frame),
         },
-        start: at - length(&own.frame),
+        start: at - length(&read.frame),
         at,
-        frame: own.frame,
-        ended: own.ended,
+        frame: read.frame,
+        ended: read.ended,
     });
     let line: Vec<_> = line.collect();
-    let drives: BTreeSet<u8> = line.iter().filter_map(|own| own.from).collect();
+    let drives: BTreeSet<u8> = line.iter().filter_map(|frame| frame.from).collect();
     let capture = Capture {
         rate: Rate::default(),
         traces: vec![Trace {
@@ -169,13 +169,13 @@ pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureE
         mut notes,
         lost,
     } = log;
-    let first = frames.iter().filter_map(|own| own.at).min();
+    let first = frames.iter().filter_map(|logged| logged.at).min();
     let first = first.unwrap_or(0).min(0);
     let lines = one_bus(frames, links, &mut notes)?;
-    let timed = lines.iter().all(|own| own.at.is_some());
+    let timed = lines.iter().all(|logged| logged.at.is_some());
     let (mut frames, mut errors, mut end) = (Vec::new(), 0, Span::ZERO);
-    for own in &lines {
-        let frame = match own.what {
+    for logged in &lines {
+        let frame = match logged.what {
             What::Frame(frame) => frame,
             What::Error => {
                 errors += 1;
@@ -183,21 +183,21 @@ pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureE
             }
             What::Fd => {
                 return Err(CaptureError::Link {
-                    place: format!("line {}", own.place.number),
+                    place: format!("line {}", logged.place.number),
                     what: "a frame of CAN FD, and classic frames are expected; choose another channel with `--link bus=...` where there is one"
                         .to_owned(),
                 });
             }
         };
         end = end + BitRate::K500.time_of(frame.wire_bits());
-        let at = own.at.filter(|_| timed);
+        let at = logged.at.filter(|_| timed);
         let at = at.map(|at| at.abs_diff(first));
         frames.push(FrameRead {
             nanos: at.map_or(end, Span::from_units).as_nanos(),
             sender: Sender::ByIdentifier,
             frame,
             ended: FrameEnd::Good,
-            place: own.place,
+            place: logged.place,
         });
     }
     if errors > 0 {
@@ -229,11 +229,12 @@ fn one_bus(
         place: "the log".to_owned(),
         what,
     };
-    let mut names: Vec<&str> = frames.iter().map(|own| own.channel.as_str()).collect();
+    let channels = frames.iter().map(|logged| logged.channel.as_str());
+    let mut names: Vec<&str> = channels.collect();
     names.sort_unstable();
     names.dedup();
-    let chosen = links.iter().find(|own| own.target == ChannelTarget::Bus);
-    let chosen = chosen.and_then(|own| own.channel.as_deref());
+    let chosen = links.iter().find(|link| link.target == ChannelTarget::Bus);
+    let chosen = chosen.and_then(|link| link.channel.as_deref());
     let name = match (chosen, names.as_slice()) {
         (None, [] | [_]) => return Ok(frames),
         (None, [first, ..]) => {
@@ -252,13 +253,13 @@ fn one_bus(
         }
     };
     let all = frames.len();
-    let own = frames.iter().filter(|own| own.channel == name);
-    let own: Vec<Logged> = own.cloned().collect();
-    if own.len() < all {
-        let left = counted(all - own.len(), "frame");
+    let kept = frames.iter().filter(|logged| logged.channel == name);
+    let kept: Vec<Logged> = kept.cloned().collect();
+    if kept.len() < all {
+        let left = counted(all - kept.len(), "frame");
         notes.push(format!("{left} of other interfaces not read"));
     }
-    Ok(own)
+    Ok(kept)
 }
 
 /// Puts logs in order of time where each ends before another one begins.
@@ -315,9 +316,9 @@ pub(super) fn json(bytes: &[u8]) -> Result<Imported, CaptureError> {
         place: format!("line {}, column {}", error.line(), error.column()),
         what: format!("{error}"),
     })?;
-    let frames = object.frames.iter().enumerate().map(|(number, own)| {
+    let frames = object.frames.iter().enumerate().map(|(number, frame)| {
         let place = Place::of(number + 1);
-        let read = own.read().map(|own| FrameRead { place, ..own });
+        let read = frame.read().map(|read| FrameRead { place, ..read });
         read.map_err(|what| CaptureError::Link {
             place: format!("frame {}", number + 1),
             what,
@@ -325,7 +326,7 @@ pub(super) fn json(bytes: &[u8]) -> Result<Imported, CaptureError> {
     });
     let mut frames = frames.collect::<Result<Vec<_>, _>>()?;
     // This program writes it, by one clock. A frame of the bench stands where it was handed over, with the time at which it leaves.
-    frames.sort_by_key(|own| own.nanos);
+    frames.sort_by_key(|frame| frame.nanos);
     Ok(assemble(frames, Counts::Frames, None))
 }
 
@@ -342,9 +343,9 @@ impl FrameObject {
         };
         let from = match &self.from {
             serde_json::Value::String(name) if name == MASTER => Some(None),
-            own => own
+            other => other
                 .as_u64()
-                .and_then(|own| u8::try_from(own).ok())
+                .and_then(|number| u8::try_from(number).ok())
                 .map(Some),
         };
         let ended = match self.fault.as_deref() {
@@ -380,15 +381,15 @@ mod tests {
         let capture = super::super::read(log.as_bytes(), None).expect("a capture");
         let read: Vec<_> = frames(&capture)
             .iter()
-            .map(|own| (own.from, own.frame.to_string()))
+            .map(|frame| (frame.from, frame.frame.to_string()))
             .collect();
-        let own = |from, text: &str| (from, text.to_owned());
+        let sent = |from, text: &str| (from, text.to_owned());
         assert_eq!(
             read,
             [
-                own(None, "201#3D4000"),
-                own(Some(1), "181#40810100"),
-                own(None, "00000201#R3")
+                sent(None, "201#3D4000"),
+                sent(Some(1), "181#40810100"),
+                sent(None, "00000201#R3")
             ]
         );
         let first = &frames(&capture)[0];
@@ -432,7 +433,7 @@ mod tests {
         let frames = capture.traces[0].channels[0].frames();
         let times: Vec<_> = frames
             .iter()
-            .map(|own| (own.from, own.at.since_start().as_nanos()))
+            .map(|frame| (frame.from, frame.at.since_start().as_nanos()))
             .collect();
         assert_eq!(times, [(Some(1), 1_500_000), (None, 2_000_000)]);
         assert!(capture.traces[0].seams.is_empty());

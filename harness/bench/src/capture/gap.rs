@@ -39,11 +39,11 @@ pub fn gaps(pieces: impl IntoIterator<Item = (Instant, Instant)>) -> Vec<Gap> {
     let silences: Vec<Span> = silences.collect();
     let mut longest = silences.clone();
     longest.sort_unstable_by(|a, b| b.cmp(a));
-    let own = longest.get(FEW + longest.len() / 100);
+    let ordinary = longest.get(FEW + longest.len() / 100);
     let least = LEAST[usize::from(longest.len() < ENOUGH)];
-    let most = least.max(own.copied().unwrap_or(Span::ZERO) * TIMES);
+    let most = least.max(ordinary.copied().unwrap_or(Span::ZERO) * TIMES);
     let all = silences.into_iter().enumerate();
-    let gaps = all.filter(|own| own.1 > most);
+    let gaps = all.filter(|(_, silence)| *silence > most);
     gaps.map(|(piece, silence)| Gap { piece, silence })
         .collect()
 }
@@ -51,7 +51,7 @@ pub fn gaps(pieces: impl IntoIterator<Item = (Instant, Instant)>) -> Vec<Gap> {
 /// What is said of gaps, where there are some; `noun` names a piece.
 pub fn note(gaps: &[Gap], noun: &str) -> Option<String> {
     let named = gaps.iter().take(MOST_NAMED);
-    let named = named.map(|own| format!("of {} at {noun} {}", own.silence, own.piece + 1));
+    let named = named.map(|gap| format!("of {} at {noun} {}", gap.silence, gap.piece + 1));
     let named: Vec<_> = named.collect();
     let more = gaps.len().saturating_sub(MOST_NAMED);
     let more = match more {
@@ -78,7 +78,7 @@ mod tests {
             at = begin;
             (begin, at)
         });
-        gaps(pieces).iter().map(|own| own.piece).collect()
+        gaps(pieces).iter().map(|gap| gap.piece).collect()
     }
 
     #[test]

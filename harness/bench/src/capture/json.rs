@@ -115,12 +115,12 @@ fn read_ring(object: &Object, ring: usize, assembly: &mut Assembly) -> Result<u8
         if !adjacent(from, to) {
             return wrong(name, "no link of a ring has these ends (ND21 8.5)");
         }
-        let own = assembly.link(ring, from, to);
-        if !own.bytes.is_empty() {
+        let read = assembly.link(ring, from, to);
+        if !read.bytes.is_empty() {
             return wrong(name, "this link is given twice");
         }
         for (index, byte) in link.bytes.iter().enumerate() {
-            own.bytes
+            read.bytes
                 .push(read_byte(byte).map_err(|what| CaptureError::Link {
                     place: format!("link {name}, byte {}", index + 1),
                     what: what.to_owned(),
@@ -160,7 +160,7 @@ fn mark(object: &MarkObject) -> Option<Remark> {
     ];
     let (_, marks) = *KINDS.iter().find(|(kind, _)| *kind == object.kind)?;
     let cause = object.cause.as_deref();
-    let named = |own: &BusError| Some(own.name()) == cause;
+    let named = |error: &BusError| Some(error.name()) == cause;
     Some(Remark {
         station: object.drive,
         piece: object.byte,

@@ -135,7 +135,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
         rate,
         ..ReadSettings::default()
     };
-    read_with(bytes, &settings).map(|own| own.capture)
+    read_with(bytes, &settings).map(|imported| imported.capture)
 }
 
 /// Reads the bytes of a file.
@@ -155,17 +155,17 @@ pub fn is_capture(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = regular::open(path, Links::Follow)
         .and_then(|file| file.take(4_096).read_to_end(&mut start));
-    let named = path.extension().is_some_and(|own| own == "scn");
+    let named = path.extension().is_some_and(|extension| extension == "scn");
     read.is_ok() && !named && import::is_capture(&start)
 }
 
 /// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.
 pub fn ends(name: &str) -> Option<(usize, Option<u8>, Option<u8>)> {
-    let (ring, own) = match name.strip_prefix("2:") {
-        Some(own) => (1, own),
+    let (ring, link) = match name.strip_prefix("2:") {
+        Some(link) => (1, link),
         None => (0, name),
     };
-    let (from, to) = own.split_once("->")?;
+    let (from, to) = link.split_once("->")?;
     let (from, to) = (end(from)?, end(to)?);
     adjacent(from, to).then_some((ring, from, to))
 }
@@ -233,16 +233,16 @@ impl Assembly {
                 continue;
             };
             let first = links.iter().find(|link| link.from.is_none());
-            let own = first.and_then(|link| link.to).map(|drive| drive + 1);
-            let drives = size.or(own).unwrap_or(least);
-            if drives < least || own.is_some_and(|own| own != drives) {
+            let by_first = first.and_then(|link| link.to).map(|drive| drive + 1);
+            let drives = size.or(by_first).unwrap_or(least);
+            if drives < least || by_first.is_some_and(|count| count != drives) {
                 return Err(CaptureError::Link {
                     place: format!("a ring of {drives} drives"),
                     what: format!("a link of drive {} is none of it", least - 1),
                 });
             }
             let channels = links.into_iter();
-            let channels = channels.map(|own| Channel::of_octets(own.from, own.to, own.bytes));
+            let channels = channels.map(|link| Channel::of_octets(link.from, link.to, link.bytes));
             traces.push(Trace {
                 stations: drives,
                 channels: channels.collect(),
@@ -317,16 +317,16 @@ impl Capture {
     #[must_use]
     pub(crate) fn mostly_damaged(&self) -> Option<String> {
         // What a simulation has damaged is known to the bit.
-        let is_damaged = |own: &&LineByte| own.error.is_some() && own.sent == own.received;
+        let is_damaged = |byte: &&LineByte| byte.error.is_some() && byte.sent == byte.received;
         let line = |octets: &[&Channel]| {
-            let octets = octets.iter().flat_map(|own| own.octets());
+            let octets = octets.iter().flat_map(|channel| channel.octets());
             let damaged = octets.clone().filter(is_damaged).count();
             (damaged, octets.count())
         };
         let lines = self.traces.iter().flat_map(|trace| {
             let all: Vec<&Channel> = trace.channels.iter().collect();
             match Carries::of(std::slice::from_ref(trace)) {
-                Carries::Link => all.into_iter().map(|own| line(&[own])).collect(),
+                Carries::Link => all.into_iter().map(|channel| line(&[channel])).collect(),
                 Carries::Line | Carries::Frames => vec![line(&all)],
             }
         });
@@ -344,8 +344,8 @@ impl Capture {
     pub fn end(&self) -> Instant {
         let links = self.traces.iter().flat_map(|trace| &trace.channels);
         let last = links.filter_map(|link| match &link.carried {
-            Carried::Octets(octets) => octets.last().map(|own| own.at),
-            Carried::Frames(frames) => frames.last().map(|own| own.at),
+            Carried::Octets(octets) => octets.last().map(|byte| byte.at),
+            Carried::Frames(frames) => frames.last().map(|frame| frame.at),
         });
         last.max().unwrap_or(Instant::START)
     }
@@ -356,7 +356,7 @@ pub fn line_formats(shared: bool) -> Vec<Format> {
     match shared {
         true => {
             let usual = BusRate::default();
-            let others = BusRate::ALL.into_iter().filter(|own| *own != usual);
+            let others = BusRate::ALL.into_iter().filter(|rate| *rate != usual);
             std::iter::once(usual)
                 .chain(others)
                 .map(BusRate::format)

@@ -75,39 +75,39 @@ pub(super) fn ordered(
     };
     let frames = sections(frames.clone(), *first);
     let mut clock = Clock::default();
-    for (index, own) in frames.into_iter().enumerate() {
-        if let Some(kind) = clock.next(&own, counts, length(&own).as_nanos()) {
+    for (index, frame) in frames.into_iter().enumerate() {
+        if let Some(kind) = clock.next(&frame, counts, length(&frame).as_nanos()) {
             all.seams.push(Seam { piece: index, kind });
         }
         let at = u64::try_from(clock.now).unwrap_or(0).min(LATEST);
         all.frames
-            .push((Instant::START + Span::from_nanos(at), own));
+            .push((Instant::START + Span::from_nanos(at), frame));
     }
     all.notes = clock.notes(&all.seams, counts);
     all
 }
 
 /// Sections that follow each other in time, in order of time; others in that of the file.
-fn sections(frames: Vec<FrameRead>, first: FrameRead) -> Vec<FrameRead> {
+fn sections(mut frames: Vec<FrameRead>, first: FrameRead) -> Vec<FrameRead> {
     if frames
         .iter()
-        .all(|own| own.place.section == first.place.section)
+        .all(|frame| frame.place.section == first.place.section)
     {
         return frames;
     }
     let mut spans: BTreeMap<usize, (u64, u64)> = BTreeMap::new();
-    for own in &frames {
+    for frame in &frames {
         let span = spans
-            .entry(own.place.section)
-            .or_insert((own.nanos, own.nanos));
-        *span = (span.0.min(own.nanos), span.1.max(own.nanos));
+            .entry(frame.place.section)
+            .or_insert((frame.nanos, frame.nanos));
+        *span = (span.0.min(frame.nanos), span.1.max(frame.nanos));
     }
-    let mut ranks: Vec<_> = spans.into_iter().map(|(own, span)| (span, own)).collect();
+    let spans = spans.into_iter();
+    let mut ranks: Vec<_> = spans.map(|(section, span)| (span, section)).collect();
     ranks.sort_unstable();
     let overlap = ranks.windows(2).any(|two| two[1].0.0 < two[0].0.1);
-    let mut frames = frames;
     if !overlap {
-        let rank = |own: &FrameRead| ranks.iter().position(|rank| rank.1 == own.place.section);
+        let rank = |frame: &FrameRead| ranks.iter().position(|rank| rank.1 == frame.place.section);
         frames.sort_by_key(rank);
     }
     frames
@@ -133,11 +133,11 @@ struct Clock {
 
 impl Clock {
     /// Goes on to a frame; says what is between it and the one before, where times do not go on.
-    fn next(&mut self, own: &FrameRead, counts: Counts, length: u64) -> Option<SeamKind> {
-        let nanos = i128::from(own.nanos);
-        let Some(before) = self.before.replace(own.place) else {
-            self.first = own.nanos;
-            self.base = if own.nanos > DAY {
+    fn next(&mut self, frame: &FrameRead, counts: Counts, length: u64) -> Option<SeamKind> {
+        let nanos = i128::from(frame.nanos);
+        let Some(before) = self.before.replace(frame.place) else {
+            self.first = frame.nanos;
+            self.base = if frame.nanos > DAY {
                 nanos - i128::from(length)
             } else {
                 0
@@ -147,20 +147,20 @@ impl Clock {
         };
         let at = nanos - self.base;
         let back = self.now - at;
-        let since_start = own.nanos < DAY && self.first < DAY;
+        let since_start = frame.nanos < DAY && self.first < DAY;
         let begins_again = since_start
-            && (own.nanos <= self.first
+            && (frame.nanos <= self.first
                 || counts == Counts::Packets
-                || before.section != own.place.section);
-        let kind = if before.recording != own.place.recording || back > JITTER && begins_again {
-            self.recordings.push(own.place);
+                || before.section != frame.place.section);
+        let kind = if before.recording != frame.place.recording || back > JITTER && begins_again {
+            self.recordings.push(frame.place);
             SeamKind::Recording
         } else if back > JITTER {
-            self.set.push((own.place, back));
+            self.set.push((frame.place, back));
             SeamKind::ClockSet
         } else {
             if back > 0 {
-                let most = self.jitter.get_or_insert((own.place, back));
+                let most = self.jitter.get_or_insert((frame.place, back));
                 most.1 = most.1.max(back);
             }
             self.now = self.now.max(at);
@@ -172,7 +172,7 @@ impl Clock {
         } else {
             self.now = at;
         }
-        self.first = own.nanos;
+        self.first = frame.nanos;
         Some(kind)
     }
 
@@ -236,7 +236,7 @@ mod tests {
         let ends = all
             .frames
             .iter()
-            .map(|own| own.0.since_start().as_nanos() / 1_000);
+            .map(|(at, _)| at.since_start().as_nanos() / 1_000);
         (ends.collect(), all.seams, all.notes)
     }
 
@@ -298,7 +298,8 @@ mod tests {
             let all = ordered(frames.collect(), Counts::Packets, |_| {
                 Span::from_micros(100)
             });
-            let order: Vec<_> = all.frames.iter().map(|own| own.1.place.number).collect();
+            let frames = all.frames.iter();
+            let order: Vec<_> = frames.map(|(_, frame)| frame.place.number).collect();
             (order, all.seams.len())
         };
         assert_eq!(

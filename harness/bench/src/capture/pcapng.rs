@@ -77,11 +77,12 @@ pub(super) fn finish(mut reader: Reader<'_>, rate: Option<Rate>) -> Result<Impor
     reader.no_twins()?;
     reader.cooked_frames()?;
     let events = std::mem::take(&mut reader.events);
-    let lost = events.iter().any(|own| means_loss(own));
+    let lost = events.iter().any(|event| means_loss(event));
     let mut notes = noted(events);
     let passed = std::mem::take(&mut reader.passed);
-    let passed = passed.iter();
-    notes.extend(passed.map(|(why, own)| format!("{} not read: {why}", counted(*own, "packet"))));
+    for (why, count) in passed {
+        notes.push(format!("{} not read: {why}", counted(count, "packet")));
+    }
     let cut = reader.cut;
     if cut {
         notes.push(
@@ -109,33 +110,34 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
         });
     }
     let carries = |part: usize| {
-        let of = |own: &Byte| {
-            let interface = reader.interfaces.get(own.interface);
-            interface.is_some_and(|own| own.as_ref().is_some_and(|own| own.part == part))
+        let of = |byte: &Byte| {
+            let known = reader.interfaces.get(byte.interface);
+            matches!(known, Some(Some(known)) if known.part == part)
         };
-        reader.octets.iter().any(|own| own.0 == part)
-            || reader.frames.iter().any(|own| own.0 == part)
+        reader.octets.iter().any(|(number, ..)| *number == part)
+            || reader.frames.iter().any(|(number, _)| *number == part)
             || reader.found.iter().any(of)
     };
     let wanted = chosen(&reader.parts, carries, reader.links)?;
     let known = reader.interfaces;
-    let of_part = || known.iter().flatten().filter(|own| own.part == wanted);
-    let octet = of_part().find_map(|own| own.octet).unwrap_or(OCTET);
-    let octets = reader.octets.into_iter().filter(|own| own.0 == wanted);
+    let of_part = || known.iter().flatten().filter(|known| known.part == wanted);
+    let octet = of_part().find_map(|known| known.octet).unwrap_or(OCTET);
+    let octets = reader.octets.into_iter();
+    let octets = octets.filter(|(number, ..)| *number == wanted);
     match &reader.parts[wanted] {
         Part::Ring => {}
         Part::Stations => {
-            let senders = of_part().filter_map(|own| match own.carries {
+            let senders = of_part().filter_map(|interface| match interface.carries {
                 Carries::Station(station) => Some(station),
                 Carries::Link(..) | Carries::Frames(_) | Carries::Line => None,
             });
-            let octets = octets.map(|(_, from, _, own)| (from, own)).collect();
+            let octets = octets.map(|(_, from, _, octet)| (from, octet)).collect();
             return Ok(telegrams::assemble(senders, octets, octet).into());
         }
         Part::Line(_) => {
-            let mut octets: Vec<_> = octets.map(|(_, _, at, own)| (at, own)).collect();
-            octets.sort_by_key(|own| own.0);
-            let octets = in_order(octets.into_iter().map(|own| own.1), octet);
+            let mut octets: Vec<_> = octets.map(|(_, _, at, octet)| (at, octet)).collect();
+            octets.sort_by_key(|(at, _)| *at);
+            let octets = in_order(octets.into_iter().map(|(_, octet)| octet), octet);
             let read = LineRead::of(&octets, octet, true);
             let unread = unread_octets(&read);
             let capture = telegrams::assemble(std::iter::empty(), read.octets, octet);
@@ -146,9 +148,9 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
             });
         }
         Part::Senders | Part::Frames(_) => {
-            let frames = reader.frames.into_iter().filter(|own| own.0 == wanted);
-            let frames = frames.map(|(_, own)| own).collect();
-            return Ok(assemble(frames, Counts::Packets, reader.bit_rate));
+            let frames = reader.frames.into_iter();
+            let frames = frames.filter_map(|(number, frame)| (number == wanted).then_some(frame));
+            return Ok(assemble(frames.collect(), Counts::Packets, reader.bit_rate));
         }
     }
     let byte_time = rate.or(reader.speed).unwrap_or_default().byte_time();
@@ -177,7 +179,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
             .push(line_byte(nanos, byte.sent, byte.received, byte.error));
     }
     let listened = first.zip(reader.listened);
-    let listened = listened.map(|(first, own)| listened_to(own, first, base));
+    let listened = listened.map(|(first, heard)| listened_to(heard, first, base));
     let rate = rate.or(reader.speed);
     let capture = assembly.finish([None, None], [Vec::new(), Vec::new()], rate)?;
     let capture = Capture {
@@ -190,13 +192,13 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
 /// Octets of packets one behind the other: packets of an adapter may be nearer to each other than their octets take.
 fn in_order(octets: impl Iterator<Item = PacketOctet>, octet: Span) -> Vec<PacketOctet> {
     let mut before: Option<u64> = None;
-    let octets = octets.map(|own| {
-        let least = before.map_or(0, |own| own.saturating_add(octet.as_nanos()));
+    let octets = octets.map(|packet| {
+        let least = before.map_or(0, |before| before.saturating_add(octet.as_nanos()));
         // Times are cut off to nanoseconds.
-        let overlaps = own.nanos.saturating_add(1) < least;
-        let nanos = if overlaps { least } else { own.nanos };
+        let overlaps = packet.nanos.saturating_add(1) < least;
+        let nanos = if overlaps { least } else { packet.nanos };
         before = Some(nanos);
-        PacketOctet { nanos, ..own }
+        PacketOctet { nanos, ..packet }
     });
     octets.collect()
 }
@@ -265,7 +267,7 @@ impl<'b> Reader<'b> {
 
     /// The number of a part.
     fn part(&mut self, part: Part) -> usize {
-        let known = self.parts.iter().position(|own| *own == part);
+        let known = self.parts.iter().position(|known| *known == part);
         known.unwrap_or_else(|| {
             self.parts.push(part);
             self.parts.len() - 1
@@ -368,8 +370,8 @@ impl<'b> Reader<'b> {
             }
             Ok(())
         })?;
-        let own = |(from, to): (usize, usize)| String::from_utf8_lossy(&self.bytes[from..to]);
-        let name = name.map(|place| (place.0, own(place)));
+        let text = |(from, to): (usize, usize)| String::from_utf8_lossy(&self.bytes[from..to]);
+        let name = name.map(|place| (place.0, text(place)));
         self.describe((start, link_type), name, (resolution, offset, speed))
     }
 
@@ -381,7 +383,7 @@ impl<'b> Reader<'b> {
         };
         let clock = known
             .as_ref()
-            .map_or((6, 0), |own| (own.resolution, own.offset));
+            .map_or((6, 0), |known| (known.resolution, known.offset));
         let ticks =
             u64::from(self.u32(start + 4, end)?) << 32 | u64::from(self.u32(start + 8, end)?);
         let nanos = nanoseconds(ticks, clock.0, clock.1);

@@ -26,13 +26,12 @@ pub enum Carries {
 impl Carries {
     /// What these traces carried: frames, octets for all stations, or octets of links.
     pub fn of(traces: &[Trace]) -> Self {
-        let channels = traces.iter().flat_map(|trace| &trace.channels);
-        let carries_frames = |own: &Channel| matches!(own.carried, Carried::Frames(_));
+        let mut channels = traces.iter().flat_map(|trace| &trace.channels);
+        let carries_frames = |channel: &Channel| matches!(channel.carried, Carried::Frames(_));
         if channels.clone().any(carries_frames) {
             return Self::Frames;
         }
-        let mut channels = channels;
-        match channels.any(|own| own.from.is_none() && own.to.is_none()) {
+        match channels.any(|channel| channel.from.is_none() && channel.to.is_none()) {
             true => Self::Line,
             false => Self::Link,
         }
@@ -63,19 +62,19 @@ pub enum Piece {
 impl Piece {
     /// The same, heard so much later.
     pub fn later(&self, span: Span) -> Self {
-        let byte = |own: &LineByte| LineByte {
-            at: own.at + span,
-            ..*own
+        let byte = |octet: &LineByte| LineByte {
+            at: octet.at + span,
+            ..*octet
         };
         match self {
-            Self::Octet(own) => Self::Octet(byte(own)),
+            Self::Octet(octet) => Self::Octet(byte(octet)),
             Self::Telegram(from, octets) => {
                 Self::Telegram(*from, octets.iter().map(byte).collect())
             }
-            Self::Frame(own) => Self::Frame(LineFrame {
-                start: own.start + span,
-                at: own.at + span,
-                ..*own
+            Self::Frame(frame) => Self::Frame(LineFrame {
+                start: frame.start + span,
+                at: frame.at + span,
+                ..*frame
             }),
             Self::Event(nanos, words) => {
                 Self::Event(nanos.saturating_add(span.as_nanos()), words.clone())
@@ -101,25 +100,25 @@ impl<W: Write> LiveRecorder<W> {
     /// # Errors
     /// Those of `out`.
     pub fn start(out: W, places: &[RecordedPlace]) -> io::Result<Self> {
-        let mut own = Self {
+        let mut recorder = Self {
             out,
             block: Block::default(),
             places: places.to_vec(),
             waiting: Vec::new(),
             written: 0,
         };
-        own.block.section(&mut own.waiting)?;
+        recorder.block.section(&mut recorder.waiting)?;
         for place in places {
             let link_type = match place.carries {
                 Carries::Link | Carries::Line => LINK_TYPE,
                 Carries::Frames => pcapng_frames::LINK_TYPE,
             };
-            let speed = u64::from(place.bits_per_second);
-            own.block.interface(link_type, &place.name, Some(speed));
-            own.block.end(&mut own.waiting)?;
+            let (block, speed) = (&mut recorder.block, place.bits_per_second.into());
+            block.interface(link_type, &place.name, Some(speed));
+            block.end(&mut recorder.waiting)?;
         }
-        own.flush()?;
-        Ok(own)
+        recorder.flush()?;
+        Ok(recorder)
     }
 
     /// Keeps what was heard at the place with this number.
@@ -128,11 +127,12 @@ impl<W: Write> LiveRecorder<W> {
     /// None: blocks are kept until [`flush`](Self::flush).
     pub fn piece(&mut self, place: usize, piece: &Piece) -> io::Result<()> {
         let (block, out) = (&mut self.block, &mut self.waiting);
-        let own = self.places.get(place);
+        let recorded = self.places.get(place);
+        let carries = recorded.map(|place| place.carries);
         match piece {
             Piece::Octet(byte) => packet(block, place, byte),
             Piece::Telegram(_, octets) => {
-                let octet = own.and_then(|own| octet_time(own.bits_per_second.into()));
+                let octet = recorded.and_then(|place| octet_time(place.bits_per_second.into()));
                 for part in octets.chunks(MOST) {
                     pcapng_telegrams::packet(block, (place, RECEIVED), part, octet);
                     block.end(out)?;
@@ -140,7 +140,7 @@ impl<W: Write> LiveRecorder<W> {
                 return Ok(());
             }
             Piece::Frame(frame) => pcapng_frames::packet(block, place, frame),
-            Piece::Event(nanos, words) if own.is_some_and(|own| own.carries == Carries::Frames) => {
+            Piece::Event(nanos, words) if carries == Some(Carries::Frames) => {
                 pcapng_frames::event(block, place, *nanos, words);
             }
             Piece::Event(nanos, words) => {

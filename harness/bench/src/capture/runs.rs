@@ -38,7 +38,8 @@ impl HeardTelegram {
 /// The octets of all stations with their senders, in order of time.
 pub fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
     let channels = trace.channels.iter();
-    let all = channels.flat_map(|own| own.octets().iter().map(|octet| (own.from, *octet)));
+    let all =
+        channels.flat_map(|channel| channel.octets().iter().map(|octet| (channel.from, *octet)));
     let mut all: Vec<_> = all.collect();
     all.sort_by_key(|(_, octet)| octet.at);
     all
@@ -56,12 +57,12 @@ pub struct TelegramRun {
 impl TelegramRun {
     /// When the stop bit of its last octet had passed.
     pub fn at(&self) -> Instant {
-        self.octets.last().map_or(Instant::START, |own| own.at)
+        self.octets.last().map_or(Instant::START, |octet| octet.at)
     }
 
     /// When the stop bit of its first octet had passed.
     pub fn begin(&self) -> Instant {
-        self.octets.first().map_or(Instant::START, |own| own.at)
+        self.octets.first().map_or(Instant::START, |octet| octet.at)
     }
 
     /// What the other stations read; `None` where nothing arrived.
@@ -69,7 +70,7 @@ impl TelegramRun {
         let arrived = self
             .octets
             .iter()
-            .filter_map(|own| own.received.map(|byte| (byte, own)));
+            .filter_map(|octet| octet.received.map(|byte| (byte, octet)));
         let arrived: Vec<_> = arrived.collect();
         let (_, last) = arrived.last()?;
         let mut errors = arrived.iter().zip(1..);
@@ -77,7 +78,7 @@ impl TelegramRun {
             from: self.from,
             at: last.at,
             octets: arrived.iter().map(|(byte, _)| *byte).collect(),
-            error: errors.find_map(|((_, own), place)| own.error.map(|error| (place, error))),
+            error: errors.find_map(|((_, octet), place)| octet.error.map(|error| (place, error))),
         })
     }
 }
@@ -89,19 +90,19 @@ pub fn octet_time<'t>(octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>) 
     let mut last: Option<(Option<u8>, Instant)> = None;
     // Octets are many, and their distances few.
     let mut distances: BTreeMap<Span, usize> = BTreeMap::new();
-    for (from, own) in octets {
+    for (from, octet) in octets {
         if let Some((_, at)) = last
-            .replace((from, own.at))
+            .replace((from, octet.at))
             .filter(|before| before.0 == from)
         {
-            *distances.entry(own.at.since(at)).or_default() += 1;
+            *distances.entry(octet.at.since(at)).or_default() += 1;
         }
     }
     let at_rate = |rate: BusRate| {
         let octet = rate.octet_time().as_nanos();
         let near = distances
             .iter()
-            .filter(|(own, _)| own.as_nanos().abs_diff(octet) <= octet / 50);
+            .filter(|(distance, _)| distance.as_nanos().abs_diff(octet) <= octet / 50);
         let (nearest, _) = near.clone().next()?;
         let count: usize = near.map(|(_, count)| count).sum();
         Some((count, Reverse(*nearest)))
@@ -120,10 +121,10 @@ const CUT: Span = Span::from_nanos(SYN_OCTETS + 1);
 /// and where it was idle for at least one octet behind a complete telegram.
 pub fn runs(trace: &Trace) -> Vec<TelegramRun> {
     let octets = octets(trace);
-    let one = octet_time(octets.iter().map(|(from, own)| (*from, own))).unwrap_or(Span::ZERO);
+    let one = octet_time(octets.iter().map(|(from, octet)| (*from, octet))).unwrap_or(Span::ZERO);
     let mut all: Vec<TelegramRun> = Vec::new();
     for (from, octet) in octets {
-        let complete = |last: &TelegramRun| last.said().is_some_and(|own| own.telegram().is_some());
+        let complete = |run: &TelegramRun| run.said().is_some_and(|said| said.telegram().is_some());
         let parted = |last: &TelegramRun| {
             let distance = octet.at.since(last.at());
             distance + CUT >= one * (SYN_OCTETS + 1) && distance > CUT
@@ -150,10 +151,10 @@ pub fn said(trace: &Trace) -> Vec<HeardTelegram> {
 #[must_use]
 pub fn rate(trace: &Trace) -> Option<BusRate> {
     let octets = octets(trace);
-    let shortest = octet_time(octets.iter().map(|(from, own)| (*from, own)))?.units();
+    let shortest = octet_time(octets.iter().map(|(from, octet)| (*from, octet)))?.units();
     let fits = |rate: &BusRate| {
-        let own: Span = rate.octet_time();
-        shortest.abs_diff(own.units()) * 100 <= own.units()
+        let octet: Span = rate.octet_time();
+        shortest.abs_diff(octet.units()) * 100 <= octet.units()
     };
     BusRate::ALL.into_iter().find(fits)
 }
@@ -167,7 +168,7 @@ pub fn bits_per_second(traces: &[Trace]) -> u32 {
 /// The telegrams of a shared line of octets, each with the slave that sent it; `None` is a master.
 pub fn telegrams(traces: &[Trace]) -> Vec<(Option<u8>, Vec<LineByte>)> {
     let all = traces.iter().flat_map(runs);
-    all.map(|own| (own.from, own.octets)).collect()
+    all.map(|run| (run.from, run.octets)).collect()
 }
 
 #[cfg(test)]
@@ -190,14 +191,14 @@ mod tests {
             channels: vec![channel(None, 0, octets)],
             ..Trace::empty(1)
         };
-        said(&trace).into_iter().map(|own| own.octets).collect()
+        said(&trace).into_iter().map(|heard| heard.octets).collect()
     }
 
     /// A gap of two octets does not end a telegram that is not complete; 33 idle bits do, and 11 behind a complete one.
     #[test]
     fn idle_time_ends_a_telegram() {
         let status = [0x10, 8, 2, 0x49, 0x53, 0x16];
-        let whole: Vec<_> = status.iter().map(|own| (1, *own)).collect();
+        let whole: Vec<_> = status.iter().map(|byte| (1, *byte)).collect();
         let mut gap = whole.clone();
         gap[4].0 = 3;
         assert_eq!(telegrams(&gap), [status.to_vec()]);
@@ -222,7 +223,7 @@ mod tests {
         };
         let found: Vec<_> = said(&trace)
             .into_iter()
-            .map(|own| (own.from, own.octets))
+            .map(|heard| (heard.from, heard.octets))
             .collect();
         let expected = [
             (None, vec![0x10, 8]),
@@ -236,7 +237,7 @@ mod tests {
     #[test]
     fn octets_that_a_port_gives_at_once() {
         let status = [0x10, 0x08, 0x02, 0x49, 0x53, 0x16];
-        let sent: Vec<_> = status.map(|own| (1, own)).into();
+        let sent: Vec<_> = status.map(|byte| (1, byte)).into();
         let near = |us: u64, byte: u8| {
             let at = Instant::START + Span::from_micros(400 + us);
             LineByte::seen(at, Some(byte), Some(byte), None)
@@ -251,7 +252,7 @@ mod tests {
             ],
             ..Trace::empty(1)
         };
-        let all: Vec<_> = said(&trace).into_iter().map(|own| own.octets).collect();
+        let all: Vec<_> = said(&trace).into_iter().map(|heard| heard.octets).collect();
         assert_eq!(all, [status.to_vec(), reply.to_vec()]);
     }
 }

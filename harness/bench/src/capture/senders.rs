@@ -39,7 +39,7 @@ impl LineRead {
                 runs = joined;
             }
         }
-        let low = runs.extract_if(.., |own| own.kind == RunKind::Low).count();
+        let low = runs.extract_if(.., |run| run.kind == RunKind::Low).count();
         if low > 0 {
             notes.push(format!(
                 "{} left out: the line is low there for longer than an octet, as one without bias resistors is between telegrams",
@@ -49,16 +49,17 @@ impl LineRead {
         // Behind each telegram the line may be low once.
         let whole = runs
             .iter()
-            .filter(|own| own.kind == RunKind::Telegram)
+            .filter(|run| run.kind == RunKind::Telegram)
             .count();
         let unread =
-            of_no_telegram(&runs, |own| own.from.is_none()) + low.saturating_sub(whole + 1);
+            of_no_telegram(&runs, |run| run.from.is_none()) + low.saturating_sub(whole + 1);
         if unread > 0 {
             let count = counted(unread, "octet");
             notes.push(format!("{count} could not be read as telegrams"));
         }
         let octets = runs.into_iter();
-        let octets = octets.flat_map(|run| run.octets.into_iter().map(move |own| (run.from, own)));
+        let octets =
+            octets.flat_map(|run| run.octets.into_iter().map(move |octet| (run.from, octet)));
         Self {
             octets: octets.collect(),
             unread,
@@ -86,17 +87,17 @@ enum RunKind {
 
 /// Octets of no telegram in runs that `counts` chooses, but for the telegrams that the beginning and the end of a capture cut.
 fn of_no_telegram(runs: &[Run], counts: impl Fn(&Run) -> bool) -> usize {
-    let is_whole = |own: &Run| own.kind == RunKind::Telegram;
+    let is_whole = |run: &Run| run.kind == RunKind::Telegram;
     let first = runs.iter().position(is_whole).unwrap_or(0);
     let count = |runs: &[Run]| -> usize {
-        let other = |own: &&Run| matches!(own.kind, RunKind::Begun | RunKind::Other) && counts(own);
-        runs.iter().filter(other).map(|own| own.octets.len()).sum()
+        let other = |run: &&Run| matches!(run.kind, RunKind::Begun | RunKind::Other) && counts(run);
+        runs.iter().filter(other).map(|run| run.octets.len()).sum()
     };
     let before = count(&runs[..first]);
     let begun = runs
         .last()
-        .filter(|own| own.kind == RunKind::Begun && counts(own));
-    let cut = begun.map_or(0, |own| own.octets.len());
+        .filter(|run| run.kind == RunKind::Begun && counts(run));
+    let cut = begun.map_or(0, |run| run.octets.len());
     let before = if before <= MAX_TELEGRAM { 0 } else { before };
     before + count(&runs[first..]).saturating_sub(cut)
 }
@@ -114,8 +115,8 @@ fn by_time(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
     while let Some(first) = left.first() {
         // 33 idle bits end a telegram in any case, and 11 a damaged one.
         let all = run(left, octet, SYN_OCTETS);
-        let good = all.iter().take_while(|own| own.error.is_none());
-        let bytes: Vec<u8> = good.filter_map(|own| own.received).collect();
+        let good = all.iter().take_while(|octet| octet.error.is_none());
+        let bytes: Vec<u8> = good.filter_map(|octet| octet.received).collect();
         let (from, kind, used) = match Telegram::decode(&bytes) {
             Decoded::Value { value, used } => (line.sender(&value), RunKind::Telegram, used),
             _ if is_low(first.received.unwrap_or(1), first.error) => (None, RunKind::Low, 1),
@@ -124,11 +125,11 @@ fn by_time(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
             }
             _ => (line.0.take(), RunKind::Other, run(left, octet, 1).len()),
         };
-        let (own, rest) = left.split_at(used.clamp(1, left.len()));
+        let (taken, rest) = left.split_at(used.clamp(1, left.len()));
         runs.push(Run {
             from,
             kind,
-            octets: own.to_vec(),
+            octets: taken.to_vec(),
         });
         left = rest;
     }
@@ -139,31 +140,31 @@ fn by_time(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
 fn joined(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
     let mut cutter = TelegramCutter::new(octet);
     let mut cut = Vec::new();
-    for own in octets {
-        cut.extend(cutter.cut(own.nanos));
-        if let Some(byte) = own.received {
-            let error = own.error;
-            cutter.push(own.nanos, Received { byte, error });
+    for octet in octets {
+        cut.extend(cutter.cut(octet.nanos));
+        if let Some(byte) = octet.received {
+            let error = octet.error;
+            cutter.push(octet.nanos, Received { byte, error });
         }
     }
-    let last = octets.last().map_or(0, |own| own.nanos);
+    let last = octets.last().map_or(0, |octet| octet.nanos);
     cut.extend(cutter.cut(last.saturating_add(TelegramCutter::PATIENCE)));
-    let packet = |own: &LineByte| PacketOctet {
-        nanos: own.at.since_start().as_nanos(),
-        sent: own.sent,
-        received: own.received,
-        error: own.error,
+    let packet = |byte: &LineByte| PacketOctet {
+        nanos: byte.at.since_start().as_nanos(),
+        sent: byte.sent,
+        received: byte.received,
+        error: byte.error,
     };
-    let run = |(from, own): (Option<u8>, Vec<LineByte>)| {
-        let good = own.iter().take_while(|own| own.error.is_none());
-        let good: Vec<u8> = good.filter_map(|own| own.received).collect();
-        let kind = match (Telegram::decode(&good), own.as_slice()) {
-            (Decoded::Value { used, .. }, _) if used == own.len() => RunKind::Telegram,
+    let run = |(from, bytes): (Option<u8>, Vec<LineByte>)| {
+        let good = bytes.iter().take_while(|byte| byte.error.is_none());
+        let good: Vec<u8> = good.filter_map(|byte| byte.received).collect();
+        let kind = match (Telegram::decode(&good), bytes.as_slice()) {
+            (Decoded::Value { used, .. }, _) if used == bytes.len() => RunKind::Telegram,
             (_, [first]) if is_low(first.received.unwrap_or(1), first.error) => RunKind::Low,
-            (Decoded::NeedMore, _) if good.len() == own.len() => RunKind::Begun,
+            (Decoded::NeedMore, _) if good.len() == bytes.len() => RunKind::Begun,
             _ => RunKind::Other,
         };
-        let octets = own.iter().map(packet).collect();
+        let octets = bytes.iter().map(packet).collect();
         Run { from, kind, octets }
     };
     cut.into_iter().map(run).collect()
@@ -182,13 +183,13 @@ impl Asked {
         match telegram {
             Telegram::Confirmation => self.0.take(),
             Telegram::Token { .. } => None,
-            Telegram::Pdu(own) if own.fc().is_request() => {
-                self.0 = Some(own.da()).filter(|own| *own != BROADCAST);
+            Telegram::Pdu(pdu) if pdu.fc().is_request() => {
+                self.0 = Some(pdu.da()).filter(|address| *address != BROADCAST);
                 None
             }
-            Telegram::Pdu(own) => {
+            Telegram::Pdu(pdu) => {
                 self.0 = None;
-                Some(own.sa())
+                Some(pdu.sa())
             }
         }
     }
@@ -224,8 +225,8 @@ impl TelegramCutter {
     }
 
     /// Takes an octet that was read at this time, in nanoseconds.
-    pub fn push(&mut self, nanos: u64, own: Received) {
-        self.waiting.push((nanos, own));
+    pub fn push(&mut self, nanos: u64, received: Received) {
+        self.waiting.push((nanos, received));
     }
 
     /// What has ended until now, with its sender; `None` is a master.
@@ -276,24 +277,24 @@ impl TelegramCutter {
     /// The telegram that begins at a place.
     fn decoded(&self, place: usize) -> Decoded<Telegram, Reason> {
         let octets = self.waiting.iter().skip(place).take(MAX_TELEGRAM);
-        let good = octets.map_while(|(_, own)| own.error.is_none().then_some(own.byte));
+        let good = octets.map_while(|(_, octet)| octet.error.is_none().then_some(octet.byte));
         Telegram::decode(&good.collect::<Vec<_>>())
     }
 
     fn is_good(&self) -> bool {
-        self.waiting.iter().all(|(_, own)| own.error.is_none())
+        self.waiting.iter().all(|(_, octet)| octet.error.is_none())
     }
 
     /// The octets with their times.
     fn placed(&mut self, octets: &[(u64, Received)], idle: u64) -> Vec<LineByte> {
         let count = octets.len() as u64;
-        let read = octets.last().map_or(0, |own| own.0);
+        let read = octets.last().map_or(0, |(nanos, _)| *nanos);
         let least = self.end + self.octet * (idle + count);
         self.end = if self.end == 0 { read } else { read.max(least) };
-        let placed = octets.iter().zip(1..).map(|((_, own), place)| {
+        let placed = octets.iter().zip(1..).map(|((_, received), place)| {
             let nanos = self.end.saturating_sub(self.octet * (count - place));
             let at = Instant::START + Span::from_nanos(nanos);
-            LineByte::seen(at, Some(own.byte), Some(own.byte), own.error)
+            LineByte::seen(at, Some(received.byte), Some(received.byte), received.error)
         });
         placed.collect()
     }
@@ -305,7 +306,7 @@ fn run(octets: &[PacketOctet], octet: Span, pause: u64) -> &[PacketOctet] {
     let longest = (octet * (pause + 1)).as_nanos().saturating_sub(pause + 2);
     let mut pairs = octets.windows(2).take(MAX_TELEGRAM);
     let paused = |two: &[PacketOctet]| two[1].nanos.saturating_sub(two[0].nanos) >= longest;
-    let end = pairs.position(paused).map_or(MAX_TELEGRAM, |own| own + 1);
+    let end = pairs.position(paused).map_or(MAX_TELEGRAM, |last| last + 1);
     &octets[..end.min(octets.len())]
 }
 
@@ -315,7 +316,7 @@ mod tests {
 
     fn senders(octets: &[PacketOctet], octet: Span) -> Vec<Option<u8>> {
         let read = LineRead::of(octets, octet, false);
-        read.octets.into_iter().map(|own| own.0).collect()
+        read.octets.into_iter().map(|(from, _)| from).collect()
     }
 
     const OCTET: Span = Span::from_micros(22);
@@ -351,12 +352,10 @@ mod tests {
                 cutter.push(nanos, Received::good(*byte));
             }
             let cut = cutter.cut(nanos).into_iter();
-            let bytes = |own: &[LineByte]| {
-                own.iter()
-                    .filter_map(|own| own.received)
-                    .collect::<Vec<_>>()
+            let bytes = |octets: &[LineByte]| -> Vec<u8> {
+                octets.iter().filter_map(|octet| octet.received).collect()
             };
-            cut.map(|(from, own)| (from, bytes(&own), own[0].at.since_start().as_nanos()))
+            cut.map(|(from, octets)| (from, bytes(&octets), octets[0].at.since_start().as_nanos()))
                 .collect::<Vec<_>>()
         };
         // All in one portion.
@@ -374,7 +373,7 @@ mod tests {
         assert_eq!(hear(&mut cutter, 36_000_000, &ask[3..]).len(), 1);
         // An octet is missing: the reply that follows shows where the damage ends.
         let damaged = hear(&mut cutter, 50_000_000, &[&ask[..4], reply].concat());
-        let damaged: Vec<_> = damaged.into_iter().map(|own| own.1).collect();
+        let damaged: Vec<_> = damaged.into_iter().map(|(_, bytes)| bytes).collect();
         assert_eq!(damaged, [&ask[..4], reply]);
         assert_eq!(hear(&mut cutter, 60_000_000, &ask[..4]), []);
         assert_eq!(hear(&mut cutter, 79_000_000, &[]), []);

@@ -52,12 +52,12 @@ impl Tape {
     }
 
     fn of_frames(traces: &[Trace]) -> Self {
-        let channels = traces.iter().flat_map(|own| &own.channels);
+        let channels = traces.iter().flat_map(|trace| &trace.channels);
         let frames: Vec<&LineFrame> = channels.flat_map(Channel::frames).collect();
-        let rate: Option<BitRate> = frames.iter().find_map(|own| rate_of(own));
+        let rate: Option<BitRate> = frames.iter().find_map(|frame| rate_of(frame));
         let pieces = frames
             .into_iter()
-            .map(|own| (own.at, 0, Piece::Frame(*own)));
+            .map(|frame| (frame.at, 0, Piece::Frame(*frame)));
         let bits = rate.unwrap_or(BitRate::K500).bits_per_second();
         Self::of_line(Carries::Frames, bits, pieces)
     }
@@ -92,7 +92,7 @@ impl Tape {
     fn of_links(traces: &[Trace], rate: Rate) -> Self {
         let numbered = traces.iter().enumerate();
         let links =
-            numbered.flat_map(|(ring, own)| own.channels.iter().map(move |link| (ring, link)));
+            numbered.flat_map(|(ring, trace)| trace.channels.iter().map(move |link| (ring, link)));
         let place = |(ring, link)| RecordedPlace {
             name: name(ring, link),
             carries: Carries::Link,
@@ -113,9 +113,9 @@ impl Tape {
 
 /// The octets of a shared line, cut into telegrams.
 fn cut(traces: &[Trace], medium: Medium, now: Instant) -> Vec<(Instant, usize, Piece)> {
-    let channels = traces.iter().flat_map(|own| &own.channels);
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
     let mut octets: Vec<_> = channels.flat_map(Channel::octets).collect();
-    octets.sort_by_key(|own| own.at);
+    octets.sort_by_key(|octet| octet.at);
     let mut cutter = TelegramCutter::new(medium.octet_time());
     let mut ended = Vec::new();
     for octet in octets {

@@ -19,17 +19,17 @@ pub(super) fn assemble(
     mut found: Vec<(Option<u8>, PacketOctet)>,
     octet: Span,
 ) -> Capture {
-    found.sort_by_key(|(_, own)| own.nanos);
-    let first = found.first().map_or(0, |(_, own)| own.nanos);
+    found.sort_by_key(|(_, octet)| octet.nanos);
+    let first = found.first().map_or(0, |(_, octet)| octet.nanos);
     let base = match first {
         DAY.. => first.saturating_sub(octet.as_nanos()),
         _ => 0,
     };
     let mut sent: BTreeMap<Option<u8>, Vec<LineByte>> = BTreeMap::from([(None, Vec::new())]);
-    sent.extend(stations.map(|own| (own, Vec::new())));
-    for (from, own) in found {
-        let octet = line_byte(own.nanos - base, own.sent, own.received, own.error);
-        sent.entry(from).or_default().push(octet);
+    sent.extend(stations.map(|station| (station, Vec::new())));
+    for (from, octet) in found {
+        let byte = line_byte(octet.nanos - base, octet.sent, octet.received, octet.error);
+        sent.entry(from).or_default().push(byte);
     }
     let slaves = u8::try_from(sent.len() - 1).unwrap_or(u8::MAX);
     let channels = sent.into_iter();
@@ -75,10 +75,10 @@ impl OctetObject {
         }
         let from = match &self.from {
             serde_json::Value::String(name) if name == MASTER => None,
-            own => {
-                let address = own.as_u64().and_then(|own| u8::try_from(own).ok());
+            other => {
+                let address = other.as_u64().and_then(|number| u8::try_from(number).ok());
                 Some(address.ok_or_else(|| {
-                    format!("`{own}` is no station: `{MASTER}` or an address expected")
+                    format!("`{other}` is no station: `{MASTER}` or an address expected")
                 })?)
             }
         };
@@ -87,7 +87,7 @@ impl OctetObject {
             (Some(_), Some(name)) => Some(
                 ERRORS
                     .into_iter()
-                    .find(|own| own.name() == name)
+                    .find(|error| error.name() == name)
                     .ok_or_else(|| format!("`{name}` is no error of a line"))?,
             ),
             (None, _) => return Err("nothing was received, so it was dropped".to_owned()),
@@ -118,8 +118,8 @@ pub(super) fn json(bytes: &[u8]) -> Result<Capture, CaptureError> {
         place: format!("line {}, column {}", error.line(), error.column()),
         what: format!("{error}"),
     })?;
-    let octets = object.bytes.iter().enumerate().map(|(number, own)| {
-        own.read().map_err(|what| CaptureError::Link {
+    let octets = object.bytes.iter().enumerate().map(|(number, byte)| {
+        byte.read().map_err(|what| CaptureError::Link {
             place: format!("byte {}", number + 1),
             what,
         })

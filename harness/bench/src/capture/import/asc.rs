@@ -63,9 +63,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
                 what: format!("{shown:?}: {what}"),
             }
         })?;
-        log.frames.extend(read.map(|own| Logged {
+        log.frames.extend(read.map(|logged| Logged {
             place: reader.place,
-            ..own
+            ..logged
         }));
     }
     Ok(log)
@@ -126,11 +126,11 @@ impl Reader {
     /// A frame by its identifier or name, and what stands behind `d` or `r`.
     fn classic(&self, name: &str, remote: bool, rest: &[&str]) -> Result<What, String> {
         // A name may look like a number.
-        let stated = rest.windows(3).find_map(|own| match own {
+        let stated = rest.windows(3).find_map(|words| match words {
             ["ID", "=", id] => Some(*id),
             _ => None,
         });
-        let (text, radix) = stated.map_or((name, self.radix), |own| (own, 10));
+        let (text, radix) = stated.map_or((name, self.radix), |id| (id, 10));
         let (digits, extended) = match text.strip_suffix('x') {
             Some(digits) => (digits, true),
             None => (text, false),
@@ -144,7 +144,7 @@ impl Reader {
         })?;
         // The length of a remote frame may be missing in old logs.
         let length = rest.first();
-        let length = length.and_then(|own| usize::from_str_radix(own, 16).ok());
+        let length = length.and_then(|digits| usize::from_str_radix(digits, 16).ok());
         let length = match (remote, length) {
             (_, Some(length)) => length,
             (true, None) => 0,
@@ -178,12 +178,12 @@ fn with_flags(words: &[&str]) -> Result<What, String> {
         None => (id, false),
     };
     let flags = rest.get(length.saturating_add(2));
-    let flags = flags.and_then(|own| u32::from_str_radix(own, 16).ok());
+    let flags = flags.and_then(|text| u32::from_str_radix(text, 16).ok());
     match flags {
         Some(flags) if flags & FD == 0 && *switch == "0" && length <= 8 => {
             let id = (identifier(digits, 16)?, Some(extended));
-            let own = frame(id, flags & REMOTE != 0, length, rest, 16)?;
-            Ok(What::Frame(own))
+            let frame = frame(id, flags & REMOTE != 0, length, rest, 16)?;
+            Ok(What::Frame(frame))
         }
         _ => Ok(What::Fd),
     }

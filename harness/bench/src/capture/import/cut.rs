@@ -28,7 +28,7 @@ pub(super) fn whole_part(
     if parts == Parts::Blocks {
         return Ok((Cow::Borrowed(bytes), Vec::new()));
     }
-    let last = bytes.iter().rposition(|own| *own != 0);
+    let last = bytes.iter().rposition(|byte| *byte != 0);
     let (text, zeros) = bytes.split_at(last.map_or(0, |last| last + 1));
     let mut notes = Vec::new();
     if !zeros.is_empty() {
@@ -65,7 +65,7 @@ pub(super) fn whole_part(
 
 /// The lines that have an end, and how many bytes are behind them.
 fn lines(text: &[u8]) -> Result<(&[u8], usize), CaptureError> {
-    let end = text.iter().rposition(|own| matches!(own, b'\n' | b'\r'));
+    let end = text.iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
     let (whole, rest) = text.split_at(end.map_or(0, |last| last + 1));
     if whole.is_empty() {
         return Err(CaptureError::Link {
@@ -80,7 +80,7 @@ fn lines(text: &[u8]) -> Result<(&[u8], usize), CaptureError> {
 /// The objects of a list that are whole, as a text of JSON, and how many bytes are behind them. What follows an object shows that it is whole.
 fn objects(text: &[u8]) -> (Cow<'_, [u8]>, usize) {
     let parsed = serde_json::from_slice::<serde::de::IgnoredAny>(text);
-    let between = text.windows(3).rposition(|own| own == b"},{");
+    let between = text.windows(3).rposition(|window| window == b"},{");
     match (parsed, between) {
         (Err(error), Some(last)) if error.is_eof() => {
             let (whole, rest) = text.split_at(last + 1);
@@ -123,7 +123,7 @@ mod tests {
     fn read(text: &[u8]) -> (Vec<String>, Vec<String>) {
         let read = read_with(text, &ReadSettings::default()).expect("a capture");
         let frames = read.capture.traces[0].channels[0].frames();
-        let frames = frames.iter().map(|own| own.frame.to_string()).collect();
+        let frames = frames.iter().map(|frame| frame.frame.to_string()).collect();
         (frames, read.notes)
     }
 

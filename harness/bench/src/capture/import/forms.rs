@@ -50,8 +50,8 @@ pub(super) const CANHACKER: Form = Form {
 /// The words of the first line that is not empty.
 fn begins(bytes: &[u8], words: &[&str]) -> bool {
     let first = first_line(bytes.trim_ascii_start());
-    let mut own = first.split_whitespace();
-    words.iter().all(|word| own.next() == Some(word))
+    let mut parts = first.split_whitespace();
+    words.iter().all(|word| parts.next() == Some(word))
 }
 
 pub(super) fn is_trc(bytes: &[u8]) -> bool {
@@ -90,7 +90,7 @@ pub(super) fn is_canhacker(bytes: &[u8]) -> bool {
 
 /// The number of data bytes, or a length code.
 fn stated(text: &str) -> Result<usize, String> {
-    let number = text.parse().ok().filter(|own| *own <= 64);
+    let number = text.parse().ok().filter(|length| *length <= 64);
     number.ok_or_else(|| format!("`{text}` is no length of the data"))
 }
 
@@ -117,11 +117,11 @@ fn trc(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
     // Version 1.0 has no line that says so.
     let columns = match state.columns.as_str() {
         "" => "NOIlD",
-        own => own,
+        columns => columns,
     };
-    let place = |letter: char| columns.chars().position(|own| own == letter);
+    let place = |letter: char| columns.chars().position(|column| column == letter);
     let word = |letter| place(letter).and_then(|at| words.get(at).copied());
-    let at = word('O').and_then(|own| seconds(&format!("{own}e-3")));
+    let at = word('O').and_then(|text| seconds(&format!("{text}e-3")));
     let at = at.ok_or("a time in milliseconds is expected")?;
     let kind = word('T').or_else(|| word('d')).unwrap_or("Rx");
     let channel = word('B').unwrap_or_default();
@@ -144,8 +144,8 @@ fn trc(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
         .unwrap_or_default();
     let remote = remote || data.first() == Some(&"RTR");
     let id = (number, Some(id.len() > 4));
-    let own = frame(id, remote, stated(length)?, data, 16)?;
-    Ok(Some(logged(channel, Some(at), What::Frame(own))))
+    let frame = frame(id, remote, stated(length)?, data, 16)?;
+    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
 }
 
 fn gvret(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
@@ -153,7 +153,8 @@ fn gvret(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
         line.clone_into(&mut state.columns);
         return Ok(None);
     }
-    let place = |name: &str| state.columns.split(',').position(|own| own.trim() == name);
+    let columns: Vec<&str> = state.columns.split(',').map(str::trim).collect();
+    let place = |name: &str| columns.iter().position(|column| *column == name);
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let field = |name| {
         place(name)
@@ -192,11 +193,11 @@ fn busmaster(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
     let at = match parts.as_slice() {
         [hours, minutes, second, part] => {
             let whole = |text: &str| text.parse::<u8>().ok().map(Time::from);
-            let own = seconds(&format!("{second}.{part}"));
+            let seconds = seconds(&format!("{second}.{part}"));
             whole(hours)
                 .zip(whole(minutes))
-                .zip(own)
-                .map(|((hours, minutes), own)| (hours * 60 + minutes) * 60 * SECOND + own)
+                .zip(seconds)
+                .map(|((hours, minutes), seconds)| (hours * 60 + minutes) * 60 * SECOND + seconds)
         }
         _ => None,
     };
@@ -209,21 +210,21 @@ fn busmaster(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
         "xr" => (true, true),
         _ => return Err(format!("`{kind}` is no type: s, x, sr or xr expected")),
     };
-    let own = frame(
+    let frame = frame(
         (number, Some(extended)),
         remote,
         stated(length)?,
         data,
         state.radix,
     )?;
-    Ok(Some(logged(channel, Some(at), What::Frame(own))))
+    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
 }
 
 /// The bus of `2R11`, and whether identifiers have 29 bits.
 fn crtd_kind(kind: &str) -> Option<(&str, bool)> {
     let split = kind.find(['R', 'T'])?;
     let (bus, kind) = kind.split_at(split);
-    let digits = bus.bytes().all(|own| own.is_ascii_digit());
+    let digits = bus.bytes().all(|digit| digit.is_ascii_digit());
     match kind {
         "R11" | "T11" if digits => Some((bus, false)),
         "R29" | "T29" if digits => Some((bus, true)),
@@ -250,25 +251,25 @@ fn crtd(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
     if data.len() > 8 {
         return Err("at most 8 data bytes are expected".to_owned());
     }
-    let own = frame(id, false, data.len(), data, 16)?;
-    Ok(Some(logged(bus, Some(at), What::Frame(own))))
+    let frame = frame(id, false, data.len(), data, 16)?;
+    Ok(Some(logged(bus, Some(at), What::Frame(frame))))
 }
 
 fn printed(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let behind = |name: &str| {
-        let at = words.iter().position(|own| *own == name)?;
+        let at = words.iter().position(|word| *word == name)?;
         words.get(at + 1..)
     };
-    let first = |name: &str| behind(name).and_then(|own| own.first().copied());
+    let first = |name: &str| behind(name).and_then(|words| words.first().copied());
     let (Some(time), Some(id), Some([length, data @ ..])) =
         (first("Timestamp:"), first("ID:"), behind("DL:"))
     else {
         return Err("Timestamp, ID and DL are expected".to_owned());
     };
     let at = seconds(time).ok_or("a time in seconds is expected")?;
-    let flags = words.iter().take_while(|own| **own != "DL:");
-    let has = |flag: &str| flags.clone().any(|own| *own == flag);
+    let flags = words.iter().take_while(|word| **word != "DL:");
+    let has = |flag: &str| flags.clone().any(|word| *word == flag);
     let what = if has("E") {
         What::Error
     } else if has("F") {
@@ -295,21 +296,21 @@ fn kvaser(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
     }
     let number = identifier(id, 16)?;
     // Flags may stand in front of the length.
-    let is_length = |own: &&str| own.len() == 1 && own.as_bytes()[0].is_ascii_digit();
+    let is_length = |word: &&str| word.len() == 1 && word.as_bytes()[0].is_ascii_digit();
     let start = rest.iter().position(is_length).unwrap_or(rest.len());
     let [length, data @ ..] = &rest[start..] else {
         return Err("a length is expected".to_owned());
     };
     let remote = rest[..start].contains(&"R");
     // The file does not say its radix: with it in decimal, identifiers and bytes are not filled up with zeros.
-    if id.len() < 8 || data.iter().any(|own| own.len() != 2) {
+    if id.len() < 8 || data.iter().any(|byte| byte.len() != 2) {
         return Err(
             "the log is not in hexadecimal; save it with hexadecimal identifiers and data"
                 .to_owned(),
         );
     }
-    let own = frame((number, None), remote, stated(length)?, data, 16)?;
-    Ok(Some(logged(channel, Some(at), What::Frame(own))))
+    let frame = frame((number, None), remote, stated(length)?, data, 16)?;
+    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
 }
 
 fn canhacker(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
@@ -321,12 +322,12 @@ fn canhacker(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
         return Ok(None);
     }
     let at = seconds(time).ok_or("a time in seconds is expected")?;
-    let own = frame(
+    let frame = frame(
         (identifier(id, 16)?, None),
         false,
         stated(length)?,
         data,
         16,
     )?;
-    Ok(Some(logged("", Some(at), What::Frame(own))))
+    Ok(Some(logged("", Some(at), What::Frame(frame))))
 }

@@ -20,7 +20,7 @@ fn damaged_files(rounds: usize) {
     let changes = drawn(&many()[..20], Parity::Odd, 1);
     let times: Vec<f64> = changes[1..]
         .iter()
-        .map(|own| own.0 as f64 / 38_400.0)
+        .map(|(at, _)| *at as f64 / 38_400.0)
         .collect();
     let vcd = "$timescale 1 us $end $var wire 1 ! 1->0 $end $enddefinitions $end #0 1! #5 0! #400 1! #500 b0 ! #900 1! ";
     let files: Vec<Vec<u8>> = vec![

@@ -87,7 +87,7 @@ mod tests {
             assert!(levels.push(at, level));
         }
         assert!(!levels.push(2, Level::High));
-        let at: Vec<_> = levels.changes().iter().map(|own| own.at).collect();
+        let at: Vec<_> = levels.changes().iter().map(|change| change.at).collect();
         assert_eq!(at, [0, 3]);
     }
 }

@@ -46,7 +46,7 @@ impl ChannelTarget {
             Self::named(&name.replace("_to_", "->").replace("ring2_", "2:"))
         };
         let named = Self::named(name).or_else(plain);
-        named.filter(|own| *own != Self::Ring)
+        named.filter(|target| *target != Self::Ring)
     }
 }
 
@@ -117,8 +117,8 @@ fn wrong(what: String) -> CaptureError {
 
 fn listed(channels: &[ChannelRead]) -> String {
     const SHOWN: usize = 12;
-    let names = channels.iter().filter_map(|own| own.names.first());
-    let mut shown: Vec<String> = names.take(SHOWN).map(|own| format!("`{own}`")).collect();
+    let names = channels.iter().filter_map(|channel| channel.names.first());
+    let mut shown: Vec<String> = names.take(SHOWN).map(|name| format!("`{name}`")).collect();
     if channels.len() > SHOWN {
         shown.push(format!("{} more", channels.len() - SHOWN));
     }
@@ -128,8 +128,8 @@ fn listed(channels: &[ChannelRead]) -> String {
 /// The place of the channel of a name.
 fn only_one(name: &String, channels: &[ChannelRead]) -> Result<Option<usize>, CaptureError> {
     let named = channels.iter().enumerate();
-    let mut named = named.filter(|(_, own)| own.names.contains(name));
-    let first = named.next().map(|own| own.0);
+    let mut named = named.filter(|(_, channel)| channel.names.contains(name));
+    let first = named.next().map(|(place, _)| place);
     let Some((_, second)) = named.next() else {
         return Ok(first);
     };
@@ -148,42 +148,42 @@ fn choose(
     notes: &mut Vec<String>,
 ) -> Result<Vec<Chosen>, CaptureError> {
     let mut targets: Vec<Option<ChannelTarget>> = vec![None; channels.len()];
-    for own in &settings.links {
-        if own.target == ChannelTarget::Ring {
+    for link in &settings.links {
+        if link.target == ChannelTarget::Ring {
             return Err(wrong(
                 "`--link ring` chooses a part of a pcapng file; `--link 98->97=CHANNEL` expected for a channel".to_owned(),
             ));
         }
-        let place = match &own.channel {
+        let place = match &link.channel {
             Some(name) => only_one(name, &channels)?,
             None if channels.len() == 1 => Some(0),
             None => {
                 let names = listed(&channels);
                 return Err(wrong(format!(
                     "`--link {}` does not say which channel of {names} it is: `--link {}=CHANNEL` expected",
-                    own.link, own.link
+                    link.link, link.link
                 )));
             }
         };
         let Some(place) = place else {
-            let name = own.channel.as_deref().unwrap_or_default();
+            let name = link.channel.as_deref().unwrap_or_default();
             let names = listed(&channels);
             return Err(wrong(format!(
                 "no channel is named `{name}`; the file has {names}"
             )));
         };
-        targets[place] = Some(own.target);
+        targets[place] = Some(link.target);
     }
     if settings.links.is_empty() {
         for (channel, target) in channels.iter().zip(&mut targets) {
             *target = channel
                 .names
                 .iter()
-                .find_map(|own| ChannelTarget::of_channel(own));
+                .find_map(|name| ChannelTarget::of_channel(name));
         }
     }
     if targets.iter().all(Option::is_none) {
-        let name = channels.first().and_then(|own| own.names.first());
+        let name = channels.first().and_then(|channel| channel.names.first());
         let name = name.map_or("CHANNEL", String::as_str);
         return Err(wrong(format!(
             "none of {} is named as a link; say which link a channel is, as in `--link \"98->97={name}\"`, or as in `--link \
@@ -195,7 +195,7 @@ fn choose(
     let mut left = Vec::new();
     for (channel, target) in channels.drain(..).zip(targets) {
         match target {
-            Some(target) if chosen.iter().any(|own| own.target == target) => {
+            Some(target) if chosen.iter().any(|known| known.target == target) => {
                 let names = channel.names.first().cloned().unwrap_or_default();
                 return Err(wrong(format!(
                     "`{names}` is the second channel of the same link; one expected"
@@ -240,7 +240,7 @@ fn format(
     };
     let lines: Vec<&Levels> = chosen
         .iter()
-        .filter_map(|own| match &own.channel.signal {
+        .filter_map(|line| match &line.channel.signal {
             Signal::Levels(levels) => Some(levels),
             Signal::Octets(_) | Signal::Other(_) => None,
         })
@@ -251,20 +251,20 @@ fn format(
         return Ok(uart);
     }
     // The slowest rate at which no octet begins before the one in front of it has ended; a tenth for clocks that differ.
-    let starts = chosen.iter().filter_map(|own| match &own.channel.signal {
+    let starts = chosen.iter().filter_map(|line| match &line.channel.signal {
         Signal::Octets(octets) => Some(octets.windows(2)),
         Signal::Levels(_) | Signal::Other(_) => None,
     });
     let gaps = starts.flatten().map(|two| two[1].start - two[0].start);
     let closest = gaps.filter(|gap| *gap > 0).min().unwrap_or(Time::MAX);
-    let fits = |own: &&Format| own.octet_time().units() / 10 * 9 <= closest.cast_unsigned();
+    let fits = |format: &&Format| format.octet_time().units() / 10 * 9 <= closest.cast_unsigned();
     let mut fitting: Vec<&Format> = formats.iter().filter(fits).collect();
-    fitting.sort_by_key(|own| own.bits_per_second);
+    fitting.sort_by_key(|format| format.bits_per_second);
     // A line with pauses everywhere says little: the bus's usual rate then.
-    let usual = fitting.iter().find(|own| ***own == formats[0]);
-    let near = |own: &&&Format| own.octet_time().units() / 10 * 11 >= closest.cast_unsigned();
+    let usual = fitting.iter().find(|format| ***format == formats[0]);
+    let near = |format: &&&Format| format.octet_time().units() / 10 * 11 >= closest.cast_unsigned();
     let found = fitting.iter().find(near).or(usual).or(fitting.first());
-    let format = found.map_or(formats[0], |own| **own);
+    let format = found.map_or(formats[0], |format| **format);
     Ok(UartFormat {
         format,
         inverted: false,
@@ -275,13 +275,13 @@ fn format(
 fn too_few_samples(chosen: &[Chosen], uart: UartFormat) -> Option<String> {
     const LEAST: i64 = 4;
     let bit = 3_000_000_000 / i64::from(uart.format.bits_per_second).max(1);
-    let samples = chosen.iter().filter_map(|own| match &own.channel.signal {
+    let samples = chosen.iter().filter_map(|line| match &line.channel.signal {
         Signal::Levels(levels) => levels.sample,
         Signal::Octets(_) | Signal::Other(_) => None,
     });
     let sample = samples
         .max()
-        .filter(|own| own.saturating_mul(LEAST) > bit)?;
+        .filter(|sample| sample.saturating_mul(LEAST) > bit)?;
     let tenths = bit * 10 / sample.max(1);
     Some(format!(
         "the line was sampled {}.{} times a bit, and octets may be read wrong: sample at least {LEAST} times a bit, {} samples a second",
@@ -301,12 +301,12 @@ pub(super) fn settle(
     mut notes: Vec<String>,
 ) -> Result<Imported, CaptureError> {
     let chosen = choose(channels, settings, &mut notes)?;
-    let of_ring = |own: &Chosen| matches!(own.target, ChannelTarget::Link(..));
+    let of_ring = |line: &Chosen| matches!(line.target, ChannelTarget::Link(..));
     let (links, all) = (
-        chosen.iter().filter(|own| of_ring(own)).count(),
+        chosen.iter().filter(|line| of_ring(line)).count(),
         chosen.len(),
     );
-    let bus = chosen.iter().any(|own| own.target == ChannelTarget::Bus);
+    let bus = chosen.iter().any(|line| line.target == ChannelTarget::Bus);
     if (links != 0 && links != all) || (bus && all > 1) {
         return Err(wrong(
             "links of a ring, stations of a shared line, or one `bus` are expected, and not several of these: import them one after the other"
@@ -319,17 +319,17 @@ pub(super) fn settle(
     notes.extend(too_few_samples(&chosen, uart));
     let lines: Vec<(ChannelTarget, Vec<OctetRead>)> = chosen
         .into_iter()
-        .map(|own| {
-            let octets = match own.channel.signal {
+        .map(|line| {
+            let octets = match line.channel.signal {
                 Signal::Levels(levels) => decode(&levels, uart, usize::MAX),
                 Signal::Octets(octets) => octets,
                 Signal::Other(_) => Vec::new(),
             };
-            (own.target, octets)
+            (line.target, octets)
         })
         .collect();
-    let starts = lines.iter().flat_map(|(_, own)| own);
-    let first = starts.map(|own| own.start).min().unwrap_or(0);
+    let starts = lines.iter().flat_map(|(_, octets)| octets);
+    let first = starts.map(|octet| octet.start).min().unwrap_or(0);
     let base = match first {
         0.. if Span::from_units(first.cast_unsigned()).as_nanos() <= DAY => 0,
         _ => first,
@@ -345,12 +345,12 @@ pub(super) fn settle(
         let mut stations = Vec::new();
         let mut unread = None;
         for (target, octets) in lines {
-            let read = |own: OctetRead| {
+            let read = |octet: OctetRead| {
                 Ok(PacketOctet {
-                    nanos: nanos(own.start).ok_or_else(late)?,
-                    sent: Some(own.byte),
-                    received: Some(own.byte),
-                    error: own.error,
+                    nanos: nanos(octet.start).ok_or_else(late)?,
+                    sent: Some(octet.byte),
+                    received: Some(octet.byte),
+                    error: octet.error,
                 })
             };
             let octets: Vec<PacketOctet> = octets
@@ -358,9 +358,9 @@ pub(super) fn settle(
                 .map(read)
                 .collect::<Result<_, CaptureError>>()?;
             match target {
-                ChannelTarget::Station(own) => {
-                    stations.push(own);
-                    all.extend(octets.into_iter().map(|octet| (own, octet)));
+                ChannelTarget::Station(station) => {
+                    stations.push(station);
+                    all.extend(octets.into_iter().map(|octet| (station, octet)));
                 }
                 ChannelTarget::Bus | ChannelTarget::Ring | ChannelTarget::Link(..) => {
                     let read = LineRead::of(&octets, octet, false);
@@ -383,9 +383,9 @@ pub(super) fn settle(
             continue;
         };
         let link = assembly.link(ring, from, to);
-        for own in octets {
-            let (at, byte) = (nanos(own.start).ok_or_else(late)?, Some(own.byte));
-            link.bytes.push(line_byte(at, byte, byte, own.error));
+        for octet in octets {
+            let (at, byte) = (nanos(octet.start).ok_or_else(late)?, Some(octet.byte));
+            link.bytes.push(line_byte(at, byte, byte, octet.error));
         }
     }
     let rate = Rate::from_bits_per_second(uart.format.bits_per_second);

@@ -16,7 +16,7 @@ const ASC: &str =
 
 /// Each with a name, its text, and how exact its times are, in microseconds; `None` for one without times.
 fn logs() -> Vec<(&'static str, String, Option<u64>)> {
-    let own = |name, text: &str, exact| (name, text.to_owned(), exact);
+    let log = |name, text: &str, exact| (name, text.to_owned(), exact);
     let screen = |times: [&str; 4]| {
         let rest = [
             "201   [3]  3D 30 00",
@@ -31,7 +31,7 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
         lines.collect::<String>()
     };
     vec![
-        own(
+        log(
             "headings, comments and tabs",
             "*** Team 9\r\n*** Lap\r\n\r\n# warm\n\r(1718000000.000100)\tcan0\t201#3D3000\n(1718000000.000500) can0 181#30CD0C00\n# cold\n\
              (1718000000.100100) can0 201#3D3000 T\n(1718000000.100500) can0 181#30CC0C00 R\n^C\npi@box7:~$ \n",
@@ -79,60 +79,60 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
             ]),
             None,
         ),
-        own(
+        log(
             "screen -x -a -c -i",
             "\x1b[31m  can0  TX - -  201\x1b[0m   [3]  3D 30 00                  '=0.'\n  can0  RX - -  181   [4]  30 CD 0C 00\n\
              \u{20} can0  201   [3]  00111101 00110000 00000000\n  can0  181   [4]  30 CC 0C 00\n^C\n",
             None,
         ),
-        own(
+        log(
             "frames alone",
             "can0 201#3D3000\ncan0 181#30CD0C00\ncan0 201#3D3000\ncan0 181#30CC0C00\n",
             None,
         ),
-        own(
+        log(
             "TRC 1.0",
             ";####\n;   C:\\a.trc\n;    PCAN-Net: X\n;----+- ---+--- ----+--- +- -+ --\n     1)      0  0201 3  3D 30 00\n     2)      0  FFFFFFFF 4 00 00 00 04 -- -- -- -- BUSLIGHT\n\
              \u{20}    3)      0  0181 4  30 CD 0C 00\n     4)    100  0201 3  3D 30 00\n     5)    100  0181 4  30 CC 0C 00\n",
             Some(1_000),
         ),
-        own(
+        log(
             "TRC 1.1",
             ";$FILEVERSION=1.1\n;$STARTTIME=46176.4\n     1)         2.0  Tx     0201  3  3D 30 00\n     2)         2.4  Rx     0181  4  30 CD 0C 00\n\
              \u{20}    3)         9.0  Warng  FFFFFFFF  4  00 00 00 08  BUSHEAVY\n     4)       102.0  Tx     0201  3  3D 30 00\n     5)       102.4  Rx     0181  4  30 CC 0C 00\n",
             Some(100),
         ),
-        own(
+        log(
             "TRC 1.2",
             ";$FILEVERSION=1.2\n;$STARTTIME=46176.4\n     1)         2.000 1  Tx     0201  3  3D 30 00\n     2)         2.400 1  Rx     0181  4  30 CD 0C 00\n\
              \u{20}    3)       102.000 1  Tx     0201  3  3D 30 00\n     4)       102.400 1  Rx     0181  4  30 CC 0C 00\n",
             Some(1),
         ),
-        own(
+        log(
             "TRC 1.3",
             ";$FILEVERSION=1.3\n;$STARTTIME=46176.4\n     1)         2.000 1  Tx     0201 -  3    3D 30 00\n     2)         2.400 1  Rx     0181 -  4    30 CD 0C 00\n\
              \u{20}    3)       102.000 1  Tx     0201 -  3    3D 30 00\n     4)       102.400 1  Rx     0181 -  4    30 CC 0C 00\n",
             Some(1),
         ),
-        own(
+        log(
             "TRC 2.0",
             ";$FILEVERSION=2.0\n;$STARTTIME=46176.4\n;$COLUMNS=N,O,T,I,d,l,D\n      1         2.000 DT     0201 Tx 3  3D 30 00\n      2         2.400 DT     0181 Rx 4  30 CD 0C 00\n\
              \u{20}     3         3.000 ST          Rx    00 00 00 08\n      4       102.000 DT     0201 Tx 3  3D 30 00\n      5       102.400 DT     0181 Rx 4  30 CC 0C 00\n",
             Some(1),
         ),
-        own(
+        log(
             "TRC 2.1",
             ";$FILEVERSION=2.1\n;$STARTTIME=46176.4\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n      1         2.000 DT 1      0201 Tx -  3    3D 30 00\n      2         2.400 DT 1      0181 Rx -  4    30 CD 0C 00\n\
              \u{20}     3       102.000 DT 1      0201 Tx -  3    3D 30 00\n      4       102.400 DT 1      0181 Rx -  4    30 CC 0C 00\n",
             Some(1),
         ),
-        own(
+        log(
             "GVRET",
             "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n5000,00000201,false,Tx,0,3,3D,30,00,\n5400,00000181,false,Rx,0,4,30,CD,0C,00,\n\
              105000,00000201,false,Tx,0,3,3D,30,00,\n105400,00000181,false,Rx,0,4,30,CC,0C,00,\n",
             Some(1),
         ),
-        own(
+        log(
             "GVRET without a direction",
             "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n5000,201,false,0,3,3D,30,00\n5400,181,false,0,4,30,CD,0C,00\n\
              105000,201,false,0,3,3D,30,00\n105400,181,false,0,4,30,CC,0C,00\n",
@@ -156,13 +156,13 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
             ),
             Some(100),
         ),
-        own(
+        log(
             "CRTD",
             "1718000000.000 CXX a log\n1718000000.000100 1T11 201 3D 30 00\n1718000000.000500 1R11 181 30 CD 0C 00\n1718000000.050000 1CEV a lap\n\
              1718000000.100100 1T11 201 3D 30 00\n1718000000.100500 1R11 181 30 CC 0C 00\n",
             Some(1),
         ),
-        own(
+        log(
             "python-can's text",
             "Timestamp: 1718000000.000100    ID:      201    S Tx                DL:  3    3d 30 00                    Channel: can0\n\
              Timestamp: 1718000000.000500    ID:      181    S Rx                DL:  4    30 cd 0c 00                 Channel: can0\n\
@@ -170,14 +170,14 @@ fn logs() -> Vec<(&'static str, String, Option<u64>)> {
              Timestamp: 1718000000.100500    ID:      181    S Rx                DL:  4    30 cc 0c 00                 Channel: can0\n",
             Some(1),
         ),
-        own(
+        log(
             "Kvaser",
             "Chn Identifier Flg   DLC  D0...1...2...3...4...5...6..D7       Time     Dir\n 0    00000201         3  3D  30  00                           1.000000 T\n \
              0    00000181         4  30  CD  0C  00                       1.000400 R\n 0    00000201         3  3D  30  00                           1.100000 T\n \
              0    00000181         4  30  CC  0C  00                       1.100400 R\n",
             Some(1),
         ),
-        own(
+        log(
             "CANHacker over a minute",
             "Time   ID     DLC Data                    Comment\n59,950000 201 3 3D 30 00 \n59,950400 181 4 30 CD 0C 00 \n00,050000 201 3 3D 30 00 \n00,050400 181 4 30 CC 0C 00 \n",
             Some(1),
@@ -207,9 +207,9 @@ fn read(text: &str, links: &[&str]) -> Result<Imported, String> {
     read_with(text.as_bytes(), &settings(links)).map_err(|error| error.to_string())
 }
 
-fn shown(own: &Imported) -> Vec<String> {
-    let frames = own.capture.traces[0].channels[0].frames().iter();
-    frames.map(|own| own.frame.to_string()).collect()
+fn shown(imported: &Imported) -> Vec<String> {
+    let frames = imported.capture.traces[0].channels[0].frames().iter();
+    frames.map(|frame| frame.frame.to_string()).collect()
 }
 
 #[test]
@@ -268,8 +268,8 @@ fn a_frame_of_can_fd_on_another_channel_does_not_matter() {
     let trc = ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n 1 1.0 DT can0 0201 Rx - 3 3D 30 00\n 2 2.0 FB can1 0123 Rx - 9 01 02\n";
     let gvret = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,201,false,Rx,can0,3,3D,30,00\n2,123,false,Rx,can1,12,1,2,3,4,5,6,7,8,9,A,B,C\n";
     for text in [candump, screen, &asc, trc, gvret] {
-        let own = read(text, &["bus=can0"]).unwrap_or_else(|error| panic!("{text}: {error}"));
-        assert_eq!(shown(&own), FRAMES[..1], "{text}");
+        let imported = read(text, &["bus=can0"]).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(shown(&imported), FRAMES[..1], "{text}");
         let error = read(text, &["bus=can1"]).expect_err("a frame of CAN FD");
         assert!(
             error.contains("line ") && error.contains("CAN FD"),
@@ -353,13 +353,10 @@ fn what_cannot_be_is_refused_with_its_line() {
 fn what_stands_behind_the_last_frame_is_counted() {
     let text =
         "```\n> can0  201   [3]  3D 30 00\n> can0  181   [4]  30 CD 0C 00\n```\nroot@box7:~# \n";
-    let own = read(text, &[]).expect("a log");
-    assert_eq!(shown(&own), FRAMES[..2]);
-    assert!(
-        own.notes
-            .iter()
-            .any(|own| own.starts_with("2 lines behind the last frame"))
-    );
+    let imported = read(text, &[]).expect("a log");
+    assert_eq!(shown(&imported), FRAMES[..2]);
+    let mut notes = imported.notes.iter();
+    assert!(notes.any(|note| note.starts_with("2 lines behind the last frame")));
 }
 
 /// Frames that candump has dropped: what differs accuses no drive.
@@ -367,10 +364,10 @@ fn what_stands_behind_the_last_frame_is_counted() {
 fn dropped_frames_are_noted() {
     let text = "  can0  201   [3]  3D 30 00\nDROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 3)\n  can0  20000004   [8]  00 01 00 00 00 00 00 00   ERRORFRAME\n\
                 \tcontroller-problem{rx-overflow}\n  can0  181   [4]  30 CD 0C 00\n";
-    let own = read(text, &[]).expect("a log");
-    assert_eq!(shown(&own), FRAMES[..2]);
-    assert!(own.lost);
-    let notes = own.notes.join("\n");
+    let imported = read(text, &[]).expect("a log");
+    assert_eq!(shown(&imported), FRAMES[..2]);
+    assert!(imported.lost);
+    let notes = imported.notes.join("\n");
     assert!(
         notes.contains("dropped 3") && notes.contains("1 error frame not read"),
         "{notes}"

@@ -72,14 +72,14 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         }
         match (form.line)(&mut state, line) {
             Ok(None) => {}
-            Ok(Some(own)) => {
+            Ok(Some(logged)) => {
                 if let Some((error, _)) = behind {
                     return Err(error);
                 }
                 state.begun = true;
                 log.frames.push(Logged {
                     place: Place::of(number + 1),
-                    ..own
+                    ..logged
                 });
             }
             Err(what) => {
@@ -116,9 +116,9 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
     }
     if state.relative {
         let mut at = 0_i64;
-        for own in &mut log.frames {
-            at = own.at.map_or(at, |own| at.saturating_add(own));
-            own.at = own.at.map(|_| at);
+        for logged in &mut log.frames {
+            at = logged.at.map_or(at, |since| at.saturating_add(since));
+            logged.at = logged.at.map(|_| at);
         }
     }
     if let Some(period) = form.wraps {
@@ -131,14 +131,14 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
 fn begins_a_frame(line: &str, channel: &str) -> bool {
     let line = plain(line);
     let first = line.split_whitespace().next().unwrap_or_default();
-    first == channel || first.starts_with(|own: char| own == '(' || own.is_ascii_digit())
+    first == channel || first.starts_with(|letter: char| letter == '(' || letter.is_ascii_digit())
 }
 
 /// Whether the times on a screen count from the first frame (`-tz`) or each from the one before (`-td`): both begin at 0 and look alike.
 fn settle_times(log: &mut Log, state: &mut State) {
     // A log of as many frames in which each cycle is shorter than the one before has not been seen.
     const ENOUGH: usize = 20;
-    let times: Vec<Time> = log.frames.iter().filter_map(|own| own.at).collect();
+    let times: Vec<Time> = log.frames.iter().filter_map(|logged| logged.at).collect();
     if times.len() < 3 || times[0] != 0 {
         return;
     }
@@ -148,8 +148,8 @@ fn settle_times(log: &mut Log, state: &mut State) {
         let note = "times go back, so each is taken to count from the frame before (candump -td)";
         log.notes.push(note.to_owned());
     } else if times.len() < ENOUGH {
-        for own in &mut log.frames {
-            own.at = None;
+        for logged in &mut log.frames {
+            logged.at = None;
         }
         let note = "whether times count from the first frame or from the one before, so short a log does not show (candump -tz, -td)";
         log.notes.push(note.to_owned());
@@ -158,17 +158,17 @@ fn settle_times(log: &mut Log, state: &mut State) {
 
 /// Times of a clock that begins again after `period`, as times since the first frame.
 fn unwrap_times(frames: &mut [Logged], period: Time) {
-    let first = frames.iter().find_map(|own| own.at).unwrap_or_default();
+    let first = frames.iter().find_map(|logged| logged.at).unwrap_or(0);
     let (mut before, mut added) = (None, first.saturating_neg());
-    for own in frames {
-        let Some(at) = own.at else {
+    for logged in frames {
+        let Some(at) = logged.at else {
             continue;
         };
         if before.is_some_and(|before: Time| before - at > period / 2) {
             added = added.saturating_add(period);
         }
         before = Some(at);
-        own.at = Some(at.saturating_add(added));
+        logged.at = Some(at.saturating_add(added));
     }
 }
 
@@ -204,12 +204,12 @@ pub(super) fn frame(
     if remote {
         return Frame::remote(id, length).map_err(|bad| bad.to_string());
     }
-    let own = bytes.iter().take(length).map(|own| {
-        let digits = own.bytes().all(|digit| digit.is_ascii_alphanumeric());
-        u8::from_str_radix(own, radix).ok().filter(|_| digits)
+    let data = bytes.iter().take(length).map(|text| {
+        let valid = text.bytes().all(|digit| digit.is_ascii_alphanumeric());
+        u8::from_str_radix(text, radix).ok().filter(|_| valid)
     });
-    match own.collect::<Option<Vec<u8>>>() {
-        Some(own) if own.len() == length => Frame::new(id, &own).map_err(|bad| bad.to_string()),
+    match data.collect::<Option<Vec<u8>>>() {
+        Some(data) if data.len() == length => Frame::new(id, &data).map_err(|bad| bad.to_string()),
         _ => Err(format!("{} expected", counted(length, "data byte"))),
     }
 }
@@ -235,7 +235,7 @@ fn plain(line: &str) -> String {
     let mut parts = line.trim_start_matches("> ").split('\x1b');
     let mut plain = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        plain.push_str(part.split_once('m').map_or(part, |own| own.1));
+        plain.push_str(part.split_once('m').map_or(part, |(_, text)| text));
     }
     plain
 }
@@ -248,7 +248,7 @@ fn split_time(line: &str) -> Result<(Option<Time>, Vec<&str>), String> {
     let split = rest.split_once(')').and_then(|(time, rest)| {
         let time = match time.contains('-') {
             true => date(time),
-            false => seconds(time).filter(|own| *own >= 0 && time.contains('.')),
+            false => seconds(time).filter(|at| *at >= 0 && time.contains('.')),
         };
         Some((time?, rest))
     });
@@ -265,10 +265,10 @@ pub(in crate::capture) fn candump_time(line: &str) -> Option<Time> {
 /// Whether words are an interface and a frame in one word.
 fn is_log(words: &[&str]) -> bool {
     let is_frame = |text: &str| {
-        let id = text.split_once('#').map_or("", |own| own.0);
-        matches!(id.len(), 3 | 8) && id.bytes().all(|own| own.is_ascii_hexdigit())
+        let id = text.split_once('#').map_or("", |(id, _)| id);
+        matches!(id.len(), 3 | 8) && id.bytes().all(|digit| digit.is_ascii_hexdigit())
     };
-    let named = |own: &str| own.starts_with(|first: char| first.is_ascii_alphanumeric());
+    let named = |name: &str| name.starts_with(|first: char| first.is_ascii_alphanumeric());
     matches!(words, [name, frame] | [name, frame, "R" | "T"] if named(name) && is_frame(frame))
 }
 
@@ -278,16 +278,15 @@ fn is_screen(words: &[&str]) -> bool {
         .iter()
         .skip(2)
         .take(4)
-        .any(|own| length(own).is_some())
+        .any(|word| length(word).is_some())
 }
 
 /// The length in `[3]`, or the raw length code in `{F}`.
 fn length(word: &str) -> Option<&str> {
-    let square = word.strip_prefix('[').and_then(|own| own.strip_suffix(']'));
-    let curly = || word.strip_prefix('{').and_then(|own| own.strip_suffix('}'));
-    let own = square.or_else(curly)?;
-    let digits = own.bytes().all(|digit| digit.is_ascii_hexdigit());
-    (digits && (1..=3).contains(&own.len())).then_some(own)
+    let within = |open: char, close: char| word.strip_prefix(open)?.strip_suffix(close);
+    let inner = within('[', ']').or_else(|| within('{', '}'))?;
+    let digits = inner.bytes().all(|digit| digit.is_ascii_hexdigit());
+    (digits && (1..=3).contains(&inner.len())).then_some(inner)
 }
 
 fn candump(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
@@ -353,7 +352,7 @@ fn screen(at: Option<Time>, words: &[&str]) -> Result<Logged, String> {
         // candump states the length of a frame of CAN FD with two digits.
         What::Fd
     } else {
-        let binary = rest.first().is_some_and(|own| own.len() == 8);
+        let binary = rest.first().is_some_and(|word| word.len() == 8);
         let remote = rest.first() == Some(&"remote");
         let id = (number, Some(id.len() == 8));
         let length = usize::from_str_radix(stated, 16).unwrap_or(usize::MAX);

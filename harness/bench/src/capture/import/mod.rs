@@ -5,6 +5,7 @@
 //! octets ([`UartFormat`]), whose format is given or found.
 
 pub mod asc;
+pub mod csv;
 pub mod cut;
 pub mod dsview;
 pub mod forms;
@@ -12,7 +13,6 @@ pub mod levels;
 pub mod links;
 pub mod logs;
 pub mod numbers;
-pub mod own;
 pub mod saleae;
 pub mod sigrok;
 pub mod table;
@@ -194,15 +194,15 @@ const FORMATS: [Format; 25] = [
         |bytes| first(bytes) == Some(b'{'),
         |bytes, settings| Ok(json::read(bytes, settings.rate)?.into()),
     ),
-    whole("bytes in csv", own::is_bytes, |bytes, settings| {
-        Ok(own::bytes(bytes, settings.rate)?.into())
+    whole("bytes in csv", csv::is_bytes, |bytes, settings| {
+        Ok(csv::bytes(bytes, settings.rate)?.into())
     })
     .of(Parts::Lines),
-    whole("frames in csv", own::is_frames, |bytes, _| {
-        own::frames(bytes)
+    whole("frames in csv", csv::is_frames, |bytes, _| {
+        csv::frames(bytes)
     })
     .of(Parts::Lines),
-    whole("telegrams in csv", own::is_telegrams, own::telegrams).of(Parts::Lines),
+    whole("telegrams in csv", csv::is_telegrams, csv::telegrams).of(Parts::Lines),
     whole("ASC (Vector)", asc::recognised, |bytes, settings| {
         frames::of_log(asc::read(bytes)?, &settings.links)
     })
@@ -324,9 +324,9 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 
 /// The format of a file. A compressed one may hold its lines as they are, so that it looks like a log.
 fn format(bytes: &[u8]) -> Option<&'static Format> {
-    let foreign = FOREIGN.iter().any(|own| bytes.starts_with(own.0));
+    let foreign = FOREIGN.iter().any(|(magic, _)| bytes.starts_with(magic));
     let mut formats = FORMATS.iter().filter(|_| !foreign);
-    formats.find(|own| (own.recognised)(bytes))
+    formats.find(|format| (format.recognised)(bytes))
 }
 
 /// Whether a file that begins so is to be read as a capture: it is of a format, or it is no text of a scenario either.
@@ -338,7 +338,7 @@ pub(super) fn is_capture(start: &[u8]) -> bool {
     ];
     let word = |line: &str| {
         let word = line.split_whitespace().next();
-        word.is_some_and(|own| SCENARIO.contains(&own) || own.starts_with('@'))
+        word.is_some_and(|word| SCENARIO.contains(&word) || word.starts_with('@'))
     };
     let start = without_mark(start);
     format(start).is_some() || !String::from_utf8_lossy(start).lines().any(word)
@@ -389,13 +389,13 @@ pub(super) fn read_files(
     let Some(first) = kinds.first() else {
         return Err(wrong("none is given".to_owned()));
     };
-    let same = |at: usize| files[..at].iter().any(|own| own.1 == files[at].1);
+    let same = |at: usize| files[..at].iter().any(|(_, bytes)| *bytes == files[at].1);
     let twice = (1..files.len()).find(|at| same(*at));
     let twice = twice.map(|at| format!("{} is given twice", files[at].0));
     let mut notes = Vec::new();
     for ((name, bytes), kind) in files.iter_mut().zip(&kinds) {
         let (whole, cut) = whole_part(without_mark(bytes), kind.parts)?;
-        notes.extend(cut.into_iter().map(|own| format!("{name}: {own}")));
+        notes.extend(cut.into_iter().map(|note| format!("{name}: {note}")));
         *bytes = whole.into_owned();
     }
     match first.reader {
@@ -407,20 +407,17 @@ pub(super) fn read_files(
                         "{name} is of another kind than the first one"
                     )));
                 };
-                let (own, said) = read(bytes, settings)?;
-                let alone = own.len() == 1;
-                channels.extend(own.into_iter().map(|mut own| {
-                    if alone {
-                        own.names.insert(0, name.clone());
-                    }
-                    own
-                }));
+                let (mut found, said) = read(bytes, settings)?;
+                if let [only] = &mut found[..] {
+                    only.names.insert(0, name.clone());
+                }
+                channels.extend(found);
                 notes.extend(said);
             }
             links::settle(channels, settings, notes)
         }
         Reader::Whole(read) if JOINED.contains(&first.name) => {
-            if let Some(other) = kinds.iter().find(|own| own.name != first.name) {
+            if let Some(other) = kinds.iter().find(|kind| kind.name != first.name) {
                 return Err(wrong(format!(
                     "one is a {} and another a {}; files of one format expected",
                     first.name, other.name
@@ -429,7 +426,7 @@ pub(super) fn read_files(
             if let Some(twice) = twice {
                 return Err(wrong(twice));
             }
-            let mut all: Vec<_> = files.iter().map(|own| &own.1[..]).collect();
+            let mut all: Vec<_> = files.iter().map(|(_, bytes)| &bytes[..]).collect();
             if first.parts == Parts::Lines {
                 frames::in_order_of_time(&mut all);
             }
@@ -446,7 +443,7 @@ pub(super) fn read_files(
 
 /// What a file that is not read looks like.
 fn foreign(bytes: &[u8]) -> CaptureError {
-    let known = FOREIGN.iter().find(|own| bytes.starts_with(own.0));
+    let known = FOREIGN.iter().find(|(magic, _)| bytes.starts_with(magic));
     let line = table::first_line(bytes).trim();
     let text = !line.is_empty() && !line.chars().any(char::is_control);
     let looks = match known {
@@ -462,7 +459,7 @@ fn foreign(bytes: &[u8]) -> CaptureError {
             format!("unknown: it begins with the bytes {}", begins.join(" "))
         }
     };
-    let names: Vec<_> = FORMATS.iter().map(|own| own.name).collect();
+    let names: Vec<_> = FORMATS.iter().map(|format| format.name).collect();
     CaptureError::Foreign {
         looks,
         formats: names.join(", "),

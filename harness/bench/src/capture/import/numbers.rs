@@ -18,7 +18,7 @@ pub(super) fn seconds(text: &str) -> Option<Time> {
         None => (text, 0),
     };
     let (whole, places) = text.split_once(['.', ',']).unwrap_or((text, ""));
-    let digits = |text: &str| text.bytes().all(|own| own.is_ascii_digit());
+    let digits = |text: &str| text.bytes().all(|digit| digit.is_ascii_digit());
     if (whole.is_empty() && places.is_empty()) || !digits(whole) || !digits(places) {
         return None;
     }
@@ -30,7 +30,7 @@ pub(super) fn seconds(text: &str) -> Option<Time> {
         whole => whole.parse().ok()?,
     };
     for place in 0..12 {
-        let digit = places.as_bytes().get(place).map_or(0, |own| own - b'0');
+        let digit = places.as_bytes().get(place).map_or(0, |digit| digit - b'0');
         number = number * 10 + i128::from(digit);
     }
     let power = 10_i128.checked_pow(exponent.unsigned_abs())?;
@@ -59,13 +59,13 @@ pub(super) fn from_float(seconds: f64) -> Option<Time> {
 pub(super) fn date(text: &str) -> Option<Time> {
     let (date, time) = text.trim().split_once(['T', ' '])?;
     let number = |text: &str, digits: usize| {
-        let own = text.len() == digits && text.bytes().all(|own| own.is_ascii_digit());
-        own.then(|| text.parse::<i64>().ok())?
+        let valid = text.len() == digits && text.bytes().all(|digit| digit.is_ascii_digit());
+        valid.then(|| text.parse::<i64>().ok())?
     };
     let mut parts = date.splitn(3, '-');
     let year = number(parts.next()?, 4)?;
-    let month = number(parts.next()?, 2).filter(|own| (1..=12).contains(own))?;
-    let day = number(parts.next()?, 2).filter(|own| (1..=31).contains(own))?;
+    let month = number(parts.next()?, 2).filter(|month| (1..=12).contains(month))?;
+    let day = number(parts.next()?, 2).filter(|day| (1..=31).contains(day))?;
     let zone = time.find(['Z', '+', '-']).unwrap_or(time.len());
     let (time, zone) = time.split_at(zone);
     let (hour, rest) = time.split_once(':')?;
@@ -73,8 +73,8 @@ pub(super) fn date(text: &str) -> Option<Time> {
     let clock = number(hour, 2)? * 3_600 + number(minute, 2)? * 60;
     let away = match zone.split_at_checked(1) {
         None | Some(("Z", "")) => 0,
-        Some((sign, own)) => {
-            let (hours, minutes) = own.split_once(':').or_else(|| own.split_at_checked(2))?;
+        Some((sign, text)) => {
+            let (hours, minutes) = text.split_once(':').or_else(|| text.split_at_checked(2))?;
             let away = number(hours, 2)? * 3_600 + number(minutes, 2)? * 60;
             if sign == "-" { -away } else { away }
         }
@@ -95,12 +95,14 @@ fn days(year: i64, month: i64, day: i64) -> i64 {
 /// A byte in hexadecimal or binary digits: `0x1F`, `0b00011111`. `None` for any other radix: 16 and the character of a byte may look alike.
 pub(super) fn byte(text: &str) -> Option<u8> {
     let text = text.trim();
-    let own = |prefix: [&str; 2], radix| {
-        let digits = prefix.iter().find_map(|own| text.strip_prefix(own))?;
-        let signed = digits.starts_with('+');
-        u8::from_str_radix(digits, radix).ok().filter(|_| !signed)
+    let (prefix, digits) = text.split_at_checked(2)?;
+    let radix = match prefix {
+        "0x" | "0X" => 16,
+        "0b" | "0B" => 2,
+        _ => return None,
     };
-    own(["0x", "0X"], 16).or_else(|| own(["0b", "0B"], 2))
+    let signed = digits.starts_with('+');
+    u8::from_str_radix(digits, radix).ok().filter(|_| !signed)
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ const RADIX: &str = "a byte such as 0x1F is expected; export with radix Hex, sin
 
 fn names(bytes: &[u8]) -> Vec<String> {
     let names = columns(first_line(bytes));
-    names.into_iter().map(|own| own.to_lowercase()).collect()
+    names.into_iter().map(|name| name.to_lowercase()).collect()
 }
 
 fn is_time(name: &str) -> bool {
@@ -25,8 +25,8 @@ fn is_time(name: &str) -> bool {
 /// Whether a file is the text that a serial analyser exports: `Time [s],Value,Parity Error,Framing Error`.
 pub(super) fn is_analyser(bytes: &[u8]) -> bool {
     let names = names(bytes);
-    let has = |name: &str| names.iter().any(|own| own == name);
-    names.first().is_some_and(|own| is_time(own))
+    let has = |name: &str| names.iter().any(|column| column == name);
+    names.first().is_some_and(|name| is_time(name))
         && (has("value") || has("data"))
         && (has("framing error") || has("parity error"))
 }
@@ -34,14 +34,14 @@ pub(super) fn is_analyser(bytes: &[u8]) -> bool {
 /// Whether a file is a table of Logic 2: `name,type,start_time,duration,"data"`.
 pub(super) fn is_data_table(bytes: &[u8]) -> bool {
     let names = names(bytes);
-    let has = |name: &str| names.iter().any(|own| own == name);
+    let has = |name: &str| names.iter().any(|column| column == name);
     has("type") && (has("start_time") || has("start time")) && has("duration")
 }
 
 /// Whether a file has the levels of channels: `Time [s],Channel 0,...`.
 pub(super) fn is_levels(bytes: &[u8]) -> bool {
     let names = names(bytes);
-    names.len() > 1 && names.first().is_some_and(|own| is_time(own)) && !is_analyser(bytes)
+    names.len() > 1 && names.first().is_some_and(|name| is_time(name)) && !is_analyser(bytes)
 }
 
 /// The levels of channels: a row for each change of any of them.
@@ -109,8 +109,8 @@ fn error(text: &str) -> Result<Option<LineError>, String> {
     let text = text.trim().to_lowercase();
     match text.as_str() {
         "" | "false" => Ok(None),
-        own if own.contains("parity") => Ok(Some(LineError::Parity)),
-        own if own.contains("framing") => Ok(Some(LineError::Framing)),
+        text if text.contains("parity") => Ok(Some(LineError::Parity)),
+        text if text.contains("framing") => Ok(Some(LineError::Framing)),
         _ => Err("`parity` or `framing` is expected".to_owned()),
     }
 }
@@ -139,11 +139,11 @@ pub(super) fn analyser(bytes: &[u8]) -> Result<Channels, CaptureError> {
             return Err(table.wrong_field(value, RADIX));
         };
         let mut error = None;
-        for (column, own) in errors {
+        for (column, kind) in errors {
             let Some(column) = column else { continue };
             match table.raw(column).trim_ascii() {
                 b"" => {}
-                text if text.eq_ignore_ascii_case(b"error") => error = error.or(Some(own)),
+                text if text.eq_ignore_ascii_case(b"error") => error = error.or(Some(kind)),
                 _ => return Err(table.wrong_field(column, "nothing or `Error` is expected")),
             }
         }
@@ -189,7 +189,7 @@ pub(super) fn data_table(bytes: &[u8]) -> Result<Channels, CaptureError> {
             others += 1;
             continue;
         }
-        if address.is_some_and(|own| !table.raw(own).trim_ascii().is_empty()) {
+        if address.is_some_and(|column| !table.raw(column).trim_ascii().is_empty()) {
             return Err(table.wrong("the analyser was in a multiprocessor mode; set its mode to Normal and export again"));
         }
         let start = time(&table, start)?;
@@ -202,14 +202,14 @@ pub(super) fn data_table(bytes: &[u8]) -> Result<Channels, CaptureError> {
             }
             None => None,
         };
-        let own = name.map_or("".into(), |name| table.text(name));
-        let place = channels.iter().position(|(name, _)| *name == own);
+        let analyser = name.map_or("".into(), |name| table.text(name));
+        let place = channels.iter().position(|(name, _)| *name == analyser);
         let place = place.unwrap_or(channels.len());
         if place == channels.len() {
             if place == MOST {
                 return Err(table.wrong(format!("more than {MOST} analysers")));
             }
-            channels.push((own.into_owned(), Vec::new()));
+            channels.push((analyser.into_owned(), Vec::new()));
         }
         let octets = &mut channels[place].1;
         in_order(&table, octets.last(), start)?;
@@ -255,10 +255,10 @@ impl Binary<'_> {
 
     fn take<const N: usize>(&mut self) -> Result<[u8; N], CaptureError> {
         let bytes = self.bytes.get(self.at..self.at.saturating_add(N));
-        match bytes.and_then(|own| <[u8; N]>::try_from(own).ok()) {
-            Some(own) => {
+        match bytes.and_then(|bytes| <[u8; N]>::try_from(bytes).ok()) {
+            Some(taken) => {
                 self.at += N;
-                Ok(own)
+                Ok(taken)
             }
             None => self.wrong(format!("{N} bytes are expected here; the file ends before")),
         }

@@ -49,7 +49,7 @@ pub(super) fn read(
     };
     for (number, line) in bytes
         .trim_ascii_end()
-        .split(|own| *own == b'\n')
+        .split(|byte| *byte == b'\n')
         .enumerate()
     {
         let wrong = |what| CaptureError::Link {
@@ -114,8 +114,8 @@ impl<'b> Samples<'b> {
         }
         if let Some(stated) = line.strip_prefix(b"META samplerate: ") {
             let stated = std::str::from_utf8(stated).ok();
-            let stated = stated.and_then(|own| own.parse().ok());
-            self.rate = self.rate.or(stated.filter(|own| *own > 0));
+            let stated = stated.and_then(|text| text.parse().ok());
+            self.rate = self.rate.or(stated.filter(|rate| *rate > 0));
             return Ok(());
         }
         // An empty line, or the row with kinds or names of the columns.
@@ -134,7 +134,7 @@ impl<'b> Samples<'b> {
             return Ok(());
         }
         self.above = line;
-        let fields = || line.split(|own| *own == b',');
+        let fields = || line.split(|byte| *byte == b',');
         if self.lines.is_empty() {
             self.lines = vec![Levels::default(); fields().count()];
             self.others = vec![None; self.lines.len()];
@@ -146,7 +146,7 @@ impl<'b> Samples<'b> {
             ));
         }
         let lines = self.lines.iter_mut().zip(&mut self.others);
-        for ((own, other), field) in lines.zip(fields()) {
+        for ((levels, other), field) in lines.zip(fields()) {
             let level = match field.trim_ascii() {
                 [level] => Level::of(*level),
                 _ => None,
@@ -160,7 +160,7 @@ impl<'b> Samples<'b> {
                 });
                 continue;
             };
-            own.push(at, level);
+            levels.push(at, level);
         }
         Ok(())
     }

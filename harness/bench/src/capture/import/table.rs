@@ -19,17 +19,17 @@ pub(super) struct Table<'b> {
 pub(super) fn first_line(bytes: &[u8]) -> &str {
     // A heading is no longer than that.
     let start = &bytes[..bytes.len().min(65_536)];
-    let line = start.split(|own| matches!(own, b'\n' | b'\r')).next();
+    let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next();
     let line = line.unwrap_or_default();
     std::str::from_utf8(line).unwrap_or_default()
 }
 
 /// The character between the columns of a line: the most frequent of comma, semicolon and tabulator.
 fn separator(line: &str) -> u8 {
-    let count = |own: u8| line.bytes().filter(|other| *other == own).count();
+    let count = |character: u8| line.bytes().filter(|other| *other == character).count();
     // Of equal counts the last wins.
-    let most = b"\t;,".iter().copied().max_by_key(|own| count(*own));
-    most.unwrap_or(b',')
+    let most = b"\t;,".iter().max_by_key(|character| count(**character));
+    most.copied().unwrap_or(b',')
 }
 
 /// The names of the columns of a line; none where it is no text.
@@ -39,8 +39,8 @@ pub(super) fn columns(line: &str) -> Vec<String> {
         .delimiter(separator(line))
         .from_reader(line.as_bytes());
     let record = reader.records().next().and_then(Result::ok);
-    let names = record.iter().flat_map(|own| own.iter());
-    names.map(|own| own.trim().to_owned()).collect()
+    let names = record.iter().flat_map(|record| record.iter());
+    names.map(|name| name.trim().to_owned()).collect()
 }
 
 impl<'b> Table<'b> {
@@ -63,8 +63,8 @@ impl<'b> Table<'b> {
     pub(super) fn below(bytes: &'b [u8], mark: u8) -> (Self, Vec<Cow<'b, str>>) {
         let (mut rest, mut comments) = (bytes, Vec::new());
         while rest.first() == Some(&mark) {
-            let end = rest.iter().position(|own| *own == b'\n');
-            let (line, below) = rest.split_at(end.map_or(rest.len(), |own| own + 1));
+            let end = rest.iter().position(|byte| *byte == b'\n');
+            let (line, below) = rest.split_at(end.map_or(rest.len(), |end| end + 1));
             comments.push(String::from_utf8_lossy(line.trim_ascii()));
             rest = below;
         }
@@ -87,7 +87,7 @@ impl<'b> Table<'b> {
     /// Where a column is, by its name.
     pub(super) fn find(&self, name: &str) -> Option<usize> {
         let mut columns = self.columns.iter();
-        columns.position(|own| own.eq_ignore_ascii_case(name))
+        columns.position(|column| column.eq_ignore_ascii_case(name))
     }
 
     /// Goes to the next row; `false` behind the last one.

@@ -9,7 +9,7 @@ use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
 pub(super) fn settings(links: &[&str]) -> ReadSettings {
-    let links = links.iter().map(|own| own.parse().expect("a link"));
+    let links = links.iter().map(|link| link.parse().expect("a link"));
     ReadSettings {
         links: links.collect(),
         ..ReadSettings::default()
@@ -35,7 +35,7 @@ fn refused(file: impl AsRef<[u8]>, settings: &ReadSettings) -> String {
 
 fn shared(trace: &Trace) -> bool {
     let mut channels = trace.channels.iter();
-    channels.any(|own| own.from.is_none() && own.to.is_none())
+    channels.any(|channel| channel.from.is_none() && channel.to.is_none())
 }
 
 /// What channels carried: `98->97: 88 FE! ...`, with `!` behind a damaged octet.
@@ -47,19 +47,19 @@ fn shown(capture: &Capture) -> String {
                 (from, None) if shared(trace) => write!(text, "{from:?}:"),
                 _ => write!(text, "{}:", name(ring, channel)),
             };
-            for own in channel.octets() {
-                let mark = match own.error {
+            for octet in channel.octets() {
+                let mark = match octet.error {
                     None => "",
                     Some(LineError::Parity) => "p",
                     Some(LineError::Framing) => "f",
                     Some(LineError::Break) => "b",
                     Some(LineError::Overrun) => "o",
                 };
-                let byte = own.received.unwrap_or_default();
+                let byte = octet.received.unwrap_or_default();
                 let _infallible = write!(text, " {byte:02X}{mark}");
             }
-            for own in channel.frames() {
-                let _infallible = write!(text, " {}", own.frame);
+            for frame in channel.frames() {
+                let _infallible = write!(text, " {}", frame.frame);
             }
             text.push('\n');
         }
@@ -82,7 +82,7 @@ pub(super) fn drawn(octets: &[u8], parity: Parity, gap: u64) -> Vec<(u64, bool)>
         }
         bits.push(true);
         for bit in bits {
-            if changes.last().is_some_and(|own| own.1 != bit) {
+            if changes.last().is_some_and(|(_, last)| *last != bit) {
                 changes.push((at, bit));
             }
             at += 1;
@@ -94,11 +94,11 @@ pub(super) fn drawn(octets: &[u8], parity: Parity, gap: u64) -> Vec<(u64, bool)>
 
 /// Octets with every number of ones, in an order in which both parities occur.
 pub(super) fn many() -> Vec<u8> {
-    (0..200_u32).map(|own| (own * 73 % 256) as u8).collect()
+    (0..200_u32).map(|place| (place * 73 % 256) as u8).collect()
 }
 
 fn hex(octets: &[u8]) -> String {
-    octets.iter().map(|own| format!(" {own:02X}")).collect()
+    octets.iter().map(|octet| format!(" {octet:02X}")).collect()
 }
 
 /// A digital.csv of Logic 2 with one channel.
@@ -117,7 +117,7 @@ fn levels_become_octets_at_every_rate_of_a_ring() {
             let changes = drawn(&many(), Parity::Odd, 3);
             let changes: Vec<_> = changes
                 .iter()
-                .map(|own| (own.0, own.1 != inverted))
+                .map(|(at, level)| (*at, *level != inverted))
                 .collect();
             let file = digital(&changes, f64::from(rate.bits_per_second()));
             let found = imported(&file, &settings(&["1->0=Line"]));
@@ -140,7 +140,7 @@ fn another_parity_is_not_taken_for_right() {
     let file = digital(&drawn(&many(), Parity::Even, 3), 38_400.0);
     let found = imported(&file, &settings(&["1->0=Line"]));
     let octets = found.capture.traces[0].channels[0].octets();
-    let damaged = octets.iter().filter(|own| own.error.is_some()).count();
+    let damaged = octets.iter().filter(|octet| octet.error.is_some()).count();
     assert_eq!((octets.len(), damaged), (200, 200));
     assert!(
         found.notes[0].contains("explains it better: 38400 8E1 with 0 of 200"),
@@ -305,7 +305,7 @@ pub(super) fn saleae(version: u32, parts: &[(u32, f64, f64, &[f64])]) -> Vec<u8>
         file.extend(begin.to_le_bytes());
         file.extend(end.to_le_bytes());
         file.extend((times.len() as u64).to_le_bytes());
-        file.extend(times.iter().flat_map(|own| own.to_le_bytes()));
+        file.extend(times.iter().flat_map(|time| time.to_le_bytes()));
     }
     file
 }
@@ -326,7 +326,7 @@ fn of_binary_levels(step: usize) {
     let changes = drawn(&many(), Parity::Odd, 1);
     let times: Vec<f64> = changes[1..]
         .iter()
-        .map(|own| own.0 as f64 / 19_200.0)
+        .map(|(at, _)| *at as f64 / 19_200.0)
         .collect();
     for version in [0, 1] {
         let file = saleae(version, &[(1, 0.0, 1.0, &times)]);
@@ -363,8 +363,8 @@ fn samples_of_sigrok() {
         .to_owned();
     let changes = drawn(&[0x88, 0x01], Parity::Odd, 5);
     for sample in 0..600 {
-        let now = changes.iter().rev().find(|own| own.0 * 10 <= sample);
-        let level = now.is_none_or(|own| own.1);
+        let now = changes.iter().rev().find(|(at, _)| *at * 10 <= sample);
+        let level = now.is_none_or(|(_, level)| *level);
         let _infallible = writeln!(text, "0,{}", u8::from(level));
     }
     let found = imported(&text, &settings(&[]));
@@ -380,7 +380,7 @@ fn samples_of_sigrok() {
     let commented = text.replace("META samplerate: 96000", "; Samplerate: 96 kHz");
     assert_eq!(imported(&commented, &settings(&[])).capture, found.capture);
     let (head, _) = text.split_once("0,1\n").expect("rows");
-    let left_out: String = (0..200).map(|own| format!("0,{}\n", own % 2)).collect();
+    let left_out: String = (0..200).map(|row| format!("0,{}\n", row % 2)).collect();
     assert!(refused(format!("{head}{left_out}"), &settings(&[])).contains("dedup"));
 }
 
@@ -441,14 +441,14 @@ fn asc() {
                0.003000 1  181             Rx   d 4 40 81 01 00\nEnd TriggerBlock\n";
     let found = imported(log, &settings(&[]));
     let expected = "_: 201#3D4000 1FFFFFFF#R8 181#40810100\n";
-    let frames = |capture: &Capture| shown(capture).split_once(": ").map(|own| own.1.to_owned());
+    let frames = |capture: &Capture| frames_of(&shown(capture));
     assert_eq!(frames(&found.capture), frames_of(expected));
     assert!(found.notes[0].contains("1 error frame"));
     let at = |capture: &Capture| -> Vec<u64> {
         let frames = capture.traces[0].channels[0].frames();
         frames
             .iter()
-            .map(|own| own.at.since_start().as_nanos() / 1_000)
+            .map(|frame| frame.at.since_start().as_nanos() / 1_000)
             .collect()
     };
     assert_eq!(at(&found.capture), [1_000, 2_000, 3_000]);
@@ -484,7 +484,7 @@ fn asc() {
 }
 
 fn frames_of(text: &str) -> Option<String> {
-    text.split_once(": ").map(|own| own.1.to_owned())
+    text.split_once(": ").map(|(_, frames)| frames.to_owned())
 }
 
 /// The log of candump: padded interfaces, directions, times from 0, raw length codes, several interfaces.
@@ -513,11 +513,11 @@ fn candump() {
 #[test]
 fn pcap() {
     let file = |big: bool, magic: u32, link: u32, data: &[u8]| {
-        let number = |own: u32| {
+        let number = |value: u32| {
             if big {
-                own.to_be_bytes()
+                value.to_be_bytes()
             } else {
-                own.to_le_bytes()
+                value.to_le_bytes()
             }
         };
         let mut file = number(magic).to_vec();
@@ -525,8 +525,8 @@ fn pcap() {
         file.extend([0; 8]);
         file.extend(number(65_535));
         file.extend(number(link));
-        for own in [1, 5, data.len() as u32, data.len() as u32] {
-            file.extend(number(own));
+        for value in [1, 5, data.len() as u32, data.len() as u32] {
+            file.extend(number(value));
         }
         file.extend(data);
         file
@@ -558,7 +558,7 @@ fn files_of_one_capture() {
         let all = all
             .iter()
             .map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
-        read_files(all.collect(), &settings(links)).map(|own| shown(&own.capture))
+        read_files(all.collect(), &settings(links)).map(|imported| shown(&imported.capture))
     };
     let first = ("a", "(0.1) can0 201#3D4000\n");
     let log = files(&[first, ("b", "(0.2) can0 202#\n")], &[]);

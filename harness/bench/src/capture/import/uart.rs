@@ -188,7 +188,7 @@ impl Score {
         let (mut all, mut damaged) = (0, 0);
         for line in octets {
             all += line.len();
-            damaged += line.iter().filter(|own| own.error.is_some()).count();
+            damaged += line.iter().filter(|octet| octet.error.is_some()).count();
         }
         Self {
             uart,
@@ -240,8 +240,8 @@ fn spent(lines: &[&Levels], wanted: impl Fn(Level, Time) -> bool) -> (Time, usiz
     let pulses = lines.iter().flat_map(|line| line.changes().windows(2));
     let pulses = pulses.map(|two| (two[0].level, two[1].at - two[0].at));
     let chosen = pulses.filter(|(level, length)| wanted(*level, *length));
-    chosen.fold((0, 0), |(time, count), own| {
-        (Time::saturating_add(time, own.1), count + 1)
+    chosen.fold((0, 0), |(time, count), (_, length)| {
+        (Time::saturating_add(time, length), count + 1)
     })
 }
 
@@ -258,7 +258,7 @@ fn slow_enough(lines: &[&Levels], format: Format) -> bool {
 fn quiet_low(lines: &[&Levels], format: Format) -> Option<bool> {
     let octet = format.octet_time().units().cast_signed();
     let [low, high] = [Level::Low, Level::High]
-        .map(|own| spent(lines, |level, length| level == own && length > octet).0);
+        .map(|quiet| spent(lines, |level, length| level == quiet && length > octet).0);
     (low != high).then_some(low > high)
 }
 
@@ -268,8 +268,8 @@ fn best(lines: &[&Levels], formats: &[Format], inverted: bool) -> Option<Score> 
         format: *format,
         inverted,
     };
-    let scores = formats.iter().map(|own| Score::of(lines, uart(own)));
-    scores.reduce(|best, own| if own.beats(best) { own } else { best })
+    let scores = formats.iter().map(|format| Score::of(lines, uart(format)));
+    scores.reduce(|best, score| if score.beats(best) { score } else { best })
 }
 
 /// Finds rate and polarity of lines among the formats that the bus knows; the parity is the bus's, so that a station with another one shows
@@ -281,8 +281,8 @@ pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(UartFormat,
     const REMEDY: &str =
         "give the format, as in `--uart \"38400 8O1\"`, and check which channel is the line";
     let mut formats: Vec<Format> = formats.to_vec();
-    formats.retain(|own| slow_enough(lines, *own));
-    formats.sort_by_key(|own| own.bits_per_second);
+    formats.retain(|format| slow_enough(lines, *format));
+    formats.sort_by_key(|format| format.bits_per_second);
     let Some(slowest) = formats.first() else {
         return Err(format!(
             "the line changes faster than at any rate of the bus; {REMEDY}"
@@ -290,7 +290,7 @@ pub(super) fn find(lines: &[&Levels], formats: &[Format]) -> Result<(UartFormat,
     };
     // What the quiet line says counts, and the damage where it says nothing or the other polarity is far better.
     let first = quiet_low(lines, *slowest).unwrap_or(false);
-    let both = [first, !first].map(|own| best(lines, &formats, own));
+    let both = [first, !first].map(|inverted| best(lines, &formats, inverted));
     let [Some(found), Some(other)] = both else {
         return Err(format!("the bus has no format; {REMEDY}"));
     };

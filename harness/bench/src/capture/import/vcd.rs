@@ -36,12 +36,12 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
         b"$attrbegin",
     ];
     let first = tokens(&bytes[said(bytes)..]).next();
-    first.is_some_and(|(_, own)| FIRST.contains(&own))
+    first.is_some_and(|(_, token)| FIRST.contains(&token))
 }
 
 /// The length of the line that sigrok-cli 0.7 prints in front of what it converts: `META samplerate: 10000000`.
 fn said(bytes: &[u8]) -> usize {
-    let line = bytes.iter().position(|own| *own == b'\n');
+    let line = bytes.iter().position(|byte| *byte == b'\n');
     line.filter(|_| bytes.starts_with(b"META ")).unwrap_or(0)
 }
 
@@ -50,7 +50,7 @@ fn tokens(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     let mut at = 0;
     std::iter::from_fn(move || {
         let rest = &bytes[at..];
-        let start = at + rest.iter().position(|own| !own.is_ascii_whitespace())?;
+        let start = at + rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
         let rest = &bytes[start..];
         let length = rest.iter().position(u8::is_ascii_whitespace);
         at = start + length.unwrap_or(rest.len());
@@ -128,19 +128,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<ChannelRead>, Vec<String>), Capt
     }
     while let Some((at, token)) = tokens.next() {
         if token == b"$comment" {
-            tokens.by_ref().find(|(_, own)| *own == b"$end");
+            tokens.by_ref().find(|(_, token)| *token == b"$end");
         } else {
             reader.token(at, token)?;
         }
     }
     let (now, ended, sample) = (reader.now, !reader.changed, reader.sample);
     let wires = reader.wires.into_iter();
-    let channels = wires.map(|mut own| {
-        own.levels.end = ended.then_some(now);
-        own.levels.sample = sample;
+    let channels = wires.map(|mut wire| {
+        wire.levels.end = ended.then_some(now);
+        wire.levels.sample = sample;
         ChannelRead {
-            names: own.names,
-            signal: Signal::Levels(own.levels),
+            names: wire.names,
+            signal: Signal::Levels(wire.levels),
         }
     });
     Ok((channels.collect(), notes))
@@ -204,19 +204,19 @@ impl<'b> Reader<'b> {
         // By its name, with its scope, and with all scopes around it.
         let depth = self.scopes.len();
         let shown = [0, depth.min(1), depth.min(DEEPEST)];
-        let mut names = shown.map(|own| {
-            let scopes = self.scopes[depth - own..].iter();
-            let scopes = scopes.map(|own| String::from_utf8_lossy(own));
+        let mut names = shown.map(|count| {
+            let scopes = self.scopes[depth - count..].iter();
+            let scopes = scopes.map(|scope| String::from_utf8_lossy(scope));
             scopes
                 .chain([name.as_str().into()])
                 .collect::<Vec<_>>()
                 .join(".")
         });
         names.sort_by_key(String::len);
-        let own = &mut self.wires[place].names;
+        let known = &mut self.wires[place].names;
         for name in names {
-            if !own.contains(&name) {
-                own.push(name);
+            if !known.contains(&name) {
+                known.push(name);
             }
         }
     }
@@ -267,7 +267,7 @@ impl<'b> Reader<'b> {
         let tick = self.tick.unwrap_or(1_000_000);
         let (whole, places) = text.split_once('.').unwrap_or((text, ""));
         let places = &places[..places.len().min(9)];
-        let digits = |own: &str| own.bytes().all(|own| own.is_ascii_digit());
+        let digits = |text: &str| text.bytes().all(|digit| digit.is_ascii_digit());
         if whole.is_empty() || whole.len() > 20 || !digits(whole) || !digits(places) {
             return None;
         }
@@ -300,7 +300,7 @@ impl<'b> Reader<'b> {
 /// A time scale, `100ns`, in femtoseconds.
 fn tick(text: &[u8], at: usize) -> Result<i128, CaptureError> {
     let text = std::str::from_utf8(text).unwrap_or_default();
-    let digits = text.find(|own: char| !own.is_ascii_digit());
+    let digits = text.find(|character: char| !character.is_ascii_digit());
     let (number, unit) = text.split_at(digits.unwrap_or(text.len()));
     let unit = UNITS.iter().find(|(name, _)| *name == unit);
     match (number, unit) {

@@ -4,7 +4,7 @@ use super::interfaces::{Carries, Interface, Packets};
 use super::parts::Part;
 use super::values::sent;
 use super::{Byte, CaptureError, OCTET, Reader};
-use crate::capture::frames::{FrameRead, Sender, packet};
+use crate::capture::frames::{self, FrameRead, Sender};
 use crate::capture::order::Place;
 use crate::report::pcapng::{COMMENT, ERRORS, HEADER, LOST, RECEIVED};
 use crate::report::pcapng_telegrams::{octets, time_of};
@@ -45,24 +45,24 @@ impl Reader<'_> {
     }
 
     /// What a packet holds.
-    pub(in crate::capture) fn content(&mut self, own: &Packet) -> Result<(), CaptureError> {
+    pub(in crate::capture) fn content(&mut self, packet: &Packet) -> Result<(), CaptureError> {
         self.packets += 1;
-        let Some(known) = self.interfaces.get_mut(own.interface) else {
+        let Some(known) = self.interfaces.get_mut(packet.interface) else {
             return Ok(());
         };
         let Some(known) = known else {
             self.pass_over("their interface carries no link that is read");
             return Ok(());
         };
-        if own.captured > own.end - own.data.min(own.end) {
+        if packet.captured > packet.end - packet.data.min(packet.end) {
             let what = format!(
                 "a packet of {} bytes does not fit into its block",
-                own.captured
+                packet.captured
             );
-            return self.wrong(own.data, what);
+            return self.wrong(packet.data, what);
         }
-        let (first, last) = known.heard.unwrap_or((own.nanos, own.nanos));
-        known.heard = Some((first.min(own.nanos), last.max(own.nanos)));
+        let (first, last) = known.heard.unwrap_or((packet.nanos, packet.nanos));
+        known.heard = Some((first.min(packet.nanos), last.max(packet.nanos)));
         let &mut Interface {
             carries,
             packets,
@@ -71,8 +71,8 @@ impl Reader<'_> {
             ..
         } = known;
         let octet = octet.unwrap_or(OCTET);
-        let payload = own.data..own.data + own.captured;
-        if own.captured < own.original && !matches!(carries, Carries::Frames(_)) {
+        let payload = packet.data..packet.data + packet.captured;
+        if packet.captured < packet.original && !matches!(carries, Carries::Frames(_)) {
             self.cut = true;
         }
         let header = match packets {
@@ -83,29 +83,29 @@ impl Reader<'_> {
             Packets::Serial => self.bytes[payload.clone()].get(8).copied(),
             _ => Some(RECEIVED),
         })
-        .filter(|_| own.captured >= header) else {
+        .filter(|_| packet.captured >= header) else {
             return self.wrong(
-                own.data,
+                packet.data,
                 format!(
                     "a packet of {} bytes: at least the {HEADER} of its header are expected",
-                    own.captured
+                    packet.captured
                 ),
             );
         };
         let arrived = payload.start + header..payload.end;
         match carries {
-            Carries::Frames(sender) => self.frame(own, (packets, part), sender),
-            Carries::Station(from) => self.telegram(own, (part, from), (event, arrived), octet),
-            Carries::Line => self.telegram(own, (part, None), (event, arrived), octet),
-            Carries::Link(..) => self.bytes_of(own, event, arrived),
+            Carries::Frames(sender) => self.frame(packet, (packets, part), sender),
+            Carries::Station(from) => self.telegram(packet, (part, from), (event, arrived), octet),
+            Carries::Line => self.telegram(packet, (part, None), (event, arrived), octet),
+            Carries::Link(..) => self.bytes_of(packet, event, arrived),
         }
     }
 
     /// The comments of a packet.
-    fn comments(&self, own: &Packet) -> Result<Vec<Cow<'_, [u8]>>, CaptureError> {
+    fn comments(&self, packet: &Packet) -> Result<Vec<Cow<'_, [u8]>>, CaptureError> {
         let mut all = Vec::new();
-        let options = own.data + own.captured.next_multiple_of(4);
-        self.options((options, own.end), |code, from, to| {
+        let options = packet.data + packet.captured.next_multiple_of(4);
+        self.options((options, packet.end), |code, from, to| {
             if code == COMMENT {
                 all.push((from, to));
             }
@@ -119,7 +119,7 @@ impl Reader<'_> {
 
     /// A packet without an octet: what its comment says, or a change of the control lines.
     fn remark(&mut self, words: Option<String>) {
-        match words.filter(|own| !own.is_empty()) {
+        match words.filter(|words| !words.is_empty()) {
             Some(words) => self.events.push(words),
             None => self.pass_over("they hold no octet"),
         }
@@ -128,13 +128,13 @@ impl Reader<'_> {
     /// The octets of a packet that holds a telegram.
     fn telegram(
         &mut self,
-        own: &Packet,
+        packet: &Packet,
         (part, from): (usize, Option<u8>),
         (event, arrived): (u8, Range<usize>),
         octet: Span,
     ) -> Result<(), CaptureError> {
-        let comments = self.comments(own)?;
-        let comments = comments.iter().map(|own| String::from_utf8_lossy(own));
+        let comments = self.comments(packet)?;
+        let comments = comments.iter().map(|text| String::from_utf8_lossy(text));
         let comment = comments.collect::<Vec<_>>().join(", ");
         let arrived = &self.bytes[arrived];
         if arrived.is_empty() && event != LOST {
@@ -143,11 +143,11 @@ impl Reader<'_> {
         }
         let timed = time_of(event);
         let begins = timed.unwrap_or(self.begun);
-        let found = octets((event, own.nanos), begins, arrived, &comment, octet);
+        let found = octets((event, packet.nanos), begins, arrived, &comment, octet);
         self.begun = begins;
         let found = found
             .into_iter()
-            .map(|octet| (part, from, own.nanos, octet));
+            .map(|octet| (part, from, packet.nanos, octet));
         self.octets.extend(found);
         Ok(())
     }
@@ -155,17 +155,17 @@ impl Reader<'_> {
     /// The frame of a packet.
     fn frame(
         &mut self,
-        own: &Packet,
+        packet: &Packet,
         (packets, mut part): (Packets, usize),
         sender: Sender,
     ) -> Result<(), CaptureError> {
-        let end = own.data + own.captured;
+        let end = packet.data + packet.captured;
         let (protocol, header) = match packets {
-            Packets::Cooked => (own.data + 14, 16),
-            Packets::Cooked2 => (own.data, 20),
+            Packets::Cooked => (packet.data + 14, 16),
+            Packets::Cooked2 => (packet.data, 20),
             _ => {
                 let place = self.place();
-                return self.frame_of((own, place), part, sender, &self.bytes[own.data..end]);
+                return self.frame_of(packet, place, part, sender, &self.bytes[packet.data..end]);
             }
         };
         match self.take(protocol, end).map(u16::from_be_bytes)? {
@@ -180,12 +180,12 @@ impl Reader<'_> {
             }
         }
         if packets == Packets::Cooked2 {
-            let number = self.take(own.data + 4, end).map(u32::from_be_bytes)?;
+            let number = self.take(packet.data + 4, end).map(u32::from_be_bytes)?;
             part = self.part(Part::Frames(format!("interface {number}")));
         }
-        let id = self.take(own.data + header, end)?;
+        let id = self.take(packet.data + header, end)?;
         self.cooked.push(Cooked {
-            packet: *own,
+            packet: *packet,
             header,
             part,
             id,
@@ -199,20 +199,21 @@ impl Reader<'_> {
     pub(super) fn cooked_frames(&mut self) -> Result<(), CaptureError> {
         let cooked = std::mem::take(&mut self.cooked);
         let fitting = |read: fn([u8; 4]) -> u32| {
-            let ids = cooked.iter().map(|own| read(own.id));
-            let count = |fits: fn(u32) -> bool| ids.clone().filter(|own| fits(*own)).count();
-            (count(|own| own <= 0x7FF), count(|own| own >> 29 != 0))
+            let ids = cooked.iter().map(|frame| read(frame.id));
+            let count = |fits: fn(u32) -> bool| ids.clone().filter(|id| fits(*id)).count();
+            (count(|id| id <= 0x7FF), count(|id| id >> 29 != 0))
         };
         let (network, other) = (fitting(u32::from_be_bytes), fitting(u32::from_le_bytes));
         let swapped = other > network || other == network && !self.big;
-        for own in cooked {
-            let packet = &own.packet;
-            let data = packet.data + own.header..packet.data + packet.captured;
+        for frame in cooked {
+            let packet = &frame.packet;
+            let data = packet.data + frame.header..packet.data + packet.captured;
             let mut data = self.bytes[data].to_vec();
             if swapped && let Some(id) = data.first_chunk_mut::<4>() {
                 id.reverse();
             }
-            self.frame_of((packet, own.place), own.part, Sender::ByIdentifier, &data)?;
+            let sender = Sender::ByIdentifier;
+            self.frame_of(packet, frame.place, frame.part, sender, &data)?;
         }
         Ok(())
     }
@@ -227,23 +228,24 @@ impl Reader<'_> {
 
     fn frame_of(
         &mut self,
-        (own, place): (&Packet, Place),
+        packet: &Packet,
+        place: Place,
         part: usize,
         sender: Sender,
         data: &[u8],
     ) -> Result<(), CaptureError> {
-        let comments = self.comments(own)?;
+        let comments = self.comments(packet)?;
         let comment = comments.last();
-        let comment = comment.map(|own| String::from_utf8_lossy(own).into_owned());
-        let read = match packet(data, comment.as_deref()) {
+        let comment = comment.map(|comment| String::from_utf8_lossy(comment).into_owned());
+        let read = match frames::packet(data, comment.as_deref()) {
             Ok(found) => found,
-            Err(what) => return self.wrong(own.data, what),
+            Err(what) => return self.wrong(packet.data, what),
         };
         if read.is_none() {
             self.events.extend(comment);
         }
         self.frames.extend(read.map(|(frame, ended)| {
-            let nanos = own.nanos;
+            let nanos = packet.nanos;
             let read = FrameRead {
                 nanos,
                 sender,
@@ -259,19 +261,19 @@ impl Reader<'_> {
     /// The bytes of a link that a packet speaks of: the first has the time of the packet and its error, the others follow without a gap.
     fn bytes_of(
         &mut self,
-        own: &Packet,
+        packet: &Packet,
         event: u8,
         arrived: Range<usize>,
     ) -> Result<(), CaptureError> {
-        let comments = self.comments(own)?;
-        let stated = comments.iter().rev().find_map(|own| sent(own));
+        let comments = self.comments(packet)?;
+        let stated = comments.iter().rev().find_map(|comment| sent(comment));
         let words = comments
             .last()
-            .map(|own| String::from_utf8_lossy(own).into_owned());
+            .map(|comment| String::from_utf8_lossy(comment).into_owned());
         let error = ERRORS
             .iter()
-            .find(|(_, own)| *own == event)
-            .map(|own| own.0);
+            .find(|(_, code)| *code == event)
+            .map(|(error, _)| *error);
         let received: Vec<Option<u8>> = match &self.bytes[arrived] {
             [] if event == LOST => vec![None],
             // A break without its byte is read as 00 (PARMRK, and every UART).
@@ -287,8 +289,8 @@ impl Reader<'_> {
         for (place, received) in received.iter().enumerate() {
             let alone = stated.filter(|_| place == 0);
             self.found.push(Byte {
-                interface: own.interface,
-                nanos: own.nanos.saturating_add(behind.as_nanos()),
+                interface: packet.interface,
+                nanos: packet.nanos.saturating_add(behind.as_nanos()),
                 sent: alone.unwrap_or(*received),
                 received: *received,
                 error: error.filter(|_| place == 0 && received.is_some()),

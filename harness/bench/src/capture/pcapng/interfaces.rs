@@ -39,9 +39,9 @@ impl Packets {
         match link_type {
             LINK_TYPE => Some(Self::Serial),
             pcapng_frames::LINK_TYPE => Some(Self::Frames),
-            own if own == COOKED[0] => Some(Self::Cooked),
-            own if own == COOKED[1] => Some(Self::Cooked2),
-            own if USER.contains(&own) => Some(Self::Octets),
+            other if other == COOKED[0] => Some(Self::Cooked),
+            other if other == COOKED[1] => Some(Self::Cooked2),
+            other if USER.contains(&other) => Some(Self::Octets),
             _ => None,
         }
     }
@@ -90,7 +90,7 @@ impl Carries {
     const fn given(target: ChannelTarget) -> Option<Self> {
         match target {
             ChannelTarget::Link(ring, from, to) => Some(Self::Link(ring, from, to)),
-            ChannelTarget::Station(own) => Some(Self::Station(own)),
+            ChannelTarget::Station(station) => Some(Self::Station(station)),
             ChannelTarget::Bus => Some(Self::Line),
             ChannelTarget::Ring => None,
         }
@@ -108,8 +108,8 @@ impl Reader<'_> {
         name: Option<(usize, Cow<'_, str>)>,
         (resolution, offset, speed): Clock,
     ) -> Result<(), CaptureError> {
-        let (place, name) = name.map_or((start, None), |own| (own.0, Some(own.1)));
-        let name = name.as_deref().map(|own| own.trim_end_matches('\0'));
+        let (place, name) = name.map_or((start, None), |(place, name)| (place, Some(name)));
+        let name = name.as_deref().map(|name| name.trim_end_matches('\0'));
         let Some(packets) = Packets::of(link_type) else {
             self.interfaces.push(None);
             return Ok(());
@@ -169,28 +169,28 @@ impl Reader<'_> {
         let number = self.interfaces.len() - self.section;
         let shown = name.map_or_else(|| number.to_string(), str::to_owned);
         let links = self.links;
-        let of = |own: &NamedLink| Some((Carries::given(own.target)?, shown.clone()));
+        let of = |link: &NamedLink| Some((Carries::given(link.target)?, shown.clone()));
         let chosen = links
             .iter()
-            .find(|own| own.channel.as_ref() == Some(&shown))
+            .find(|link| link.channel.as_ref() == Some(&shown))
             .and_then(of);
         let named = name.and_then(Carries::named);
-        if let Some(own) = chosen.or(named.map(|own| (own, shown.clone()))) {
-            return Ok(Some(own));
+        if let Some(found) = chosen.or(named.map(|carries| (carries, shown.clone()))) {
+            return Ok(Some(found));
         }
-        let unnamed = links.iter().filter(|own| own.channel.is_none());
-        let given = unnamed.filter_map(|own| Some((Carries::given(own.target)?, own.link.clone())));
-        if let Some(own) = given.into_iter().next() {
+        let mut unnamed = links.iter().filter(|link| link.channel.is_none());
+        let given = |link: &NamedLink| Some((Carries::given(link.target)?, link.link.clone()));
+        if let Some((carries, link)) = unnamed.find_map(given) {
             if self.taken.replace(number).is_some() {
                 return self.wrong(
                     place,
                     format!(
                         "`--link {}` is taken for two interfaces, which are not named as links: name each, as in `--link \"{}={shown}\"`",
-                        own.1, own.1
+                        link, link
                     ),
                 );
             }
-            return Ok(Some(own));
+            return Ok(Some((carries, link)));
         }
         if !links.is_empty() {
             return Ok(None);
@@ -216,14 +216,13 @@ impl Reader<'_> {
 
     /// Two interfaces of one name that carry something at the same time are two records of one link, or two links.
     pub(super) fn no_twins(&self) -> Result<(), CaptureError> {
-        let known: Vec<&Interface> = self.interfaces.iter().flatten().collect();
+        let known = self.interfaces.iter().flatten();
         let mut last: Vec<(&Interface, (u64, u64))> = Vec::new();
-        for own in known {
-            let Some(heard) = own.heard else { continue };
+        for (interface, heard) in known.filter_map(|known| Some((known, known.heard?))) {
             let twin = |(other, times): &&(&Interface, (u64, u64))| {
-                let same = other.section == own.section
-                    && other.part == own.part
-                    && other.carries == own.carries;
+                let same = other.section == interface.section
+                    && other.part == interface.part
+                    && other.carries == interface.carries;
                 same && times.0 <= heard.1 && heard.0 <= times.1
             };
             if last.iter().any(|other| twin(&other)) {
@@ -231,11 +230,11 @@ impl Reader<'_> {
                     place: "the capture".to_owned(),
                     what: format!(
                         "two interfaces are named {:?} and carry something at the same time: save one of them, as in `editcap` or Wireshark",
-                        own.name
+                        interface.name
                     ),
                 });
             }
-            last.push((own, heard));
+            last.push((interface, heard));
         }
         Ok(())
     }

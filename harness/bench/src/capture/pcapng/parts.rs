@@ -31,11 +31,11 @@ impl Part {
     /// Whether `--link` chooses it.
     fn is_chosen(&self, link: &NamedLink) -> bool {
         match (link.target, self) {
-            (ChannelTarget::Ring, own) => *own == Self::Ring,
+            (ChannelTarget::Ring, part) => *part == Self::Ring,
             (ChannelTarget::Bus, Self::Ring) => false,
-            (ChannelTarget::Bus, own) => {
+            (ChannelTarget::Bus, part) => {
                 let wanted = link.channel.as_deref();
-                wanted.is_none_or(|wanted| own.name().trim_start_matches("bus=") == wanted)
+                wanted.is_none_or(|wanted| part.name().trim_start_matches("bus=") == wanted)
             }
             _ => false,
         }
@@ -69,7 +69,7 @@ pub(super) fn chosen(
     let known = || all.iter().map(Part::words).collect::<Vec<_>>().join(", ");
     let choice = links
         .iter()
-        .find(|own| matches!(own.target, ChannelTarget::Ring | ChannelTarget::Bus));
+        .find(|link| matches!(link.target, ChannelTarget::Ring | ChannelTarget::Bus));
     let numbers = 0..all.len();
     if let Some(link) = choice {
         let chosen: Vec<_> = numbers.filter(|part| all[*part].is_chosen(link)).collect();

@@ -12,10 +12,10 @@ impl Reader<'_> {
     pub(super) fn statistics(&mut self, (start, end): (usize, usize)) -> Result<(), CaptureError> {
         let number = usize::try_from(self.u32(start, end)?).unwrap_or(usize::MAX);
         let place = self.section.saturating_add(number);
-        let Some(Some(own)) = self.interfaces.get(place) else {
+        let Some(Some(interface)) = self.interfaces.get(place) else {
             return Ok(());
         };
-        let (resolution, offset) = (own.resolution, own.offset);
+        let (resolution, offset) = (interface.resolution, interface.offset);
         let (mut began, mut ended) = (None, None);
         self.options((start + 12, end), |code, from, to| {
             if code == ISB_STARTTIME || code == ISB_ENDTIME {

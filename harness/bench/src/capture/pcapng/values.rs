@@ -25,7 +25,8 @@ const NOTED: usize = 10;
 /// What a capture says of itself beside bytes and frames, in sentences.
 pub(super) fn noted(events: Vec<String>) -> Vec<String> {
     let more = events.len().saturating_sub(NOTED);
-    let mut notes: Vec<_> = events.into_iter().filter(|own| !own.is_empty()).collect();
+    let events = events.into_iter().filter(|event| !event.is_empty());
+    let mut notes: Vec<_> = events.collect();
     notes.truncate(NOTED);
     if more > 0 {
         notes.push(format!("{more} more events"));

@@ -19,7 +19,7 @@ const TELEGRAMS: [&str; 5] = ["t_ns", "from", "to", "bytes", "error"];
 
 fn has(bytes: &[u8], names: &[&str]) -> bool {
     let columns = columns(first_line(bytes));
-    let has = |name: &&str| columns.iter().any(|own| own == name);
+    let has = |name: &&str| columns.iter().any(|column| column == name);
     names.iter().all(has)
 }
 
@@ -49,16 +49,16 @@ fn places<const N: usize>(table: &Table<'_>, names: [&str; N]) -> Result<[usize;
 
 fn nanos(table: &Table<'_>, column: usize) -> Result<u64, CaptureError> {
     let time: Option<u64> = table.text(column).parse().ok();
-    time.filter(|own| *own <= LATEST)
+    time.filter(|nanos| *nanos <= LATEST)
         .ok_or_else(|| table.wrong_field(column, "nanoseconds of at most a year are expected"))
 }
 
 /// Hexadecimal digits in pairs.
 fn octets(text: &str) -> Option<Vec<u8>> {
-    let digit = |own: u8| {
-        char::from(own)
+    let digit = |character: u8| {
+        char::from(character)
             .to_digit(16)
-            .and_then(|own| u8::try_from(own).ok())
+            .and_then(|digit| u8::try_from(digit).ok())
     };
     let (pairs, rest) = text.as_bytes().as_chunks::<2>();
     let pairs = pairs
@@ -74,7 +74,7 @@ fn line_error(name: &str) -> Option<LineError> {
         LineError::Break,
         LineError::Overrun,
     ];
-    ERRORS.into_iter().find(|own| own.name() == name)
+    ERRORS.into_iter().find(|error| error.name() == name)
 }
 
 /// Reads the table of the bytes of a ring.
@@ -92,12 +92,12 @@ pub(super) fn bytes(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, Capture
         };
         let byte = |column: usize| match octets(&table.text(column)).as_deref() {
             Some([]) => Ok(None),
-            Some([own]) => Ok(Some(*own)),
+            Some([byte]) => Ok(Some(*byte)),
             _ => Err(table.wrong_field(column, "two hexadecimal digits or nothing are expected")),
         };
         let (sent, received) = (byte(sent)?, byte(received)?);
-        let own = table.text(status);
-        let error = match (received, own.as_ref()) {
+        let text = table.text(status);
+        let error = match (received, text.as_ref()) {
             (None, "dropped") | (Some(_), "ok") => None,
             (Some(_), name) if line_error(name).is_some() => line_error(name),
             _ => return Err(table.wrong_field(status, "it does not fit what was received")),
@@ -112,7 +112,7 @@ pub(super) fn bytes(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, Capture
 fn station(table: &Table<'_>, column: usize) -> Result<Option<u8>, CaptureError> {
     match table.text(column).as_ref() {
         MASTER => Ok(None),
-        own => own
+        address => address
             .parse()
             .map(Some)
             .map_err(|_| table.wrong_field(column, "`master` or a number is expected")),
@@ -162,26 +162,22 @@ pub(super) fn frames(bytes: &[u8]) -> Result<Imported, CaptureError> {
 pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Imported, CaptureError> {
     let mut table = Table::new(bytes);
     let [time, from, _, data, error] = places(&table, TELEGRAMS)?;
-    let formats = line_formats(true);
-    let given = settings.uart.map(|own| own.format);
-    let mut formats: Vec<_> = match given {
-        Some(own) => vec![own],
-        None => formats,
-    };
-    formats.sort_by_key(|own| own.bits_per_second);
+    let given = settings.uart;
+    let mut formats = given.map_or_else(|| line_formats(true), |uart| vec![uart.format]);
+    formats.sort_by_key(|format| format.bits_per_second);
     let mut rows = Vec::new();
     while table.next()? {
         let (end, from) = (nanos(&table, time)?, station(&table, from)?);
         let Some(octets) = octets(&table.text(data)) else {
             return Err(table.wrong_field(data, "pairs of hexadecimal digits are expected"));
         };
-        let own = table.text(error);
-        let damaged = match own.split_once(' ') {
-            None if own.is_empty() => None,
+        let text = table.text(error);
+        let damaged = match text.split_once(' ') {
+            None if text.is_empty() => None,
             Some((name, place)) => line_error(name).zip(place.parse::<usize>().ok()),
             None => None,
         };
-        if damaged.is_none() && !own.is_empty() {
+        if damaged.is_none() && !text.is_empty() {
             return Err(table.wrong_field(
                 error,
                 "an error and the number of its octet, such as `parity 3`, are expected",
@@ -197,16 +193,17 @@ pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Importe
         };
         rows.windows(2).all(follows)
     };
-    let octet = |own: &harness_proto::line::Format| own.octet_time();
-    let fitting = formats.iter().find(|own| apart(octet(own).as_nanos()));
-    let octet = fitting.or(formats.last()).map(octet).unwrap_or_default();
+    let mut times = formats.iter().map(|format| format.octet_time());
+    let fastest = times.clone().last();
+    let fitting = times.find(|octet| apart(octet.as_nanos()));
+    let octet = fitting.or(fastest).unwrap_or_default();
     let mut all = Vec::new();
-    let stations: Vec<_> = rows.iter().map(|own| own.1).collect();
+    let stations: Vec<_> = rows.iter().map(|(_, from, ..)| *from).collect();
     for (end, from, octets, damaged) in rows {
         let count = octets.len() as u64;
         for (byte, place) in octets.into_iter().zip(1..) {
             let behind = octet * (count - place);
-            let error = damaged.filter(|own| own.1 as u64 == place).map(|own| own.0);
+            let error = damaged.and_then(|(error, at)| (at as u64 == place).then_some(error));
             let octet = PacketOctet {
                 nanos: end.saturating_sub(behind.as_nanos()),
                 sent: Some(byte),
