@@ -120,8 +120,8 @@ impl Html {
         self.out.push_str(&part.out);
     }
 
-    /// The style and the script of a page: files of this folder, which are markup's own contents.
-    pub fn own(&mut self, name: &'static str, contents: &'static str) {
+    /// A style or a script: an element whose contents are written as they are.
+    pub fn raw_text(&mut self, name: &'static str, contents: &'static str) {
         self.element(name, &[], |html| html.out.push_str(contents));
     }
 

@@ -82,7 +82,7 @@ fn table(html: &mut Html, record: &CellRecord) {
         html.element("table", &[], |html| {
             let caption = match (record.every, every) {
                 (None, 1) => "Changes".to_owned(),
-                (Some(own), 1) => format!("Samples, every {own}"),
+                (Some(interval), 1) => format!("Samples, every {interval}"),
                 (_, every) => format!("{} samples, one of {every} shown", samples.len()),
             };
             html.line("caption", &[], caption);

@@ -86,7 +86,7 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
 
 /// The packet of a byte of the link with this number.
 pub(crate) fn packet(block: &mut Block, link: usize, byte: &LineByte) {
-    let error = |(own, event): &(LineError, u8)| (byte.error == Some(*own)).then_some(*event);
+    let error = |(kind, event): &(LineError, u8)| (byte.error == Some(*kind)).then_some(*event);
     let event = match byte.received {
         None => LOST,
         Some(_) => ERRORS.iter().find_map(error).unwrap_or(RECEIVED),
@@ -151,9 +151,9 @@ impl Block {
 
     /// Begins the statistics of an interface: when the capture there began and ended, in nanoseconds.
     pub(crate) fn statistics(&mut self, interface: u32, began: u64, ended: u64) {
-        let time = |own: u64| {
-            let [high, low] = [own >> 32, own & 0xFFFF_FFFF];
-            [high, low].map(|own| u32::try_from(own).unwrap_or(0).to_le_bytes())
+        let time = |nanos: u64| {
+            let [high, low] = [nanos >> 32, nanos & 0xFFFF_FFFF];
+            [high, low].map(|half| u32::try_from(half).unwrap_or(0).to_le_bytes())
         };
         self.begin(STATISTICS);
         self.put(&interface.to_le_bytes());

@@ -45,32 +45,32 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let mut block = Block::default();
     block.section(&mut out)?;
     let channels = traces.iter().flat_map(|trace| &trace.channels);
-    let mut frames: Vec<&LineFrame> = channels.flat_map(|own| own.frames()).collect();
+    let mut frames: Vec<&LineFrame> = channels.flat_map(|channel| channel.frames()).collect();
     // Equal times stay in their order.
-    frames.sort_by_key(|own| own.at);
-    let senders: BTreeSet<Option<u8>> = frames.iter().map(|own| own.from).collect();
+    frames.sort_by_key(|frame| frame.at);
+    let senders: BTreeSet<Option<u8>> = frames.iter().map(|frame| frame.from).collect();
     let senders: Vec<Option<u8>> = std::iter::once(None)
         .chain(senders.into_iter().flatten().map(Some))
         .collect();
-    let rate = frames.iter().find_map(|own| rate_of(own));
-    let speed = rate.map(|own| u64::from(own.bits_per_second()));
+    let rate = frames.iter().find_map(|frame| rate_of(frame));
+    let speed = rate.map(|rate| u64::from(rate.bits_per_second()));
     for sender in &senders {
         let name = sender.map_or(MASTER.to_owned(), |drive| format!("{DRIVE}{drive}"));
         block.interface(LINK_TYPE, &name, speed);
         block.end(&mut out)?;
     }
-    for own in frames {
-        let interface = senders.iter().position(|sender| *sender == own.from);
-        packet(&mut block, interface.unwrap_or_default(), own);
+    for frame in frames {
+        let interface = senders.iter().position(|sender| *sender == frame.from);
+        packet(&mut block, interface.unwrap_or_default(), frame);
         block.end(&mut out)?;
     }
     out.flush()
 }
 
 /// The rate at which a frame lasts as long as this one.
-pub fn rate_of(own: &LineFrame) -> Option<BitRate> {
-    let lasted = own.at.since(own.start).units();
-    let bits = own.frame.wire_bits();
+pub fn rate_of(frame: &LineFrame) -> Option<BitRate> {
+    let lasted = frame.at.since(frame.start).units();
+    let bits = frame.frame.wire_bits();
     let fits = |rate: &BitRate| {
         let bit = rate.bit_time().units();
         // With or without the intermission.
@@ -80,13 +80,13 @@ pub fn rate_of(own: &LineFrame) -> Option<BitRate> {
     let known = [1000, 800, 625, 500, 250, 125, 100, 50, 20, 10];
     let mut rates = known
         .into_iter()
-        .filter_map(|own| BitRate::from_bits_per_second(own * 1000));
-    rates.find(|rate| own.ended == FrameEnd::Good && fits(rate))
+        .filter_map(|kilobits| BitRate::from_bits_per_second(kilobits * 1000));
+    rates.find(|rate| frame.ended == FrameEnd::Good && fits(rate))
 }
 
 /// The packet of a frame that the sender with this number sent.
-pub(crate) fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
-    let frame = &own.frame;
+pub(crate) fn packet(block: &mut Block, interface: usize, carried: &LineFrame) {
+    let frame = &carried.frame;
     let mut data = [0; HEADER + MAX_DATA];
     let mut id = frame.id().number();
     let mut len = frame.dlc();
@@ -98,7 +98,7 @@ pub(crate) fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
         id |= REMOTE;
     }
     data[HEADER..HEADER + frame.data().len()].copy_from_slice(frame.data());
-    match own.ended {
+    match carried.ended {
         FrameEnd::Good => {}
         FrameEnd::Lost => comment = Some(LOST.to_owned()),
         FrameEnd::Error(error) => {
@@ -110,7 +110,7 @@ pub(crate) fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
     }
     data[..4].copy_from_slice(&id.to_be_bytes());
     data[4] = len as u8;
-    let nanos = own.at.since_start().as_nanos();
+    let nanos = carried.at.since_start().as_nanos();
     raw(block, interface, nanos, &data[..HEADER + len], comment);
 }
 

@@ -61,7 +61,7 @@ pub fn write(
     }
     let octet = bits_per_second.and_then(octet_time);
     for (from, octets) in telegrams {
-        let interface = senders.iter().position(|own| own == from);
+        let interface = senders.iter().position(|sender| sender == from);
         for part in octets.chunks(MOST) {
             let good = if from.is_none() { SENT } else { RECEIVED };
             let interface = interface.unwrap_or_default();
@@ -79,14 +79,14 @@ pub(crate) fn packet(
     octets: &[LineByte],
     octet: Option<Span>,
 ) {
-    let arrived: Vec<u8> = octets.iter().filter_map(|own| own.received).collect();
-    let damaged = octets.iter().find_map(|own| own.received.and(own.error));
+    let arrived: Vec<u8> = octets.iter().filter_map(|byte| byte.received).collect();
+    let damaged = octets.iter().find_map(|byte| byte.received.and(byte.error));
     let event = match damaged {
         _ if arrived.is_empty() => LOST,
         Some(error) => event_of(error),
         None => good,
     };
-    let end = octets.last().map_or(Instant::START, |own| own.at);
+    let end = octets.last().map_or(Instant::START, |octet| octet.at);
     block.begin(PACKET);
     block.put(&u32::try_from(interface).unwrap_or(0).to_le_bytes());
     header(block, end, event, arrived.len());
@@ -101,36 +101,36 @@ pub(crate) fn packet(
 
 fn event_of(error: LineError) -> u8 {
     let mut events = ERRORS.iter();
-    let own = events.find(|(own, _)| *own == error);
-    own.map_or(RECEIVED, |(_, event)| *event)
+    let row = events.find(|(known, _)| *known == error);
+    row.map_or(RECEIVED, |(_, event)| *event)
 }
 
 /// What differs from octets that arrived as they were sent, one behind the other.
 fn comment(octets: &[LineByte], octet: Option<Span>) -> String {
     let mut text = String::new();
     let mut before: Option<Instant> = None;
-    for (own, place) in octets.iter().zip(1..) {
+    for (byte, place) in octets.iter().zip(1..) {
         let mut say = |what: &str| {
             let comma = if text.is_empty() { "" } else { ", " };
             // Writing to a String cannot fail.
             let _infallible = write!(text, "{comma}byte {place} {what}");
         };
-        let gap = before.map(|before| own.at.since(before));
+        let gap = before.map(|before| byte.at.since(before));
         if let Some(gap) = gap.filter(|gap| octet.is_none_or(|octet| !near(*gap, octet))) {
             say(&format!("after {} ns", gap.as_nanos()));
         }
-        match (own.received, own.error) {
+        match (byte.received, byte.error) {
             (None, _) => say("lost"),
             (Some(_), Some(error)) => say(error.name()),
             (Some(_), None) => {}
         }
-        if own.sent != own.received {
-            match own.sent {
+        if byte.sent != byte.received {
+            match byte.sent {
                 Some(sent) => say(&format!("sent {sent:02X}")),
                 None => say("sent nothing"),
             }
         }
-        before = Some(own.at);
+        before = Some(byte.at);
     }
     text
 }
@@ -164,21 +164,20 @@ fn remarks(comment: &str) -> BTreeMap<usize, Remarks> {
         let ["byte", place, what @ ..] = words.as_slice() else {
             continue;
         };
-        let Some(place) = place.parse().ok().filter(|own| (1..=MOST).contains(own)) else {
+        let place = place.parse().ok();
+        let Some(place) = place.filter(|place| (1..=MOST).contains(place)) else {
             continue;
         };
-        let own = all.entry(place).or_default();
+        let remarks = all.entry(place).or_default();
         match what {
-            ["lost"] => own.lost = true,
-            ["sent", "nothing"] => own.sent = Some(None),
-            ["sent", byte] => own.sent = u8::from_str_radix(byte, 16).ok().map(Some),
-            ["after", nanos, "ns"] => own.after = nanos.parse().ok().map(Span::from_nanos),
+            ["lost"] => remarks.lost = true,
+            ["sent", "nothing"] => remarks.sent = Some(None),
+            ["sent", byte] => remarks.sent = u8::from_str_radix(byte, 16).ok().map(Some),
+            ["after", nanos, "ns"] => remarks.after = nanos.parse().ok().map(Span::from_nanos),
             [error] => {
-                let known = ERRORS.iter().map(|(own, _)| *own);
-                own.error = known
-                    .into_iter()
-                    .find(|own| own.name() == *error)
-                    .or(own.error);
+                let mut known = ERRORS.iter().map(|(error, _)| *error);
+                let known = known.find(|known| known.name() == *error);
+                remarks.error = known.or(remarks.error);
             }
             _ => {}
         }
@@ -198,7 +197,7 @@ pub struct PacketOctet {
 /// Whether the time of a packet with this event is that of its first octet; `None` where the event says nothing of it. Programs of others
 /// write any event in front of good octets.
 pub fn time_of(event: u8) -> Option<bool> {
-    let damaged = ERRORS.iter().any(|(_, own)| *own == event);
+    let damaged = ERRORS.iter().any(|(_, code)| *code == event);
     (!damaged && event != LOST).then_some(![SENT, RECEIVED].contains(&event))
 }
 
@@ -211,26 +210,26 @@ pub fn octets(
     comment: &str,
     octet: Span,
 ) -> Vec<PacketOctet> {
-    let of_event = ERRORS.iter().find(|(_, own)| *own == event);
+    let of_event = ERRORS.iter().find(|(_, code)| *code == event);
     let remarks = remarks(comment);
     let mut found = pieces(arrived, &remarks);
     // A capture of others names the error in its event alone.
-    if let (Some((error, _)), true) = (of_event, found.iter().all(|own| own.error.is_none()))
-        && let Some(first) = found.iter_mut().find(|own| own.received.is_some())
+    if let (Some((error, _)), true) = (of_event, found.iter().all(|octet| octet.error.is_none()))
+        && let Some(first) = found.iter_mut().find(|octet| octet.received.is_some())
     {
         first.error = Some(*error);
     }
     let distance = |place: usize| {
-        let own = remarks.get(&place).and_then(|own| own.after);
-        own.unwrap_or(octet)
+        let after = remarks.get(&place).and_then(|remarks| remarks.after);
+        after.unwrap_or(octet)
     };
     let mut end = Span::from_nanos(nanos);
     if begins {
         end = (2..=found.len()).fold(end, |end, place| end + distance(place));
     }
     // Backwards from the end, so that only the time of the packet is cut off.
-    for (index, own) in found.iter_mut().enumerate().rev() {
-        own.nanos = end.as_nanos();
+    for (index, octet) in found.iter_mut().enumerate().rev() {
+        octet.nanos = end.as_nanos();
         end = end.saturating_sub(distance(index + 1));
     }
     found
@@ -241,19 +240,19 @@ fn pieces(arrived: &[u8], remarks: &BTreeMap<usize, Remarks>) -> Vec<PacketOctet
     let mut left = arrived.iter();
     let mut found = Vec::new();
     for place in 1.. {
-        let own = remarks.get(&place).copied().unwrap_or_default();
-        let received = match own.lost {
+        let remarks = remarks.get(&place).copied().unwrap_or_default();
+        let received = match remarks.lost {
             true => None,
             false => left.next().copied(),
         };
-        if !own.lost && received.is_none() {
+        if !remarks.lost && received.is_none() {
             break;
         }
         found.push(PacketOctet {
             nanos: 0,
-            sent: own.sent.unwrap_or(received),
+            sent: remarks.sent.unwrap_or(received),
             received,
-            error: own.error.filter(|_| received.is_some()),
+            error: remarks.error.filter(|_| received.is_some()),
         });
     }
     found
@@ -293,11 +292,11 @@ mod tests {
         let read = octets((0x08, 144_000), false, &arrived, &text, BYTE);
         let expected: Vec<_> = line
             .iter()
-            .map(|own| PacketOctet {
-                nanos: own.at.since_start().as_nanos(),
-                sent: own.sent,
-                received: own.received,
-                error: own.error,
+            .map(|byte| PacketOctet {
+                nanos: byte.at.since_start().as_nanos(),
+                sent: byte.sent,
+                received: byte.received,
+                error: byte.error,
             })
             .collect();
         assert_eq!(read, expected);
@@ -318,7 +317,7 @@ mod tests {
             "my favourite, byte",
             BYTE,
         );
-        let nanos: Vec<_> = first.iter().map(|own| own.nanos).collect();
+        let nanos: Vec<_> = first.iter().map(|octet| octet.nanos).collect();
         assert_eq!(nanos, [22_000, 44_000]);
         let damaged = octets((0x08, 44_000), false, &[0x10, 0x16], "", BYTE);
         assert_eq!(damaged[0].error, Some(LineError::Parity));

@@ -72,7 +72,7 @@ pub(crate) fn svg(traces: &[Trace], options: &SvgOptions<'_>) -> String {
         html.line("title", &[("id", &"ring-title")], options.title);
         let described: Vec<_> = pictures.iter().map(RingPicture::description).collect();
         html.line("desc", &[("id", &"ring-desc")], described.join(" "));
-        html.own("style", STYLE);
+        html.raw_text("style", STYLE);
         let whole: [Attribute<'_>; 3] =
             [("class", &"page"), ("width", &"100%"), ("height", &"100%")];
         html.shape("rect", &whole);

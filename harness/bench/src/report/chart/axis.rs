@@ -21,14 +21,14 @@ pub(crate) fn ticks(from: f64, to: f64, most: usize, unit: &str) -> Vec<f64> {
         HEX => raw.max(1.0).log2().ceil().exp2(),
         _ => {
             let power = 10_f64.powf(raw.log10().floor());
-            let steps = [1.0, 2.0, 5.0].map(|own| own * power);
-            let step = steps.into_iter().find(|own| *own >= raw * 0.999);
+            let steps = [1.0, 2.0, 5.0].map(|factor| factor * power);
+            let step = steps.into_iter().find(|step| *step >= raw * 0.999);
             step.unwrap_or(10.0 * power)
         }
     };
     let first = (from / step - 1e-9).ceil();
     let all = (0..=most + 1).map(|number| (first + number as f64) * step);
-    all.take_while(|own| *own <= to + step * 1e-9).collect()
+    all.take_while(|tick| *tick <= to + step * 1e-9).collect()
 }
 
 /// How far two neighbours of a list are apart.
@@ -113,7 +113,7 @@ pub fn label(value: f64, apart: f64, unit: &str) -> String {
 fn decimals(step: f64) -> usize {
     let places = (-step.log10() - 1e-9).ceil().clamp(0.0, 9.0);
     (0..=9_u8)
-        .find(|own| f64::from(*own) >= places)
+        .find(|count| f64::from(*count) >= places)
         .map_or(9, usize::from)
 }
 
@@ -127,7 +127,7 @@ mod tests {
         assert_eq!(ticks(0.0, 100.0, 8), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
         let near = ticks(0.13, 0.31, 4)
             .into_iter()
-            .map(|own| format!("{own:.3}"));
+            .map(|tick| format!("{tick:.3}"));
         assert_eq!(
             near.collect::<Vec<_>>().join(" "),
             "0.150 0.200 0.250 0.300"

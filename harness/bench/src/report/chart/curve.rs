@@ -164,7 +164,7 @@ pub mod tests {
     #[test]
     fn gaps_stay_open() {
         let v = Some(1.0);
-        let own = curve(&[
+        let curve = curve(&[
             (0.0, v),
             (1.0, v),
             (2.0, None),
@@ -172,17 +172,17 @@ pub mod tests {
             (4.0, v),
             (9.0, v),
         ]);
-        let pieces = own.pieces();
+        let pieces = curve.pieces();
         assert_eq!(
             pieces.iter().map(Vec::len).collect::<Vec<_>>(),
             [2, 2, 1],
             "{pieces:?}"
         );
         assert_eq!(
-            own.words(Along::Time),
+            curve.words(Along::Time),
             "a [rpm]: 5 samples, about every 1 ms, 2 gaps"
         );
-        let (line, dots) = paths(&own, &|x| x, &|y| y);
+        let (line, dots) = paths(&curve, &|x| x, &|y| y);
         assert_eq!(line, "M0.0 1.0L1.0 1.0M3.0 1.0L4.0 1.0M9.0 1.0");
         assert_eq!(dots.matches('M').count(), 5);
         // Where changes were noted, a value holds.
@@ -199,11 +199,12 @@ pub mod tests {
     fn a_long_curve_keeps_its_peaks() {
         let mut points: Vec<_> = (0..100_000).map(|at| (f64::from(at), Some(0.0))).collect();
         points[54_321].1 = Some(7.0);
-        let own = curve(&points);
-        let drawn = own.drawn().concat();
+        let long = curve(&points);
+        let drawn = long.drawn().concat();
         assert!(drawn.len() <= 2 * STEPS);
         assert!(drawn.contains(&(54_321.0, 7.0)));
-        points.iter_mut().step_by(2).for_each(|own| own.1 = None);
+        let every_other = points.iter_mut().step_by(2);
+        every_other.for_each(|(_, value)| *value = None);
         assert!(curve(&points).drawn().len() <= 2 * STEPS);
     }
 }

@@ -108,7 +108,7 @@ impl Chart<'_> {
     fn panels(&self, top: f64) -> Vec<Panel<'_>> {
         let mut panels: Vec<Panel<'_>> = Vec::new();
         for (number, curve) in self.shown().iter().enumerate() {
-            match panels.iter_mut().find(|own| own.unit == curve.unit) {
+            match panels.iter_mut().find(|panel| panel.unit == curve.unit) {
                 Some(panel) => panel.curves.push(number),
                 None => panels.push(Panel {
                     unit: &curve.unit,
@@ -124,7 +124,7 @@ impl Chart<'_> {
             let values = panel
                 .curves
                 .iter()
-                .flat_map(|own| self.curves[*own].known());
+                .flat_map(|index| self.curves[*index].known());
             let range = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (_, value)| {
                 (a.min(value), b.max(value))
             });
@@ -187,7 +187,7 @@ impl Chart<'_> {
     /// A picture of its own.
     pub fn picture(&self) -> String {
         let lines = [self.curves.len() > MAX_CURVES, !self.note.is_empty()];
-        let count = self.shown().len() + lines.into_iter().filter(|own| *own).count();
+        let count = self.shown().len() + lines.into_iter().filter(|line| *line).count();
         let panels = self.panels(30.0 + count as f64 * LINE);
         let mut html = Html::new();
         self.svg(&mut html, &panels, true);
@@ -196,7 +196,7 @@ impl Chart<'_> {
 
     /// The picture: in a page as wide as the page, which has room for the values on its left; `whole`: with all that a file of its own needs.
     fn svg(&self, html: &mut Html, panels: &[Panel<'_>], whole: bool) {
-        let bottom = panels.last().map_or(0.0, |own| own.top + HEIGHT);
+        let bottom = panels.last().map_or(0.0, |panel| panel.top + HEIGHT);
         let height = bottom + FOOT;
         let (title, described) = (format!("{}-t", self.id), format!("{}-d", self.id));
         let named = format!("{title} {described}");
@@ -234,7 +234,7 @@ impl Chart<'_> {
 
     /// What a picture of its own has beside its panels: style, title and legend.
     fn heading(&self, html: &mut Html) {
-        html.own("style", STYLE);
+        html.raw_text("style", STYLE);
         html.shape(
             "rect",
             &[("class", &"page"), ("width", &"100%"), ("height", &"100%")],
@@ -273,9 +273,9 @@ impl Chart<'_> {
             number(ends.1 / per, unit)
         );
         for curve in self.shown() {
-            let value = |own: f64| format!("{} {}", number(own, &curve.unit), curve.unit);
-            let least = curve.known().map(|own| own.1).min_by(f64::total_cmp);
-            let most = curve.known().map(|own| own.1).max_by(f64::total_cmp);
+            let value = |value: f64| format!("{} {}", number(value, &curve.unit), curve.unit);
+            let least = curve.known().map(|(_, value)| value).min_by(f64::total_cmp);
+            let most = curve.known().map(|(_, value)| value).max_by(f64::total_cmp);
             let (first, last) = (curve.known().next(), curve.known().next_back());
             let (Some(least), Some(most), Some(first), Some(last)) = (least, most, first, last)
             else {
@@ -387,8 +387,8 @@ impl Chart<'_> {
         let (unit, per) = self.along.unit((from, to));
         let mut curves: Vec<_> = Vec::new();
         for (place, panel) in panels.iter().enumerate() {
-            for own in &panel.curves {
-                let curve = &self.curves[*own];
+            for index in &panel.curves {
+                let curve = &self.curves[*index];
                 let points = curve.drawn().concat();
                 let every = (curve.known().count() as f64 / points.len().max(1) as f64).ceil();
                 let rounded = |at: f64| (at * 1e6).round() / 1e6;
@@ -399,10 +399,10 @@ impl Chart<'_> {
                     held: curve.held,
                     // Of several samples two are shown.
                     reach: curve.reach() * every.max(1.0),
-                    at: points.iter().map(|own| rounded(own.0)).collect(),
+                    at: points.iter().map(|(at, _)| rounded(*at)).collect(),
                     words: points
                         .iter()
-                        .map(|own| number(own.1, &curve.unit))
+                        .map(|(_, value)| number(*value, &curve.unit))
                         .collect(),
                 });
             }
@@ -415,15 +415,15 @@ impl Chart<'_> {
             decimals: if self.along == Along::Time { 3 } else { 0 },
             panels: panels
                 .iter()
-                .map(|own| [own.top, HEIGHT, own.low, own.high])
+                .map(|panel| [panel.top, HEIGHT, panel.low, panel.high])
                 .collect(),
             curves,
         }
     }
 }
 
-fn tenth(own: f64) -> f64 {
-    (own * 10.0).round() / 10.0
+fn tenth(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
 }
 
 /// The classes of a curve: a colour, and dashes, which tell it from others without colours.

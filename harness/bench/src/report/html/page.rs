@@ -77,7 +77,7 @@ fn written(title: &str, front: &Html, sections: &[Section], kept: &[Vec<bool>]) 
                     format_args!("drivebench {}", env!("CARGO_PKG_VERSION")),
                 );
             });
-            html.own("script", SCRIPT);
+            html.raw_text("script", SCRIPT);
         });
     });
     html.finish()
@@ -110,7 +110,7 @@ fn head(html: &mut Html, title: &str) {
             &[("name", &"color-scheme"), ("content", &"light dark")],
         );
         html.line("title", &[], title);
-        html.own("style", STYLE);
+        html.raw_text("style", STYLE);
     });
 }
 

@@ -80,7 +80,7 @@ pub fn sequence(
 
 /// Where the line of a drive stands; that of the master is in front of them.
 fn place(drives: &[u8], drive: Option<u8>) -> usize {
-    let place = drive.and_then(|drive| drives.iter().position(|own| *own == drive));
+    let place = drive.and_then(|drive| drives.iter().position(|known| *known == drive));
     COLUMN * place.map_or(1, |place| place + 2)
 }
 
@@ -91,7 +91,7 @@ fn lifelines(html: &mut Html, drives: &[u8], name: &str, height: usize) {
         html.line(
             "text",
             &[("class", &"m"), ("x", &x), ("y", &(TOP - 12))],
-            drive.map_or("master".to_owned(), |own| format!("{name} {own}")),
+            drive.map_or("master".to_owned(), |drive| format!("{name} {drive}")),
         );
         let line = format!("M{x} {}V{height}", TOP - 4);
         html.shape("path", &[("class", &"zero"), ("d", &line)]);
