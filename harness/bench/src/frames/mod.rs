@@ -61,7 +61,7 @@ fn hexadecimal(digits: &[u8]) -> Option<u32> {
     if digits.is_empty() || digits.len() > 8 {
         return None;
     }
-    digits
-        .iter()
-        .try_fold(0, |number, &own| Some(number << 4 | digit(own)?))
+    digits.iter().try_fold(0, |number, &character| {
+        Some(number << 4 | digit(character)?)
+    })
 }

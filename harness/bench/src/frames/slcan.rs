@@ -323,7 +323,7 @@ fn frame(line: &[u8]) -> Result<(Frame, &[u8]), &'static str> {
     for (byte, pair) in data.iter_mut().zip(digits.chunks_exact(2)) {
         let value = pair
             .iter()
-            .try_fold(0, |value, &own| Some(value << 4 | digit(own)?));
+            .try_fold(0, |value, &character| Some(value << 4 | digit(character)?));
         *byte = value.ok_or(DATA)? as u8;
     }
     let frame = Frame::new(id, &data[..len]).map_err(|_| header)?;
@@ -529,7 +529,7 @@ mod tests {
     fn lines_are_bounded() {
         let mut lines = Lines::default();
         let mut push =
-            |text: &[u8]| -> Vec<_> { text.iter().filter_map(|own| lines.push(*own)).collect() };
+            |text: &[u8]| -> Vec<_> { text.iter().filter_map(|byte| lines.push(*byte)).collect() };
         assert_eq!(push(b"C\r\nO"), [Ok((b"C".to_vec(), CR))]);
         assert_eq!(push(b"\x07"), [Ok((b"O".to_vec(), BEL))]);
         let long = push(&[b'x'; 100_000]);

@@ -186,7 +186,7 @@ impl SocketcandAnswer {
 fn words(message: &[u8]) -> Vec<&[u8]> {
     let inner = message.strip_prefix(b"<").unwrap_or(message);
     let inner = inner.strip_suffix(b">").unwrap_or(inner);
-    let words = inner.split(|own| own.is_ascii_whitespace());
+    let words = inner.split(|byte| byte.is_ascii_whitespace());
     words.filter(|word| !word.is_empty()).collect()
 }
 
@@ -231,7 +231,7 @@ fn bytes(words: &[&[u8]]) -> Option<Vec<u8>> {
 fn stamp(word: &[u8]) -> Option<Stamp> {
     let text = std::str::from_utf8(word).ok()?;
     let (seconds, places) = text.split_once('.')?;
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|own| own.is_ascii_digit());
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !digits(seconds) || !digits(places) || places.len() > 6 {
         return None;
     }
@@ -417,7 +417,7 @@ mod tests {
     fn streams_are_cut_into_messages() {
         let mut messages = Messages::default();
         let mut push =
-            |text: &[u8]| -> Vec<_> { text.iter().filter_map(|own| messages.push(*own)).collect() };
+            |text: &[u8]| -> Vec<_> { text.iter().flat_map(|byte| messages.push(*byte)).collect() };
         assert!(push(b"< o").is_empty());
         let two = push(b"k >\n< hi >< e");
         assert_eq!(two, [Ok(b"< ok >".to_vec()), Ok(b"< hi >".to_vec())]);

@@ -92,9 +92,9 @@ mod tests {
         let path = folder.path().join("port");
         let file = File::create(&path).expect("room");
         assert_eq!(refuse_used(&path, &file).ok(), Some(()));
-        let own = File::open(&path).expect("a file");
+        let input = File::open(&path).expect("a file");
         let mut other = Command::new("sleep");
-        let other = other.arg("600").stdin(Stdio::from(own)).spawn();
+        let other = other.arg("600").stdin(Stdio::from(input)).spawn();
         let mut other = other.expect("a process");
         let refused = refuse_used(&path, &file).expect_err("in use").to_string();
         other.kill().expect("a process");

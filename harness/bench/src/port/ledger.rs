@@ -86,11 +86,11 @@ mod tests {
             received: received.wrapping_sub(5),
             ..Counts::default()
         };
-        let mut own = Ledger::new(counts(0, 0), start);
+        let mut ledger = Ledger::new(counts(0, 0), start);
         let mut beside = |sent, read, counted: Counts, steps| {
-            own.sent(sent);
-            (0..read).for_each(|_| own.read());
-            own.beside(counted, start + DELIVERED * steps)
+            ledger.sent(sent);
+            (0..read).for_each(|_| ledger.read());
+            ledger.beside(counted, start + DELIVERED * steps)
         };
         assert_eq!(
             beside(10, 0, counts(7, 3), 0),
@@ -125,11 +125,11 @@ mod tests {
     #[test]
     fn a_driver_that_does_not_count() {
         let start = Instant::now();
-        let mut own = Ledger::new(Counts::default(), start);
-        own.sent(5);
-        (0..5).for_each(|_| own.read());
+        let mut ledger = Ledger::new(Counts::default(), start);
+        ledger.sent(5);
+        (0..5).for_each(|_| ledger.read());
         for step in 0..3 {
-            let found = own.beside(Counts::default(), start + DELIVERED * step);
+            let found = ledger.beside(Counts::default(), start + DELIVERED * step);
             assert_eq!(found, (0, 0));
         }
     }

@@ -148,7 +148,7 @@ pub(super) fn open(
     set_marks(&fd, format).map_err(refused)?;
     rustix::termios::tcflush(&fd, QueueSelector::IFlush)
         .map_err(|error| OpenError::of(path, &error.into()))?;
-    serial.ledger = harness_uart::counts(&fd).map(|own| Ledger::new(own, Instant::now()));
+    serial.ledger = harness_uart::counts(&fd).map(|counts| Ledger::new(counts, Instant::now()));
     if low_latency {
         serial.low_latency = LowLatency::of(&fd);
     }
@@ -300,8 +300,8 @@ impl Serial {
     pub(super) fn take_unplaced(&mut self, fd: &OwnedFd, has_come: bool) -> u64 {
         let now = Instant::now();
         let ledger = self.ledger.as_mut();
-        let ledger = ledger.filter(|own| has_come || own.is_due(now));
-        let beside = ledger.and_then(|own| Some(own.beside(harness_uart::counts(fd)?, now)));
+        let ledger = ledger.filter(|ledger| has_come || ledger.is_due(now));
+        let beside = ledger.and_then(|ledger| Some(ledger.beside(harness_uart::counts(fd)?, now)));
         beside.map_or(0, |(lost, foreign)| lost + foreign)
     }
 
@@ -317,7 +317,7 @@ impl Serial {
 
     /// This number of bytes was written.
     pub(super) fn wrote(&mut self, bytes: usize) {
-        self.ledger.iter_mut().for_each(|own| own.sent(bytes));
+        self.ledger.iter_mut().for_each(|ledger| ledger.sent(bytes));
         let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
         self.free = self.free.max(Instant::now()) + self.byte_time * bytes;
     }
@@ -331,7 +331,7 @@ impl Serial {
 
     /// Sends a byte with a wrong parity bit. What came before must have been read.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
-        self.ledger.iter_mut().for_each(|own| own.sent(1));
+        self.ledger.iter_mut().for_each(|ledger| ledger.sent(1));
         let idle = send_wrong_parity(
             &mut fd.as_fd(),
             byte,

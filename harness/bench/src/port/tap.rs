@@ -80,7 +80,7 @@ impl SilentTap {
         let tap = Self {
             unmark: (marks || !pty).then(Unmark::default),
             kinds: ErrorKinds::new(harness_uart::counts(&fd)),
-            ledger: harness_uart::counts(&fd).map(|own| Ledger::new(own, Instant::now())),
+            ledger: harness_uart::counts(&fd).map(|counts| Ledger::new(counts, Instant::now())),
             _low_latency: LowLatency::of(&fd),
             fd,
         };
@@ -120,7 +120,7 @@ impl SilentTap {
         if let Some(ledger) = &mut self.ledger {
             new.iter().for_each(|_| ledger.read());
         }
-        if new.iter().any(|own| own.error.is_some()) {
+        if new.iter().any(|received| received.error.is_some()) {
             self.kinds.name(new, harness_uart::counts(&self.fd));
         }
         Ok(state)
@@ -142,7 +142,7 @@ impl SilentTap {
                     None => heard.push(Received::good(*byte)),
                     Some(unmark) => match unmark.push(*byte) {
                         None => {}
-                        Some(Ok(own)) => heard.push(own),
+                        Some(Ok(received)) => heard.push(received),
                         // An FF that no mark follows: the coding lost a byte.
                         Some(Err(bad)) => heard.push(Received::bad(bad.byte, LineError::Overrun)),
                     },
@@ -155,7 +155,8 @@ impl SilentTap {
     pub fn take_lost(&mut self) -> u64 {
         let counts = harness_uart::counts(&self.fd);
         let both = self.ledger.as_mut().zip(counts);
-        both.map_or(0, |(own, counts)| own.beside(counts, Instant::now()).0)
+        let now = Instant::now();
+        both.map_or(0, |(ledger, counts)| ledger.beside(counts, now).0)
     }
 
     /// What the driver has counted at this port so far; `None` where it does not count.
@@ -194,7 +195,7 @@ impl ErrorKinds {
             [0, 0, _] => (LineError::Break, &mut known.breaks),
             _ => return *known = now,
         };
-        for byte in heard.iter_mut().filter(|own| own.error.is_some()) {
+        for byte in heard.iter_mut().filter(|byte| byte.error.is_some()) {
             byte.error = Some(kind);
             *counted = counted.wrapping_add(1);
         }
@@ -242,25 +243,22 @@ fn listens(now: &Termios, wanted: &Termios) -> bool {
 
 /// The first flag with which a port answers by itself what it receives.
 fn speaks(mode: &Termios) -> Option<&'static str> {
-    let local = [
-        (LocalModes::ECHO, "to turn echo off (ECHO)"),
-        (LocalModes::ECHONL, "to turn echo off (ECHONL)"),
-        (LocalModes::ICANON, "raw input (ICANON)"),
-        (LocalModes::ISIG, "raw input (ISIG)"),
-    ];
-    let input = [
-        (InputModes::IXON, "to turn flow control off (IXON)"),
-        (InputModes::IXOFF, "to turn flow control off (IXOFF)"),
-    ];
-    let local = local.iter().find(|own| mode.local_modes.contains(own.0));
-    let input = input.iter().find(|own| mode.input_modes.contains(own.0));
+    let local = |flag| mode.local_modes.contains(flag);
+    let input = |flag| mode.input_modes.contains(flag);
     let hardware = mode.control_modes.contains(ControlModes::CRTSCTS);
     let output = mode.output_modes.contains(OutputModes::OPOST);
-    local
-        .map(|own| own.1)
-        .or(input.map(|own| own.1))
-        .or(hardware.then_some("to turn flow control off (CRTSCTS)"))
-        .or(output.then_some("raw output (OPOST)"))
+    let flags = [
+        (local(LocalModes::ECHO), "to turn echo off (ECHO)"),
+        (local(LocalModes::ECHONL), "to turn echo off (ECHONL)"),
+        (local(LocalModes::ICANON), "raw input (ICANON)"),
+        (local(LocalModes::ISIG), "raw input (ISIG)"),
+        (input(InputModes::IXON), "to turn flow control off (IXON)"),
+        (input(InputModes::IXOFF), "to turn flow control off (IXOFF)"),
+        (hardware, "to turn flow control off (CRTSCTS)"),
+        (output, "raw output (OPOST)"),
+    ];
+    let first = flags.into_iter().find(|(is_set, _)| *is_set);
+    first.map(|(_, words)| words)
 }
 
 #[cfg(test)]
@@ -317,7 +315,7 @@ mod tests {
         let mut heard = Vec::new();
         assert!(arrives(&tap, 5_000));
         assert_eq!(tap.read(&mut heard).expect("open"), TapState::Open);
-        let heard: Vec<_> = heard.iter().map(|own| own.byte).collect();
+        let heard: Vec<_> = heard.iter().map(|received| received.byte).collect();
         assert_eq!(heard, sent);
         assert!(!arrives(&master, 200), "an echo");
         assert_eq!(tap.counts(), None);

@@ -332,9 +332,9 @@ impl Wire {
 
     /// What a serial port shows when its adapter is gone: an end, or one of these errors.
     fn has_no_adapter(&self, error: Option<&std::io::Error>) -> bool {
-        let gone = [Errno::IO, Errno::NODEV, Errno::NXIO].map(|own| Some(own.raw_os_error()));
+        let gone = [Errno::IO, Errno::NODEV, Errno::NXIO].map(|errno| Some(errno.raw_os_error()));
         let is_port = self.is_uart() || self.plain_serial.is_some();
-        is_port && error.is_none_or(|own| gone.contains(&own.raw_os_error()))
+        is_port && error.is_none_or(|error| gone.contains(&error.raw_os_error()))
     }
 
     fn closed(&self) -> Trouble {

@@ -32,7 +32,7 @@ impl ServedThread {
         let told_of = options
             .places
             .iter()
-            .filter(|own| **own != ServedAt::Nowhere);
+            .filter(|place| **place != ServedAt::Nowhere);
         let count = told_of.count();
         let thread =
             spawn(move || serve_until(ending, server, &options, &mut Teller(told)).map(|_end| ()));

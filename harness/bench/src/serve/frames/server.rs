@@ -116,7 +116,7 @@ impl<B: SharedBus> FrameServer<B> {
     pub fn room(&mut self, client: usize) -> usize {
         let waiting = self.bus.host(client).map_or(0, |host| host.waiting());
         match self.seats.get(client).and_then(|seat| seat.client.as_ref()) {
-            Some(own) if waiting < WAITING => UNREAD.saturating_sub(own.outbox.len()),
+            Some(served) if waiting < WAITING => UNREAD.saturating_sub(served.outbox.len()),
             _ => 0,
         }
     }
@@ -126,12 +126,12 @@ impl<B: SharedBus> FrameServer<B> {
         let mut said = Vec::new();
         let mut answers = Vec::new();
         let seat = self.seats.get_mut(client);
-        let Some(own) = seat.and_then(|seat| seat.client.as_mut()) else {
+        let Some(served) = seat.and_then(|seat| seat.client.as_mut()) else {
             return said;
         };
         let now = self.bus.now();
-        let acts = own.session.receive(now, bytes, &mut answers);
-        own.outbox.extend(answers);
+        let acts = served.session.receive(now, bytes, &mut answers);
+        served.outbox.extend(answers);
         for act in acts {
             match act {
                 Act::Say(text) => said.push(text),
@@ -206,14 +206,14 @@ impl<B: SharedBus> FrameServer<B> {
     pub fn transmit(&mut self, client: usize) -> &[u8] {
         let seat = self.seats.get_mut(client);
         seat.and_then(|seat| seat.client.as_mut())
-            .map_or(&[], |own| own.outbox.make_contiguous())
+            .map_or(&[], |served| served.outbox.make_contiguous())
     }
 
     /// The first `count` bytes of that have been passed on.
     pub fn transmitted(&mut self, client: usize, count: usize) {
         let seat = self.seats.get_mut(client);
-        if let Some(own) = seat.and_then(|seat| seat.client.as_mut()) {
-            own.outbox.drain(..count.min(own.outbox.len()));
+        if let Some(served) = seat.and_then(|seat| seat.client.as_mut()) {
+            served.outbox.drain(..count.min(served.outbox.len()));
         }
     }
 
@@ -222,7 +222,7 @@ impl<B: SharedBus> FrameServer<B> {
     pub fn lost(&self, client: usize) -> u64 {
         let seat = self.seats.get(client);
         seat.and_then(|seat| seat.client.as_ref())
-            .map_or(0, |own| own.lost)
+            .map_or(0, |served| served.lost)
     }
 
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.
@@ -230,9 +230,9 @@ impl<B: SharedBus> FrameServer<B> {
     pub fn deadline(&self) -> Instant {
         let (from, to) = self.base;
         let clients = self.seats.iter().filter_map(|seat| seat.client.as_ref());
-        let heard = clients.filter_map(|own| {
-            let (at, _) = own.heard.front()?;
-            Some(own.session.holds_until().max(*at))
+        let heard = clients.filter_map(|client| {
+            let (at, _) = client.heard.front()?;
+            Some(client.session.holds_until().max(*at))
         });
         let leaves = self.seats.iter().filter_map(|seat| seat.leaves);
         let next = heard.chain(leaves).chain(self.bus.next_event()).min();

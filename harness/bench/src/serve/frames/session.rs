@@ -203,11 +203,11 @@ impl Adapter {
 
     fn open(&mut self, listen_only: bool, acts: &mut Vec<Act>) -> Report {
         let bus = self.bus;
-        match self.rate.filter(|own| *own != bus) {
-            Some(own) => {
+        match self.rate.filter(|rate| *rate != bus) {
+            Some(rate) => {
                 self.channel = Channel::OffRate(0);
                 acts.push(Act::Say(format!(
-                    "the client has opened its channel at {own}, and the bus runs at {bus}: it hears nothing and its frames are \
+                    "the client has opened its channel at {rate}, and the bus runs at {bus}: it hears nothing and its frames are \
                      not sent; choose the rate of the bus"
                 )));
             }

@@ -190,10 +190,9 @@ impl<B: SharedBus> Shell<'_, B> {
         for seat in &self.seats {
             let mut stream = PollFlags::empty();
             // A pseudo terminal without a client is read: that shows when one comes.
-            let room = seat.client.is_none_or(|own| self.server.room(own) > 0);
-            let waits = seat
-                .client
-                .is_some_and(|own| !self.server.transmit(own).is_empty());
+            let client = seat.client;
+            let room = client.is_none_or(|client| self.server.room(client) > 0);
+            let waits = client.is_some_and(|client| !self.server.transmit(client).is_empty());
             stream.set(PollFlags::IN, room);
             stream.set(PollFlags::OUT, waits);
             match &seat.end {
@@ -237,11 +236,11 @@ impl<B: SharedBus> Shell<'_, B> {
 
     /// Gives a client its place on the bus; without one, a connection is closed.
     fn come(&mut self, seat: usize) {
-        let own = &mut self.seats[seat];
-        own.wrong = false;
-        own.losing = false;
-        own.client = self.server.come(own.protocol);
-        let text = match own.client {
+        let taken = &mut self.seats[seat];
+        taken.wrong = false;
+        taken.losing = false;
+        taken.client = self.server.come(taken.protocol);
+        let text = match taken.client {
             Some(_) => {
                 self.here += 1;
                 self.gone = false;
@@ -329,7 +328,7 @@ impl<B: SharedBus> Shell<'_, B> {
         let mut buffer = [0; CHUNK];
         loop {
             let client = self.seats[seat].client;
-            let room = client.map_or(CHUNK, |own| self.server.room(own).min(CHUNK));
+            let room = client.map_or(CHUNK, |client| self.server.room(client).min(CHUNK));
             if room == 0 {
                 return Ok(false);
             }
