@@ -88,15 +88,15 @@ pub fn sums(path: &Path) -> Result<String, EvidenceError> {
 
 /// The names of the regular files of a folder, in order.
 pub fn names(path: &Path) -> Vec<String> {
-    let listing = Listing::of(path);
-    listing.map_or_else(|_| Vec::new(), |own| own.files.into_iter().collect())
+    let files = Listing::of(path).map(|listing| listing.files);
+    files.unwrap_or_default().into_iter().collect()
 }
 
 /// How many bytes the files of a folder have together, and how many of them its captures have.
 #[must_use]
 pub fn size(path: &Path) -> (u64, u64) {
     let files = names(path).into_iter().chain([SUMS.to_owned()]);
-    let size = |file: &String| path.join(file).metadata().map_or(0, |own| own.len());
+    let size = |file: &String| path.join(file).metadata().map_or(0, |data| data.len());
     let (captures, others): (Vec<_>, Vec<_>) =
         files.partition(|file| Path::new(file).starts_with(CAPTURES));
     let captures = captures.iter().map(size).sum();
@@ -122,7 +122,7 @@ pub fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
     for (file, sum) in &stated {
         match sums.get(*file) {
             None => wrong.push(format!("{file} is missing")),
-            Some(own) if own != sum => wrong.push(format!("{file} was changed")),
+            Some(actual) if actual != sum => wrong.push(format!("{file} was changed")),
             Some(_) => {}
         }
     }

@@ -30,7 +30,7 @@ pub struct JunitCase {
 #[must_use]
 pub fn junit(suite: &str, cases: &[JunitCase]) -> String {
     let mut report = Report::new("drivebench");
-    let mut own = TestSuite::new(named(suite, "run"));
+    let mut suite = TestSuite::new(named(suite, "run"));
     let mut took = Duration::ZERO;
     let mut names = BTreeSet::new();
     for case in cases {
@@ -43,10 +43,10 @@ pub fn junit(suite: &str, cases: &[JunitCase]) -> String {
             test.set_system_out(output);
         }
         took += time;
-        own.add_test_case(test);
+        suite.add_test_case(test);
     }
-    own.set_time(took);
-    report.set_time(took).add_test_suite(own);
+    suite.set_time(took);
+    report.set_time(took).add_test_suite(suite);
     let xml = report.to_string().unwrap_or_default();
     without_skipped(xml)
 }
@@ -68,10 +68,10 @@ fn without_skipped(mut xml: String) -> String {
 
 /// A name that no case has had yet: GitLab drops cases with the same name.
 fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
-    let own = named(name, "scenario");
-    let later = (2..).map(|number: usize| format!("{own}_{number}"));
-    let mut free = std::iter::once(own.clone()).chain(later);
-    let name = free.find(|name| !names.contains(name)).unwrap_or(own);
+    let wanted = named(name, "scenario");
+    let later = (2..).map(|number: usize| format!("{wanted}_{number}"));
+    let mut free = std::iter::once(wanted.clone()).chain(later);
+    let name = free.find(|name| !names.contains(name)).unwrap_or(wanted);
     names.insert(name.clone());
     name
 }
@@ -125,7 +125,7 @@ fn output(case: &JunitCase) -> String {
 fn named(name: &str, otherwise: &str) -> String {
     match printable(name) {
         empty if empty.trim().is_empty() => otherwise.to_owned(),
-        own => own,
+        printable => printable,
     }
 }
 

@@ -12,9 +12,9 @@ pub struct Names {
 
 impl Names {
     /// Of a part of a run: these names come first, in this order, and no other scenario has a name of `all`.
-    pub fn planned(own: VecDeque<String>, all: BTreeSet<String>) -> Self {
+    pub fn planned(planned: VecDeque<String>, all: BTreeSet<String>) -> Self {
         Self {
-            planned: own,
+            planned: planned,
             given: all,
         }
     }
@@ -30,20 +30,20 @@ impl Names {
     fn unique(&mut self, name: &str) -> String {
         let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
         let bare = name.strip_suffix(".scn").unwrap_or(name);
-        let own: String = bare
+        let stem: String = bare
             .chars()
             .map(|c| if safe(c) { c } else { '_' })
             .take(120)
             .collect();
-        let own = match own.trim_matches(['_', '.']) {
+        let stem = match stem.trim_matches(['_', '.']) {
             "" => "scenario".to_owned(),
-            own => own.to_owned(),
+            stem => stem.to_owned(),
         };
-        let mut unique = own.clone();
+        let mut unique = stem.clone();
         let mut number = 1;
         while !self.given.insert(unique.clone()) {
             number += 1;
-            unique = format!("{own}_{number}");
+            unique = format!("{stem}_{number}");
         }
         unique
     }

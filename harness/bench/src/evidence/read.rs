@@ -71,12 +71,12 @@ pub fn read(
 pub fn unlike_written(number: usize, text: &[u8], line: &RecordLine) -> Option<String> {
     // Bytes and times of an event are written from their values.
     let event = line.event().and_then(|event| RecordLine::of(&event));
-    let own = serde_json::to_string(event.as_ref().unwrap_or(line)).unwrap_or_default();
+    let written = serde_json::to_string(event.as_ref().unwrap_or(line)).unwrap_or_default();
     let text = text.strip_suffix(b"\n").unwrap_or(text);
-    if text == own.as_bytes() {
+    if text == written.as_bytes() {
         return None;
     }
-    let same = text.iter().zip(own.as_bytes());
+    let same = text.iter().zip(written.as_bytes());
     let column = same.take_while(|(one, other)| one == other).count() + 1;
     Some(format!(
         "line {number}, column {column}: this program writes the line in other bytes"

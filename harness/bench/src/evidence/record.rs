@@ -7,6 +7,7 @@ use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Write;
 
@@ -417,9 +418,7 @@ impl Sink for Writer {
 /// Capabilities by their names; unknown ones are left out.
 #[must_use]
 pub fn capabilities(names: &[String]) -> Vec<Capability> {
-    let named = |name: &String| {
-        let mut all = Capability::NAMES.iter();
-        all.find(|(known, _)| known == name).map(|(_, own)| *own)
-    };
+    let all = BTreeMap::from(Capability::NAMES);
+    let named = |name: &String| all.get(name.as_str()).copied();
     names.iter().filter_map(named).collect()
 }

@@ -141,9 +141,9 @@ fn together(pieces: InputPieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>>
         InputPieces::Bytes { head, .. } => (second.get(head..)?.to_vec(), MOST_JOINED),
         InputPieces::Text(_) => {
             let lines: BTreeSet<_> = first.split_inclusive(|byte| *byte == b'\n').collect();
-            let own = second.split_inclusive(|byte| *byte == b'\n');
-            let own: Vec<_> = own.filter(|line| !lines.contains(line)).collect();
-            (own.concat(), MOST_JOINED_TEXT)
+            let others = second.split_inclusive(|byte| *byte == b'\n');
+            let others: Vec<_> = others.filter(|line| !lines.contains(line)).collect();
+            (others.concat(), MOST_JOINED_TEXT)
         }
     };
     let both = [first, &rest].concat();
@@ -230,9 +230,9 @@ pub fn superfluous(body: Body, inputs: &[(String, Vec<u8>)]) -> Vec<String> {
     for feature in reached.iter().flatten() {
         *counts.entry(feature).or_insert(0_usize) += 1;
     }
-    let idle = |own: &BTreeSet<Feature>| own.iter().all(|feature| counts[feature] > 1);
+    let idle = |features: &BTreeSet<Feature>| features.iter().all(|feature| counts[feature] > 1);
     let named = inputs.iter().zip(&reached);
-    let idle = named.filter(|((name, _), own)| name.contains("--") && idle(own));
+    let idle = named.filter(|((name, _), features)| name.contains("--") && idle(features));
     idle.map(|((name, _), _)| name.clone()).collect()
 }
 

@@ -82,7 +82,7 @@ impl<L: Line> Guarded<L> {
 
     /// It turned out that the link behind the guard cannot do this.
     pub fn lose(&mut self, capability: Capability) {
-        self.capabilities.retain(|own| *own != capability);
+        self.capabilities.retain(|known| *known != capability);
     }
 
     /// A drive has shown that it monitors time-outs.
@@ -140,7 +140,7 @@ impl<L: Line> Guarded<L> {
     pub fn end_if_overdue(&mut self) {
         let over = self
             .deadline
-            .is_some_and(|own| own <= std::time::Instant::now());
+            .is_some_and(|deadline| deadline <= std::time::Instant::now());
         if over && !self.trouble.as_ref().is_some_and(Trouble::ends_a_run) {
             self.trouble = Some(Trouble::Interlock(OVERDUE.to_owned()));
         }
@@ -190,8 +190,8 @@ impl<L: Line> Guarded<L> {
 
     /// Copies what the gates of another line to the same drives know of them, for a rehearsal on a model.
     pub fn know_as<M>(&mut self, other: &Guarded<M>) {
-        for (own, other) in self.gates.iter_mut().zip(&other.gates) {
-            own.know_as(other.as_ref());
+        for (gate, other) in self.gates.iter_mut().zip(&other.gates) {
+            gate.know_as(other.as_ref());
         }
     }
 

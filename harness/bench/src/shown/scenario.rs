@@ -244,8 +244,8 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
         let finding = played.outcome.finding.as_ref();
-        let difference = finding.and_then(|own| own.difference.as_ref());
-        let differs = difference.filter(|own| own.ring == ring);
+        let difference = finding.and_then(|finding| finding.difference.as_ref());
+        let differs = difference.filter(|difference| difference.ring == ring);
         let view = TraceView {
             trace,
             ring,
@@ -253,7 +253,7 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
             id: &format!("{id}-{ring}"),
             title: played.title,
             rate: played.rate,
-            differs: differs.map(|own| own.byte),
+            differs: differs.map(|difference| difference.byte),
         };
         let pictures = played.report.pictures(&view).into_iter();
         parts.extend(pictures.map(|(heading, html)| FoldedPart {

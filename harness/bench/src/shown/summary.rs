@@ -68,7 +68,7 @@ impl Row {
 
 /// What differed, or why a scenario was not played.
 fn why(outcome: &Outcome) -> String {
-    let finding = outcome.finding.as_ref().map(|own| own.message.clone());
+    let finding = outcome.finding.as_ref().map(|found| found.message.clone());
     let remark = || match outcome.verdict {
         Verdict::Passed => None,
         _ => outcome.remarks.first().cloned(),
@@ -86,8 +86,8 @@ fn damaged(played: &ScenarioView<'_>) -> BTreeMap<String, usize> {
 
 /// The verdict in a sentence, and where bytes were damaged.
 fn sentences(shown: &[ShownScenario]) -> String {
-    let bad = |own: &&ShownScenario| colour(own.row.verdict) == "bad";
-    let skipped = |own: &&ShownScenario| own.row.verdict == Verdict::Skipped;
+    let bad = |scenario: &&ShownScenario| colour(scenario.row.verdict) == "bad";
+    let skipped = |scenario: &&ShownScenario| scenario.row.verdict == Verdict::Skipped;
     let skips = shown.iter().filter(skipped).count();
     let played = shown.len() - skips;
     let failed = shown.iter().filter(bad).count();
@@ -110,7 +110,7 @@ fn sentences(shown: &[ShownScenario]) -> String {
         }
         None if played == 0 => "No scenario was played.".to_owned(),
         None => {
-            let passed = |own: &&ShownScenario| own.row.verdict == Verdict::Passed;
+            let passed = |scenario: &&ShownScenario| scenario.row.verdict == Verdict::Passed;
             let passed = shown.iter().filter(passed).count();
             format!(
                 "{passed} of {} passed, and none failed.{rest}",
@@ -119,11 +119,11 @@ fn sentences(shown: &[ShownScenario]) -> String {
         }
     };
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();
-    for (place, count) in shown.iter().flat_map(|own| &own.row.damaged) {
+    for (place, count) in shown.iter().flat_map(|scenario| &scenario.row.damaged) {
         *places.entry(place).or_default() += count;
     }
     let all: usize = places.values().sum();
-    if let Some((place, count)) = places.iter().max_by_key(|own| own.1) {
+    if let Some((place, count)) = places.iter().max_by_key(|(_, count)| **count) {
         let place = place.strip_prefix("the ").unwrap_or(place);
         // Writing to a String cannot fail.
         let _infallible = write!(
@@ -158,7 +158,7 @@ pub fn run(head: &Head<'_>, shown: Vec<ShownScenario>) -> String {
             html.line("h3", &[], heading);
             html.element("pre", &[], |html| html.line("code", &[], text));
         }
-        let skipped = |own: &&ShownScenario| own.row.verdict == Verdict::Skipped;
+        let skipped = |scenario: &&ShownScenario| scenario.row.verdict == Verdict::Skipped;
         let (skipped, played): (Vec<_>, Vec<_>) = shown.iter().partition(skipped);
         if !played.is_empty() {
             table(html, "Scenarios", &played);
@@ -173,8 +173,8 @@ pub fn run(head: &Head<'_>, shown: Vec<ShownScenario>) -> String {
     // What was skipped shows nothing but its reason, which the table has.
     let played = shown
         .into_iter()
-        .filter(|own| own.row.verdict != Verdict::Skipped);
-    let sections: Vec<_> = played.map(|own| own.section).collect();
+        .filter(|scenario| scenario.row.verdict != Verdict::Skipped);
+    let sections: Vec<_> = played.map(|scenario| scenario.section).collect();
     page(head.title, &front, &sections)
 }
 

@@ -96,13 +96,13 @@ impl TopForm {
     /// The headings of the columns.
     #[must_use]
     pub fn heads(&self) -> Vec<&'static str> {
-        self.columns.iter().map(|own| own.head).collect()
+        self.columns.iter().map(|column| column.head).collect()
     }
 
     /// The place of a state; the most serious one for a state that is not in the list.
     #[must_use]
     pub fn state(&self, name: &str) -> usize {
-        let place = self.states.iter().position(|own| *own == name);
+        let place = self.states.iter().position(|state| *state == name);
         place.unwrap_or(0)
     }
 }

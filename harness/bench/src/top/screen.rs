@@ -50,15 +50,15 @@ impl Screen {
     /// There is no terminal, or it cannot be set up; it is as it was then.
     pub fn enter(colour: bool) -> io::Result<Self> {
         give_back_before_panics();
-        let mut own = taken();
+        let mut taken = taken();
         enable_raw_mode()?;
-        *own = true;
+        *taken = true;
         let terminal = execute!(stdout(), EnterAlternateScreen)
             .and_then(|()| Terminal::new(CrosstermBackend::new(stdout())));
         match terminal {
             Ok(terminal) => Ok(Self { terminal, colour }),
             Err(error) => {
-                give_back(&mut own);
+                give_back(&mut taken);
                 Err(error)
             }
         }
@@ -69,8 +69,8 @@ impl Screen {
     /// # Errors
     /// The terminal takes nothing more.
     pub fn draw(&mut self, top: &mut Top) -> io::Result<()> {
-        let own = taken();
-        if *own {
+        let taken = taken();
+        if *taken {
             let colour = self.colour;
             self.terminal.draw(|frame| view::draw(top, colour, frame))?;
         }
@@ -125,8 +125,8 @@ fn key_of(code: KeyCode, control: bool) -> Option<Key> {
     })
 }
 
-fn give_back(own: &mut bool) {
-    if std::mem::replace(own, false) {
+fn give_back(taken: &mut bool) {
+    if std::mem::replace(taken, false) {
         // If the terminal is gone, there is nothing to give back.
         let _gone = execute!(stdout(), LeaveAlternateScreen, Show);
         let _gone = disable_raw_mode();
@@ -148,8 +148,8 @@ fn give_back_before_panics() {
 fn give_back_whoever_draws() {
     for _ in 0..WAITS {
         match TAKEN.try_lock() {
-            Ok(mut own) => return give_back(&mut own),
-            Err(TryLockError::Poisoned(own)) => return give_back(&mut own.into_inner()),
+            Ok(mut taken) => return give_back(&mut taken),
+            Err(TryLockError::Poisoned(taken)) => return give_back(&mut taken.into_inner()),
             Err(TryLockError::WouldBlock) => std::thread::sleep(WAIT),
         }
     }

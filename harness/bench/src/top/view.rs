@@ -213,7 +213,7 @@ fn shown_columns(form: &TopForm, widths: &[usize], width: usize) -> Vec<usize> {
     let mut shown: Vec<usize> = (0..form.columns.len()).collect();
     for gone in form.give_way {
         let before = shown.iter().filter_map(|column| widths.get(*column));
-        if before.map(|own| own + 2).sum::<usize>() + LAST_WIDTH > width {
+        if before.map(|column| column + 2).sum::<usize>() + LAST_WIDTH > width {
             shown.retain(|column| column != gone);
         }
     }
