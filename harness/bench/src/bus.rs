@@ -34,7 +34,6 @@ pub type Served = Result<Result<ServeEnd, ServeError>, Failure>;
 /// A campaign that was found and read; or what is wrong with it.
 pub(crate) type ReadCampaign = Result<Box<dyn Campaign>, CampaignError>;
 
-/// A bus.
 pub struct Bus {
     pub name: BusName,
     pub manual: Manual,

@@ -55,7 +55,7 @@ pub trait AxisDrives: Debug + Send {
     /// Lets time pass while the bus stays at work.
     fn wait(&self, time: Duration);
 
-    /// Gives the drives back; how a rig ended. Behind it there are none.
+    /// Gives the drives back; how a rig ended. After that there are none.
     fn close(&mut self) -> Option<End>;
 }
 

@@ -146,7 +146,6 @@ impl Html {
         self.out.len()
     }
 
-    /// Whether nothing was written.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.out.is_empty()
@@ -158,7 +157,6 @@ impl Html {
         self.out
     }
 
-    /// The page.
     #[must_use]
     pub fn finish(self) -> String {
         format!("<!DOCTYPE html>\n{}", self.out)

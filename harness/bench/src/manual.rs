@@ -7,7 +7,6 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug)]
 pub struct Manual {
     pub bus: BusName,
-    /// What it is called.
     pub title: &'static str,
     /// The document in a `source` line.
     pub document: &'static str,
@@ -40,7 +39,6 @@ pub struct ManualTable {
     pub section: String,
     /// What the reader finds there.
     pub title: String,
-    /// The printed page.
     pub page: Option<u32>,
 }
 
@@ -50,13 +48,10 @@ pub struct ManualTable {
 pub struct Erratum {
     /// Its number in the ledger.
     pub id: String,
-    /// Which manual.
     pub document: String,
     pub section: String,
-    /// What is printed.
     pub prints: String,
     pub meant: String,
-    /// The evidence.
     pub why: String,
     /// The table whose scenario shows it, or [`NOT_YET`].
     pub shown_by: String,

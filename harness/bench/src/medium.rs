@@ -19,7 +19,6 @@ pub enum Medium {
 }
 
 impl Medium {
-    /// Bits a second.
     #[must_use]
     pub const fn bits_per_second(self) -> u32 {
         match self {
@@ -37,7 +36,7 @@ impl Medium {
         }
     }
 
-    /// How long this takes on the line, one piece behind the other; exact. Zero for pieces of another medium, which it does not carry.
+    /// How long this takes on the line, one piece after the other; exact. Zero for pieces of another medium, which it does not carry.
     #[must_use]
     pub fn time_of(self, what: Out<'_>) -> Span {
         match (self, what) {
@@ -61,14 +60,11 @@ impl From<Rate> for Medium {
 /// What is sent through a port, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Out<'a> {
-    /// Octets.
     Octets(&'a [u8]),
-    /// Frames.
     Frames(&'a [Frame]),
 }
 
 impl<'a> Out<'a> {
-    /// How many pieces.
     #[must_use]
     pub const fn len(self) -> usize {
         match self {
@@ -77,7 +73,6 @@ impl<'a> Out<'a> {
         }
     }
 
-    /// Whether there is none.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.len() == 0
@@ -111,7 +106,6 @@ impl<'a> Out<'a> {
         }
     }
 
-    /// A copy of it.
     #[must_use]
     pub(crate) fn to_pieces(self) -> Pieces {
         match self {
@@ -124,9 +118,7 @@ impl<'a> Out<'a> {
 /// What was sent through a port, kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pieces {
-    /// Octets.
     Octets(Vec<u8>),
-    /// Frames.
     Frames(Vec<Frame>),
 }
 

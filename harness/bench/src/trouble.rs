@@ -19,7 +19,7 @@ pub enum Trouble {
 }
 
 impl Trouble {
-    /// Whether nothing more is played on a rig behind it.
+    /// Whether nothing more is played on a rig after it.
     #[must_use]
     pub fn ends_a_run(&self) -> bool {
         !matches!(self, Self::Denied(_))

@@ -35,7 +35,6 @@ pub struct CountsFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignCounts {
-    /// Its name.
     pub name: String,
     /// The sum of its file, its scenario and the names of all of its cases.
     sha256: String,
@@ -68,7 +67,6 @@ struct PairFacts {
 pub struct ClassCount {
     /// The name of the class.
     pub class: String,
-    /// How many.
     pub cases: u64,
 }
 

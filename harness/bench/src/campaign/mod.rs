@@ -16,12 +16,10 @@ use include_dir::Dir;
 use pairs::FaultPairs;
 use std::fmt::Debug;
 
-/// A class of outcomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutcomeClass {
     /// Its name in files and tables.
     pub name: &'static str,
-    /// What it means.
     pub about: &'static str,
     /// A letter, for readers who see no colours.
     pub letter: char,

@@ -51,7 +51,6 @@ pub trait FaultPairs {
 /// Pairs of a campaign that were counted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlayedPairs {
-    /// The campaign's name.
     pub name: String,
     /// What it shows.
     pub title: String,

@@ -64,7 +64,6 @@ impl Files {
         })
     }
 
-    /// The present file.
     pub const fn recorder(&mut self) -> &mut LiveRecorder<File> {
         &mut self.recorder
     }
@@ -182,7 +181,7 @@ mod tests {
         assert_eq!(files.paths().count(), before);
         assert!(files.paths().last().is_some_and(|path| path != kept[1]));
     }
-    /// A file says for how long the line was listened to in front of its first byte and behind its last.
+    /// A file says for how long the line was listened to in front of its first byte and after its last.
     #[test]
     fn a_file_says_when_it_began_and_ended() {
         let folder = tempfile::tempdir().expect("a folder");

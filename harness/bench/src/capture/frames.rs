@@ -158,7 +158,7 @@ pub(super) struct Log {
     pub(super) lost: bool,
 }
 
-/// The capture of a log. `links` chooses an interface where there are several. Times may be before 0; where a line has none, frames are placed one behind
+/// The capture of a log. `links` chooses an interface where there are several. Times may be before 0; where a line has none, frames are placed one after
 /// another.
 ///
 /// # Errors
@@ -423,7 +423,7 @@ mod tests {
         }
     }
 
-    /// A frame of the bench that is handed over before a drive's has come, and leaves behind it: both keep their times, which `verify` compares
+    /// A frame of the bench that is handed over before a drive's has come, and leaves after it: both keep their times, which `verify` compares
     /// with the record.
     #[test]
     fn a_frame_that_leaves_later_keeps_its_time() {

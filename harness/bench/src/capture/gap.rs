@@ -22,9 +22,8 @@ const MOST_NAMED: usize = 3;
 /// A silence of all stations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// The first piece behind it, counted from 0.
+    /// The first piece after it, counted from 0.
     pub piece: usize,
-    /// How long it lasts.
     pub silence: Span,
 }
 
@@ -90,7 +89,7 @@ mod tests {
         let pauses = |count| std::iter::repeat_n([10, 2_000], count).flatten();
         assert_eq!(places(cycle(20).chain(pauses(3))).len(), 3);
         assert_eq!(places(cycle(20).chain(pauses(4))).len(), 0);
-        // Parts that stand one behind another.
+        // Parts that stand one after another.
         let parts = (0..10).flat_map(|_| cycle(200).chain([60_000]));
         assert_eq!(places(parts).len(), 10);
     }

@@ -63,7 +63,6 @@ pub const SCHEMA: u32 = 1;
 /// The latest time, in nanoseconds, that a byte may have.
 const LATEST: u64 = u64::MAX / 4;
 
-/// Reads a file.
 pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let object: Object = serde_json::from_slice(bytes).map_err(|error| CaptureError::At {
         offset: offset(bytes, error.line(), error.column()),

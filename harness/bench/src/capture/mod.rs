@@ -88,7 +88,6 @@ pub enum CaptureError {
     At {
         /// Where, counted from 0.
         offset: usize,
-        /// What is wrong.
         what: String,
     },
     /// Something that it says of a link cannot be.
@@ -96,7 +95,6 @@ pub enum CaptureError {
     Link {
         /// Which link, and which byte of it.
         place: String,
-        /// What is wrong.
         what: String,
     },
 }
@@ -285,7 +283,7 @@ impl Capture {
         Ok(())
     }
 
-    /// The fastest rate at which no byte comes sooner behind another than it can.
+    /// The fastest rate at which no byte comes sooner after another than it can.
     fn guessed_rate(&self) -> Rate {
         let links = self.traces.iter().flat_map(|trace| &trace.channels);
         let gaps = links.flat_map(|link| link.octets().windows(2));

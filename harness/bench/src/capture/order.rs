@@ -251,7 +251,7 @@ mod tests {
             notes[0].starts_with("the clock was set during the log, at line 2"),
             "{notes:?}"
         );
-        // To a time behind the first one, also where times count from the start.
+        // To a time after the first one, also where times count from the start.
         let (_, seams, _) = times(&[100 * MS, 600 * MS, 200 * MS], Counts::Lines);
         assert_eq!(seams, [seam(2, SeamKind::ClockSet)]);
     }
@@ -269,7 +269,7 @@ mod tests {
             notes[0].contains("at line 3: the log has 2 recordings"),
             "{notes:?}"
         );
-        // Packets of two captures, one behind the other.
+        // Packets of two captures, one after the other.
         let (_, seams, _) = times(&[MS, 900 * MS, 300 * MS], Counts::Packets);
         assert_eq!(seams, [recording(2)]);
     }

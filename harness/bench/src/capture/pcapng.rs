@@ -189,7 +189,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
     Ok(capture.into())
 }
 
-/// Octets of packets one behind the other: packets of an adapter may be nearer to each other than their octets take.
+/// Octets of packets one after the other: packets of an adapter may be nearer to each other than their octets take.
 fn in_order(octets: impl Iterator<Item = PacketOctet>, octet: Span) -> Vec<PacketOctet> {
     let mut before: Option<u64> = None;
     let octets = octets.map(|packet| {
@@ -207,11 +207,10 @@ pub(super) struct Reader<'b> {
     pub(super) bytes: &'b [u8],
     /// The section's numbers have the high byte first.
     pub(super) big: bool,
-    /// Of all sections, one behind the other; `None` for those of another link type.
+    /// Of all sections, one after the other; `None` for those of another link type.
     interfaces: Vec<Option<Interface>>,
     /// The first interface of the present section.
     section: usize,
-    /// Packets so far.
     packets: usize,
     speed: Option<Rate>,
     bit_rate: Option<BitRate>,

@@ -90,7 +90,6 @@ pub struct LiveRecorder<W> {
     places: Vec<RecordedPlace>,
     /// Blocks that are not written yet: they leave in one piece.
     waiting: Vec<u8>,
-    /// Bytes written.
     written: u64,
 }
 

@@ -112,13 +112,13 @@ pub fn octet_time<'t>(octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>) 
         .or_else(|| distances.keys().next().copied())
 }
 
-/// Idle octets behind which a telegram begins in any case: 33 bits (T_SYN).
+/// Idle octets after which a telegram begins in any case: 33 bits (T_SYN).
 const SYN_OCTETS: u64 = SYN_BITS.div_ceil(OCTET_BITS);
 /// What times of captures, which are cut off to nanoseconds, may fall short of.
 const CUT: Span = Span::from_nanos(SYN_OCTETS + 1);
 
 /// The octets of a trace, cut into runs. An octet begins a run where another station has sent before it, where the line was idle for 33 bits,
-/// and where it was idle for at least one octet behind a complete telegram.
+/// and where it was idle for at least one octet after a complete telegram.
 pub fn runs(trace: &Trace) -> Vec<TelegramRun> {
     let octets = octets(trace);
     let one = octet_time(octets.iter().map(|(from, octet)| (*from, octet))).unwrap_or(Span::ZERO);
@@ -194,7 +194,7 @@ mod tests {
         said(&trace).into_iter().map(|heard| heard.octets).collect()
     }
 
-    /// A gap of two octets does not end a telegram that is not complete; 33 idle bits do, and 11 behind a complete one.
+    /// A gap of two octets does not end a telegram that is not complete; 33 idle bits do, and 11 after a complete one.
     #[test]
     fn idle_time_ends_a_telegram() {
         let status = [0x10, 8, 2, 0x49, 0x53, 0x16];

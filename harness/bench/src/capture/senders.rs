@@ -46,7 +46,7 @@ impl LineRead {
                 counted(low, "octet")
             ));
         }
-        // Behind each telegram the line may be low once.
+        // After each telegram the line may be low once.
         let whole = runs
             .iter()
             .filter(|run| run.kind == RunKind::Telegram)
@@ -198,7 +198,7 @@ impl Asked {
 /// Cuts what is heard at one place of a line into telegrams while it arrives.
 ///
 /// A port gives octets in portions, some milliseconds late, so the idle times between octets are not known. A telegram ends where its own
-/// bytes say so, and its octets count as sent one behind the other, the last one when it was read. The idle time that the rules demand is
+/// bytes say so, and its octets count as sent one after the other, the last one when it was read. The idle time that the rules demand is
 /// kept in front of it: 33 bits before a request, 11 bits before a reply.
 #[derive(Clone, Debug)]
 pub struct TelegramCutter {

@@ -54,6 +54,5 @@ pub struct RecordError {
     pub column: usize,
     /// Where in the record, in bytes, counted from 0.
     pub offset: usize,
-    /// What is wrong.
     pub message: String,
 }

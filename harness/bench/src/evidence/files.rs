@@ -9,7 +9,6 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::Path;
 
-/// The file of sums.
 pub const SUMS: &str = "SHA256SUMS";
 /// The signature of the sums.
 pub const SIGNATURE: &str = "SHA256SUMS.sig";
@@ -27,9 +26,7 @@ pub const JUNIT: &str = "junit.xml";
 pub const REPORT: &str = "report.txt";
 /// The file of the page for people.
 pub const PAGE: &str = "report.html";
-/// The folder of scenarios.
 pub const SCENARIOS: &str = "scenarios";
-/// The folder of captures.
 pub const CAPTURES: &str = "captures";
 
 /// The file of a qualification with what the drives do where the manual leaves it open.

@@ -116,7 +116,7 @@ struct Order {
 }
 
 impl Order {
-    /// Whether a line can stand behind those before, and hold what it holds; why not, in a sentence.
+    /// Whether a line can stand after those before, and hold what it holds; why not, in a sentence.
     fn take(&mut self, line: &RecordLine) -> Result<(), String> {
         if self.ended {
             return Err("nothing can stand behind the end of the record".to_owned());

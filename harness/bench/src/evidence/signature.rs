@@ -6,7 +6,6 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// The program.
 const TOOL: &str = "ssh-keygen";
 
 /// What a signature is for: one made for something else does not count.

@@ -17,7 +17,6 @@ const SETTLED: u8 = 3;
 /// The bounds of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// The number of cases.
     pub cases: u64,
     /// The longest time that the line is used.
     pub wire: Option<Span>,
@@ -125,7 +124,6 @@ impl<C: FuzzCase> FuzzRun<C> {
         times.is_some_and(|times| *times >= SETTLED)
     }
 
-    /// The progress so far.
     #[must_use]
     pub const fn progress(&self) -> &Progress {
         &self.progress
@@ -137,7 +135,6 @@ impl<C: FuzzCase> FuzzRun<C> {
         (self.confirmed, self.flaky)
     }
 
-    /// What was kept.
     #[must_use]
     pub const fn pool(&self) -> &Pool<C> {
         &self.pool

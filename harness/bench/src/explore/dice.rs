@@ -26,12 +26,10 @@ impl Dice {
         if limit == 0 { 0 } else { self.0.usize(..limit) }
     }
 
-    /// Any byte.
     pub fn byte(&mut self) -> u8 {
         self.0.u8(..)
     }
 
-    /// Any word.
     pub fn word(&mut self) -> u16 {
         self.0.u16(..)
     }

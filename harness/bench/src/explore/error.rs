@@ -7,7 +7,6 @@ use crate::scenario::problem::Problems;
 /// Why exploring ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum ExploreError {
-    /// The rig.
     #[error(transparent)]
     Session(#[from] SessionError),
     /// Lines that make no ring.

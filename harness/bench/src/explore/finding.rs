@@ -35,7 +35,6 @@ pub struct Finding<C: FuzzCase> {
     pub difference: C::Difference,
     /// What its drives are made of.
     pub setup: C::Setup,
-    /// The conversation.
     pub case: C,
     /// The attempts that the finding rests on, the first one first; none where drives are simulated, which do the same again.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -7,7 +7,7 @@ use crate::manual::Manual;
 use crate::scenario::verdict::Verdict;
 use std::path::{Path, PathBuf};
 
-/// The folders of a checkout that the files go into; behind them stands the name of the bus.
+/// The folders of a checkout that the files go into; the name of the bus follows them.
 const SCENARIOS: &str = "corpora/scenarios";
 const SNAPSHOTS: &str = "snapshots/scenarios";
 
@@ -27,7 +27,6 @@ pub struct Naming {
 pub struct Promoted {
     /// The scenario, the input where there is one, and the snapshot.
     pub files: Vec<PathBuf>,
-    /// The scenario's text.
     pub text: String,
     /// Whether the drives with the planted deviations fail the scenario; `None` where none was planted.
     pub fails_on_deviating: Option<bool>,

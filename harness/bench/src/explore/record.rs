@@ -1,6 +1,6 @@
 //! The folder of a run: what happens is written as it happens, line by line, so that a run that was killed goes on where it was.
 //!
-//! `run.jsonl` is the record. Behind a line of progress everything in front of it is settled; what stands behind the last one is
+//! `run.jsonl` is the record. After a line of progress everything in front of it is settled; what follows the last one is
 //! done again when a run is resumed.
 
 use super::FuzzCase;
@@ -101,7 +101,7 @@ pub struct Progress {
 pub struct KeptRun<C: FuzzCase> {
     /// The first line.
     pub about: FuzzSettings<C>,
-    /// The lines behind it, up to the last one of progress.
+    /// The lines after it, up to the last one of progress.
     pub lines: Vec<LogLine<C>>,
     /// The last line of progress.
     pub progress: Progress,
@@ -154,7 +154,7 @@ impl FuzzRecord {
         Ok(record)
     }
 
-    /// The record of a run that goes on, and what it holds. What stands behind the last line of progress is cut off.
+    /// The record of a run that goes on, and what it holds. What follows the last line of progress is cut off.
     ///
     /// # Errors
     /// There is none, or a line of it is damaged; half a line at its end is not.

@@ -7,7 +7,7 @@ use super::{Differing as _, ExploreError, Finding, FuzzCase};
 pub trait Acts: FuzzCase {
     fn acts(&mut self) -> &mut Vec<Self::Act>;
 
-    /// The time behind an act, in microseconds.
+    /// The time after an act, in microseconds.
     fn wait(act: &mut Self::Act) -> &mut u64;
 
     /// Acts that may show the same, the smallest first.

@@ -31,7 +31,6 @@ impl<S: Spiced> Swarm<S> {
         Self(own)
     }
 
-    /// Whether it has this.
     #[must_use]
     pub fn has(&self, spice: S) -> bool {
         self.0.contains(&spice)

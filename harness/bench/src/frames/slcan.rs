@@ -12,7 +12,7 @@
 //! | `O`, `L`, `C` | open, open listen-only, close |
 //! | `V`, `N`, `F` | version, serial number, status flags |
 //! | `M0`, `M1` | CANable: acknowledge frames, or be silent; taken while closed, and kept while it has power |
-//! | `Z0`, `Z1` | time stamps off or on: milliseconds 0 to 59999, four digits behind each frame |
+//! | `Z0`, `Z1` | time stamps off or on: milliseconds 0 to 59999, four digits after each frame |
 
 use super::{BadMessage, digit, hexadecimal};
 use harness_proto::can::{BitRate, Frame, Id};
@@ -294,7 +294,7 @@ impl Report {
     }
 }
 
-/// Reads a frame at the start of a line, which begins with its letter; gives what stands behind it.
+/// Reads a frame at the start of a line, which begins with its letter; gives what follows it.
 fn frame(line: &[u8]) -> Result<(Frame, &[u8]), &'static str> {
     const BASE: &str = "the letter, an identifier of three hexadecimal digits up to 7FF and a length from 0 to 8 expected";
     const EXTENDED: &str = "the letter, an identifier of eight hexadecimal digits up to 1FFFFFFF and a length from 0 to 8 expected";

@@ -1,6 +1,6 @@
 //! The protocol of socketcand, the daemon that gives a CAN interface of Linux to the network (`doc/protocol.md` of linux-can/socketcand).
 //!
-//! Messages stand between `<` and `>`, one behind the other in a stream:
+//! Messages stand between `<` and `>`, one after the other in a stream:
 //!
 //! ```text
 //! server  < hi >
@@ -68,7 +68,6 @@ impl SocketcandRequest {
         }
     }
 
-    /// Writes the message.
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
         let text = match self {
             Self::Open(name) => format!("< open {name} >"),
@@ -200,7 +199,7 @@ fn identifier(digits: &[u8]) -> Option<Id> {
     }
 }
 
-/// What stands behind `send`.
+/// What follows `send`.
 fn sent(words: &[&[u8]]) -> Option<Frame> {
     let [id, len, data @ ..] = words else {
         return None;

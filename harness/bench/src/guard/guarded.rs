@@ -136,7 +136,7 @@ impl<L: Line> Guarded<L> {
         self.deadline = deadline;
     }
 
-    /// Ends the work if its deadline is over. A denial, behind which work may go on, weighs less.
+    /// Ends the work if its deadline is over. A denial, after which work may go on, weighs less.
     pub fn end_if_overdue(&mut self) {
         let over = self
             .deadline
@@ -146,7 +146,7 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Waits up to the deadline, where that comes first. Behind it a caller looks again.
+    /// Waits up to the deadline, where that comes first. After it a caller looks again.
     fn wait_until(&mut self, until: Instant) -> bool {
         let Some(deadline) = self.deadline.filter(|_| self.trouble().is_none()) else {
             return self.inner.wait(until);
@@ -224,7 +224,7 @@ impl<L: Line> Guarded<L> {
         result
     }
 
-    /// Lets the watch look at everything, due or not. The link is in [trouble](Self::trouble) behind it where something must not go on.
+    /// Lets the watch look at everything, due or not. The link is in [trouble](Self::trouble) afterwards where something must not go on.
     pub fn look_at_all(&mut self) {
         if let Some(mut watch) = self.watch.take() {
             self.look(watch.as_mut(), |watch, line| watch.look_at_all(line));
@@ -253,7 +253,7 @@ impl<L: Line> Guarded<L> {
         self.address_again(before);
     }
 
-    /// Asks drives something that no conversation knows of: a short address goes on behind it as in front of it.
+    /// Asks drives something that no conversation knows of: a short address goes on after it as before it.
     pub fn aside<T>(&mut self, ask: impl FnOnce(&mut Self) -> T) -> T {
         let before = self.addressed();
         let result = ask(self);

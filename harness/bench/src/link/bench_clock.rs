@@ -7,7 +7,6 @@ use std::collections::VecDeque;
 /// Times are those of the bench, which are never set back, unless they are said to count from the conversation's begin.
 #[derive(Clone, Debug)]
 pub struct BenchClock {
-    /// The time.
     pub now: Instant,
     /// When the last piece that the bench has sent will have left, as far as it knows.
     pub left: Instant,

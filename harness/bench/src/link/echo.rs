@@ -52,7 +52,7 @@ impl Echo {
 mod tests {
     use super::*;
 
-    /// An adapter that has heard nothing but itself, in pieces; then an answer behind its own octets.
+    /// An adapter that has heard nothing but itself, in pieces; then an answer after its own octets.
     #[test]
     fn what_was_sent_is_removed_in_pieces() {
         let mut echo = Echo::default();

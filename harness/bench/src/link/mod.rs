@@ -104,7 +104,7 @@ pub enum PlacedFault {
 }
 
 impl fmt::Display for PlacedFault {
-    /// As a scenario writes it behind its place: `flip 0`, `drive 3 off`.
+    /// As a scenario writes it after its place: `flip 0`, `drive 3 off`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Link(_, fault) => fault.fmt(f),
@@ -142,7 +142,7 @@ pub enum Moment {
 pub struct Lead {
     /// While no answer is awaited.
     pub far: Span,
-    /// Past the time at which an awaited answer arrives: what the caller sends next leaves behind these bytes.
+    /// Past the time at which an awaited answer arrives: what the caller sends next leaves after these bytes.
     pub near: Span,
 }
 
@@ -175,10 +175,9 @@ pub trait Line: Send {
     /// What a port carries, and how fast. That of the first port for a port that the line does not have.
     fn medium(&self, port: usize) -> Medium;
 
-    /// The time.
     fn now(&self) -> Instant;
 
-    /// Sends pieces one after another, behind what is still to be sent. Returns when the last one will have left, as far as the line
+    /// Sends pieces one after another, after what is still to be sent. Returns when the last one will have left, as far as the line
     /// knows: on a bus that other stations use, it can be later. Pieces of another medium than the port's are not sent.
     fn send(&mut self, port: usize, what: Out<'_>) -> Instant;
 
@@ -237,7 +236,7 @@ pub trait Line: Send {
         Lead::NONE
     }
 
-    /// Adds what the bus carries when it is idle on every port, behind what waits to be sent, so that drives that watch for silence hear no
+    /// Adds what the bus carries when it is idle on every port, after what waits to be sent, so that drives that watch for silence hear no
     /// gap. Returns when it must be called again; `None` for a line that is not kept. What it adds comes back like all else.
     fn keep(&mut self) -> Option<Instant> {
         None
@@ -377,7 +376,6 @@ pub trait Link: Line {
     /// Whether what the bench has sent is still on its way, or its answers are.
     fn busy(&self) -> bool;
 
-    /// Injects a fault.
     fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment);
 
     /// Whether a fault can be put on a link of a ring: 0 is the master's outgoing one.

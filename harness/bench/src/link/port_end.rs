@@ -46,7 +46,7 @@ pub trait Accounting: fmt::Debug + Send {
         Span::ZERO
     }
 
-    /// How long behind an octet the last one that it causes comes back; `None` where none comes while others are sent.
+    /// How long after an octet the last one that it causes comes back; `None` where none comes while others are sent.
     fn returns(&self, _octet_time: Span) -> Option<Span> {
         None
     }
@@ -57,10 +57,10 @@ pub trait Accounting: fmt::Debug + Send {
     /// Whether all that is to come has come, where interposers have taken and given these numbers of octets meanwhile.
     fn is_even(&self, taken: u64, given: u64) -> bool;
 
-    /// How long behind an octet its answer comes at the soonest.
+    /// How long after an octet its answer comes at the soonest.
     fn soonest(&self, octet_time: Span) -> Span;
 
-    /// How long behind an octet its answer comes at the latest, where nothing is lost.
+    /// How long after an octet its answer comes at the latest, where nothing is lost.
     fn latest(&self, octet_time: Span) -> Span;
 }
 
@@ -146,8 +146,8 @@ impl<A: Accounting> PortEnd<A> {
         }
     }
 
-    /// How long an octet with a wrong parity bit waits behind one that it would follow without a pause: until that one has come back, so that
-    /// nothing comes while the parity is switched. Behind a pause it waits for nothing, since the pause may be meant; nor does it where the
+    /// How long an octet with a wrong parity bit waits after one that it would follow without a pause: until that one has come back, so that
+    /// nothing comes while the parity is switched. After a pause it waits for nothing, since the pause may be meant; nor does it where the
     /// silence would be longer than drives or the stated times of a scenario allow.
     fn silence(&self, now: Instant, octet_time: Span, tolerance: Span) -> Span {
         let follows = self.sent > 0 && now < self.free + octet_time;

@@ -36,10 +36,10 @@ const ECHO: Span = Span::from_millis(500);
 /// How much longer than the bus itself needs an answer may take to come, because of adapters and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
-/// How long the bench does not look at its ports, or sleeps behind the end of its wait, before that counts.
+/// How long the bench does not look at its ports, or sleeps after the end of its wait, before that counts.
 pub const HELD_UP: Span = Span::from_millis(4);
 
-/// How long octets that an adapter or a computer has held up may keep coming behind the last one that was sent.
+/// How long octets that an adapter or a computer has held up may keep coming after the last one that was sent.
 const MOST_HELD_UP: Span = Span::from_millis(2_000);
 
 /// The longest sleep: the link checks for a request to end at least this often.
@@ -140,7 +140,6 @@ impl<A: Accounting> Pump<A> {
         self.ports.iter().all(has) && self.inner.iter().all(InnerLink::has_line_errors)
     }
 
-    /// Injects a fault.
     pub fn inject(&mut self, spot: Spot, fault: LinkFault, moment: Moment) {
         match moment {
             Moment::At(at) => {
@@ -167,7 +166,7 @@ impl<A: Accounting> Pump<A> {
         now
     }
 
-    /// Sends octets behind those that wait; returns when the last one has left.
+    /// Sends octets after those that wait; returns when the last one has left.
     pub fn send(&mut self, port: usize, octets: &[u8]) -> Instant {
         let now = self.now();
         let rest = !self.port_busy(port, now);
@@ -392,7 +391,6 @@ impl<A: Accounting> Pump<A> {
         }
     }
 
-    /// Reads what has arrived.
     fn take(&mut self, now: Instant) {
         self.looked = now;
         self.since = std::mem::replace(&mut self.watched, now);
@@ -472,7 +470,7 @@ impl<A: Accounting> Pump<A> {
             let woken = time::Instant::now();
             self.late.woken(self.clock(wake), woken);
             let woken = self.at(woken);
-            // Where it is woken behind the end of its wait, it has not watched all the time.
+            // Where it is woken after the end of its wait, it has not watched all the time.
             self.watched = match came {
                 true if woken > wake + HELD_UP => now,
                 true => woken,

@@ -1,6 +1,6 @@
 //! A link that gives again what was recorded.
 //!
-//! The order of the record decides: a byte comes where it came before, behind the same bytes sent. Time is that of the record. A caller
+//! The order of the record decides: a byte comes where it came before, after the same bytes sent. Time is that of the record. A caller
 //! that does something else finds the link in trouble. From then on the record is not read any further: nothing comes, every wait lasts until
 //! its end, and no pause is due, so that every loop of a caller ends, whatever the record holds.
 //!
@@ -23,7 +23,6 @@ use std::collections::{BTreeMap, VecDeque};
 /// How many waits in a row may take no event and no time. A caller that fetches what has come, and looks where the record looks, needs a few.
 const IDLE_WAITS: u32 = 16;
 
-/// A record, played back.
 #[derive(Clone, Debug)]
 pub struct Replay {
     events: VecDeque<LinkEvent>,
@@ -148,8 +147,8 @@ impl Replay {
         self.known.is_some()
     }
 
-    /// The first thing that was recorded and not played back, or what differed behind trouble of the record; `None` where all was played
-    /// back. Without looks, bytes that were not fetched do not count. Behind trouble the caller asks for nothing.
+    /// The first thing that was recorded and not played back, or what differed after trouble of the record; `None` where all was played
+    /// back. Without looks, bytes that were not fetched do not count. After trouble the caller asks for nothing.
     #[must_use]
     pub fn left(&self) -> Option<String> {
         let exact = self.known.is_some();
@@ -397,7 +396,7 @@ impl Line for Replay {
             self.differs("a wait");
             return self.pass(until);
         }
-        // The next byte that comes, behind those that have come and are not fetched; or the time of the next look at an inner link.
+        // The next byte that comes, after those that have come and are not fetched; or the time of the next look at an inner link.
         let mut next = self.events.iter().map_while(|event| match event {
             LinkEvent::Received(_, at, _) => Some((*at, false)),
             LinkEvent::Tapped(_, _, at, _) => Some((*at, true)),
@@ -414,7 +413,7 @@ impl Line for Replay {
 
     fn trouble(&self) -> Option<&Trouble> {
         // Nothing was done on the link between the event before and the trouble, so it may show at once: the last step of a scenario
-        // may let no time pass behind it.
+        // may let no time pass after it.
         let next = match self.events.front() {
             Some(LinkEvent::Trouble(trouble)) => Some(trouble),
             _ => None,

@@ -9,7 +9,7 @@ fn ms(at: u64) -> Instant {
     Instant::START + Span::from_millis(at)
 }
 
-/// A byte that comes long behind the time until which it was waited for, and one that is sent then.
+/// A byte that comes long after the time until which it was waited for, and one that is sent then.
 fn overslept(tolerance: Span) -> Replay {
     let byte = Heard::Octet(Received::good(0x80));
     let events = vec![
@@ -186,7 +186,7 @@ fn no_order_of_the_record_holds_the_caller() {
     }
 }
 
-/// Behind trouble of the record a difference is reported too, where the record holds all that the caller saw.
+/// After trouble of the record a difference is reported too, where the record holds all that the caller saw.
 #[test]
 fn a_difference_behind_a_denial_is_reported() {
     let mut all = recorded(true);

@@ -7,11 +7,8 @@ use std::fmt;
 /// What happens to a drive from outside the bus, by the bus that it is on; or on its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnyStimulus {
-    /// To an ND21.
     Novobus(nd21::Stimulus),
-    /// To a UNITEK drive.
     Unitek(unitek::Stimulus),
-    /// To a NORDAC inverter.
     Nordac(nordac::Stimulus),
     /// A fault on a line of octets.
     Line(LineFaultAt),

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// How long a wire may take a part.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// How pieces are written on a wire: parts that are sent one behind another.
+/// How pieces are written on a wire: parts that are sent one after another.
 pub type Parts = fn(&Pieces) -> Vec<Vec<u8>>;
 
 /// A way to a wire with its own descriptor.
@@ -30,7 +30,6 @@ pub struct LastWords {
 pub struct Unsaid {
     /// The wire.
     name: String,
-    /// The operating system's error.
     error: std::io::Error,
 }
 
@@ -57,7 +56,7 @@ impl LastWords {
         Self { gap, ..self }
     }
 
-    /// Sends pieces, behind whatever the operating system has taken before; at most two seconds for each part.
+    /// Sends pieces, after whatever the operating system has taken before; at most two seconds for each part.
     ///
     /// # Errors
     /// The port does not take them.

@@ -24,7 +24,6 @@ pub(super) struct Ledger {
 }
 
 impl Ledger {
-    /// Counts from now on.
     pub(super) fn new(counts: Counts, now: Instant) -> Self {
         Self {
             counts,

@@ -2,7 +2,7 @@
 //!
 //! A [`Wire`] is one of them with its coding: bytes with their line errors come out of it, and bytes,
 //! deliberate line errors among them, go into it. It never blocks but where a byte with a wrong parity bit is sent
-//! on a serial port, which has to be drained before and behind it.
+//! on a serial port, which has to be drained before and after it.
 //!
 //! What each carries:
 //!

@@ -113,7 +113,6 @@ pub enum OpenError {
     /// The other end is no RFC 2217 server, or cannot do 8O1.
     #[error("{address}: {error}")]
     Negotiation {
-        /// Which server.
         address: String,
         /// What was refused.
         error: NegotiationError,

@@ -1,7 +1,7 @@
 //! A serial port: 8O1 or 8E1, every line error marked by the kernel, bytes with a wrong parity bit on demand.
 //!
 //! The crate `serialport` opens the port and sets rate and format. The marks of POSIX termios (`INPCK` and `PARMRK`
-//! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
+//! without `IGNPAR` and `ISTRIP`) are set after it on the same terminal.
 
 use super::holder::refuse_used;
 use super::ledger::Ledger;
@@ -121,7 +121,6 @@ impl Drop for Serial {
     }
 }
 
-/// Opens a serial port.
 pub(super) fn open(
     path: &Path,
     format: Format,
@@ -387,7 +386,7 @@ fn send_wrong_parity(
     Ok(start.elapsed())
 }
 
-/// Waits behind a drain until bytes have left that are due at `free`. Some drivers of USB adapters say so too early.
+/// Waits after a drain until bytes have left that are due at `free`. Some drivers of USB adapters say so too early.
 fn settle(free: Instant, hasty: &mut bool) {
     let now = Instant::now();
     *hasty |= now < free;

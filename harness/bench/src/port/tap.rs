@@ -25,7 +25,6 @@ use std::time::Instant;
 /// What is read at a time.
 const CHUNK: usize = 4_096;
 
-/// An open tap.
 #[derive(Debug)]
 pub struct SilentTap {
     fd: OwnedFd,
@@ -109,7 +108,7 @@ impl SilentTap {
         Ok(tap)
     }
 
-    /// Takes what has arrived, without waiting; in order, behind what is in `heard` already.
+    /// Takes what has arrived, without waiting; in order, after what is in `heard` already.
     ///
     /// # Errors
     /// The port cannot be read and is not merely gone.

@@ -212,7 +212,7 @@ impl Wire {
         self.bytes_waiting
     }
 
-    /// Takes something to be sent, behind what waits.
+    /// Takes something to be sent, after what waits.
     ///
     /// # Errors
     /// [`Trouble::Lost`] where the other end has not taken anything for so long that too much waits.

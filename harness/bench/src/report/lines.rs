@@ -12,7 +12,6 @@ const MOST: usize = 40;
 /// Rows of a table of samples at most; of a longer one every n-th is shown.
 const ROWS: usize = 100;
 
-/// Writes the curves.
 pub(crate) fn lines(html: &mut Html, id: &str, records: &[CellRecord]) {
     let times = records.iter().flat_map(|record| &record.samples);
     let ends = times.fold(None, |ends: Option<(f64, f64)>, sample| {

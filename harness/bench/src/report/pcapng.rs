@@ -31,7 +31,6 @@ pub(crate) const STATISTICS: u32 = 5;
 pub(crate) const PACKET: u32 = 6;
 /// The byte-order magic of a section.
 pub(crate) const MAGIC: u32 = 0x1A2B_3C4D;
-/// Options.
 pub const END: u16 = 0;
 pub(crate) const COMMENT: u16 = 1;
 pub(crate) const IF_NAME: u16 = 2;
@@ -108,7 +107,7 @@ pub(crate) fn packet(block: &mut Block, link: usize, byte: &LineByte) {
     }
 }
 
-/// The time and the lengths of a packet with this many bytes behind its header, and the header of the link type.
+/// The time and the lengths of a packet with this many bytes after its header, and the header of the link type.
 pub fn header(block: &mut Block, at: Instant, event: u8, bytes: usize) {
     let nanos = at.since_start().as_nanos();
     let seconds = u32::try_from(nanos / 1_000_000_000).unwrap_or(u32::MAX);

@@ -7,7 +7,7 @@
 //! | packet | the time when the last bit of the frame had passed, since the start, cut off below; 8 bytes of header, the data |
 //!
 //! The header of the link type: the identifier with flags for 29 bits, remote and error frames, high byte first; the length; three zeros.
-//! A remote frame has as many zeros behind it as it asks for bytes, as a capture of Linux has. An error frame has its class as identifier,
+//! A remote frame has as many zeros after it as it asks for bytes, as a capture of Linux has. An error frame has its class as identifier,
 //! and a comment that names the frame which it ended: `error-frame 201#3D4000`. A frame that no station has got has the comment `lost`.
 //! So nothing of the frames of a trace is lost, and [`crate::capture`] reads them back.
 

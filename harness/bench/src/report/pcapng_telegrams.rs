@@ -26,7 +26,7 @@ pub const RECEIVED: u8 = 0x04;
 /// The name of the interface of the master, and what stands in front of a slave's address.
 const MASTER: &str = "master";
 const SLAVE: &str = "slave ";
-/// The most octets of a packet: what a station sends without a pause is cut behind them.
+/// The most octets of a packet: what a station sends without a pause is cut after them.
 pub const MOST: usize = 255;
 /// Times that are as near as this are the same: they are cut off to nanoseconds.
 const NEAR: Span = Span::from_nanos(1);
@@ -105,7 +105,7 @@ fn event_of(error: LineError) -> u8 {
     row.map_or(RECEIVED, |(_, event)| *event)
 }
 
-/// What differs from octets that arrived as they were sent, one behind the other.
+/// What differs from octets that arrived as they were sent, one after the other.
 fn comment(octets: &[LineByte], octet: Option<Span>) -> String {
     let mut text = String::new();
     let mut before: Option<Instant> = None;

@@ -35,7 +35,7 @@ pub fn plot(record: &CellRecord) -> String {
     }
 }
 
-/// All records of a run, each behind an empty line.
+/// All records of a run, each after an empty line.
 #[must_use]
 pub fn plots(records: &[CellRecord]) -> String {
     records

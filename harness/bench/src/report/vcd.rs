@@ -15,7 +15,7 @@
 //! A parity error is drawn as a wrong parity bit, a framing error as a low first three quarters of a stop bit, a break
 //! as a line that is low for eleven and a half bits (how long it really was, a trace does not say), an overrun as the good
 //! byte that the line carried. A byte that did not arrive is not on the line. Bytes that come closer than a byte time are
-//! drawn one behind the other.
+//! drawn one after the other.
 
 use harness_proto::line::LineError;
 use harness_sim::record::{Channel, LineByte};
@@ -104,7 +104,7 @@ fn draw(links: &mut [Drawn<'_>], drawing: Drawing, out: &mut dyn Write) -> std::
     out.write_all(text.as_bytes())?;
     let ends = links.iter().map(|link| link.free / drawing.tick);
     let end = ends.max().unwrap_or(0);
-    // A quiet byte time behind the last one, so that a decoder sees its stop bit.
+    // A quiet byte time after the last one, so that a decoder sees its stop bit.
     writeln!(out, "#{}", end.max(now) + 11 * drawing.bit / drawing.tick)?;
     out.flush()
 }

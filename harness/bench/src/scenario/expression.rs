@@ -110,9 +110,7 @@ pub enum Operator {
 /// An expression with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Located {
-    /// The number.
     pub expression: Expression,
-    /// Where it stands.
     pub span: TextSpan,
 }
 

@@ -34,7 +34,6 @@ pub enum LibraryError {
     #[error("failed to read the folder {folder}: {error}")]
     Folder {
         folder: String,
-        /// The operating system's error.
         error: std::io::Error,
     },
     /// A folder holds more than we take.

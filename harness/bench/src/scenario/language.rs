@@ -1,7 +1,7 @@
 //! What a bus adds to the language of scenarios.
 //!
 //! The core owns every symbol (`>`, `<`, `!`, `?`, `+`, `@`), the lines `title`, `source`, `bus`, `needs`, `strict`, `deadline`, `wait`,
-//! `for` and `end`, all times and units, and the place of every mistake. A bus adds what stands behind a symbol, header lines and
+//! `for` and `end`, all times and units, and the place of every mistake. A bus adds what follows a symbol, header lines and
 //! steps that begin with a word. It implements [`Language`] for a type without content, and one line in `buses/mod.rs` makes it known.
 
 use super::expression::Scope;
@@ -47,7 +47,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
 
     /// The header lines of the bus, as written.
     type Header: Clone + Debug + Default;
-    /// What stands behind `>` and `<`, as written: bytes, or a frame.
+    /// What follows `>` and `<`, as written: bytes, or a frame.
     type Message: Clone + Debug;
     /// Any other step of the bus, as written.
     type Step: Clone + Debug;
@@ -88,13 +88,13 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// The first thing that a header lacks.
     fn incomplete(header: &Self::Header) -> Option<Problem>;
 
-    /// Reads what stands behind `>` or `<`.
+    /// Reads what follows `>` or `<`.
     ///
     /// # Errors
     /// It is no message of the bus.
     fn message(scanner: &mut Scanner<'_>) -> Result<Self::Message, Problem>;
 
-    /// Reads what stands behind the opening of a step; `None` if the bus has no such word.
+    /// Reads what follows the opening of a step; `None` if the bus has no such word.
     fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>)
     -> Option<Result<Self::Step, Problem>>;
 
@@ -208,7 +208,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// A received piece as messages show it.
     fn show(received: Self::Received) -> String;
 
-    /// What differs, for reports that show it piece by piece: on a port, behind `place.0` pieces of earlier lines, at place `place.1`
+    /// What differs, for reports that show it piece by piece: on a port, after `place.0` pieces of earlier lines, at place `place.1`
     /// of this line.
     fn difference(
         port: usize,
@@ -272,10 +272,10 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         false
     }
 
-    /// Writes the header lines: each with its word, and behind them those about devices.
+    /// Writes the header lines: each with its word, and after them those about devices.
     fn write_header(header: &Self::Header) -> (Vec<(&'static str, String)>, Vec<String>);
 
-    /// Writes a message as it stands behind `>` or `<`.
+    /// Writes a message as it stands after `>` or `<`.
     fn write_message(message: &Self::Message) -> String;
 
     /// Writes any other step, with its symbol or its word.

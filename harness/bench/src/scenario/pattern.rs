@@ -17,7 +17,6 @@ const MAX_DEPTH: u32 = 8;
 /// One byte of a pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Expected {
-    /// This byte.
     Byte(u8),
     /// `xx`: any byte.
     Any,
@@ -55,7 +54,6 @@ enum ItemKind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     items: Vec<Item>,
-    /// Where it stands.
     pub span: TextSpan,
 }
 

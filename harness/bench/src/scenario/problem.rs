@@ -12,9 +12,8 @@ const MAX_SHOWN: usize = 20;
 /// A place in a scenario's text, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TextSpan {
-    /// The first byte.
     pub start: usize,
-    /// The byte behind the last.
+    /// The byte after the last.
     pub end: usize,
 }
 
@@ -39,14 +38,12 @@ impl From<TextSpan> for SourceSpan {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spanned<T> {
     pub value: T,
-    /// Its place.
     pub span: TextSpan,
 }
 
 /// One mistake: what is wrong, where, what was expected, and how to fix it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// What is wrong.
     pub message: String,
     pub span: TextSpan,
     /// What was expected there.

@@ -5,7 +5,7 @@ use super::scanner::Scanner;
 use harness_proto::ratio::Ratio;
 use std::fmt;
 
-/// Digits behind the point that are shown of turns: one increment is 0.000015 turns.
+/// Digits after the point that are shown of turns: one increment is 0.000015 turns.
 const TURN_DECIMALS: usize = 5;
 
 /// Significant digits that are shown of everything else: a word has no more.
@@ -145,7 +145,6 @@ pub struct Quantity {
     pub value: Ratio,
     /// The unit as written.
     pub unit: &'static Unit,
-    /// Where it stands.
     pub span: TextSpan,
 }
 
@@ -293,7 +292,6 @@ pub fn ambiguous(scanner: &Scanner<'_>) -> Option<(String, &'static Unit)> {
 }
 
 impl Unit {
-    /// What it measures.
     #[must_use]
     pub const fn dimension(&self) -> Dimension {
         self.dimension
@@ -384,7 +382,7 @@ pub fn plus_minus(scanner: &mut Scanner<'_>) -> bool {
     scanner.eat("+-") || scanner.eat("±")
 }
 
-/// A number with a sign and a point: its digits, and how many of them stand behind the point.
+/// A number with a sign and a point: its digits, and how many of them stand after the point.
 fn number(scanner: &mut Scanner<'_>) -> Result<(i64, u32), Problem> {
     let start = scanner.here();
     let negative = scanner.eat("-");

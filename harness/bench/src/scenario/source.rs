@@ -35,13 +35,11 @@ pub enum SourceError {
         "{name} is not a regular file; a text file or the pipe of a shell substitution is expected"
     )]
     NotAFile {
-        /// The file.
         name: String,
     },
     /// It is too large.
     #[error("{name} has more than {} KiB; a short text is expected", MAX_SIZE >> 10)]
     TooLarge {
-        /// The file.
         name: String,
     },
     /// A line is too long to be shown.

@@ -16,7 +16,7 @@ const MAX_DECIMALS: usize = 9;
 pub struct Duration {
     /// The digits without their point.
     digits: u64,
-    /// How many of them stand behind the point.
+    /// How many of them stand after the point.
     decimals: u32,
     unit: Unit,
     span: TextSpan,
@@ -38,25 +38,22 @@ const UNITS: [(&str, Unit); 6] = [
 ];
 
 impl Duration {
-    /// A number of nanoseconds.
     #[must_use]
     pub const fn nanos(number: u64) -> Self {
         Self::of(number, Span::from_nanos(1))
     }
 
-    /// A number of microseconds.
     #[must_use]
     pub const fn micros(number: u64) -> Self {
         Self::of(number, Span::from_micros(1))
     }
 
-    /// A number of milliseconds.
     #[must_use]
     pub const fn millis(number: u64) -> Self {
         Self::of(number, Span::from_millis(1))
     }
 
-    /// The same digits with one more of them behind the point: a tenth of the time.
+    /// The same digits with one more of them after the point: a tenth of the time.
     #[must_use]
     pub const fn tenth(self) -> Self {
         Self {
@@ -87,7 +84,6 @@ impl Duration {
         Span::from_units(digit.units() / 2)
     }
 
-    /// Where it stands.
     #[must_use]
     pub const fn span(self) -> TextSpan {
         self.span
@@ -151,7 +147,6 @@ impl fmt::Display for Window {
     }
 }
 
-/// Reads a time.
 pub fn duration(scanner: &mut Scanner<'_>) -> Result<Duration, Problem> {
     let start = scanner.here();
     let (digits, decimals) = number(scanner)?;

@@ -9,7 +9,7 @@ use crate::scenario::language::Language;
 use std::fmt::Write as _;
 use std::marker::PhantomData;
 
-/// The column at which a comment behind a step begins, if the step is not longer.
+/// The column at which a comment after a step begins, if the step is not longer.
 const COMMENT_AT: usize = 32;
 
 /// The longest line of a remark, in characters.
@@ -80,7 +80,7 @@ impl<L: Language> Text<L> {
         }
     }
 
-    /// Writes a step, with a comment behind it if that is not empty.
+    /// Writes a step, with a comment after it if that is not empty.
     pub fn step(&mut self, step: &Step<L>, comment: &str) {
         let step = written(step);
         // Writing to a String cannot fail.
@@ -106,7 +106,6 @@ impl<L: Language> Text<L> {
         self.line(&format!("# {line}"));
     }
 
-    /// Writes an empty line.
     pub fn empty_line(&mut self) {
         self.line("");
     }

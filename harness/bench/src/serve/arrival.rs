@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 pub(super) use system::ask;
 use system::{acknowledge, receive};
 
-/// A client's socket.
 #[derive(Debug)]
 pub(super) struct Client {
     stream: TcpStream,
@@ -109,7 +108,7 @@ mod system {
     }
 
     /// Acknowledges what was read at once. A client whose system holds small writes back until the last one is acknowledged (Nagle) would
-    /// wait 40 ms behind each write that gets no reply. The system forgets the setting with the next packet.
+    /// wait 40 ms after each write that gets no reply. The system forgets the setting with the next packet.
     pub(super) fn acknowledge(stream: &TcpStream) {
         let _late = rustix::net::sockopt::set_tcp_quickack(stream, true);
     }

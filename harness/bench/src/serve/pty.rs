@@ -153,7 +153,6 @@ impl Pty {
     }
 }
 
-/// Opens the client's end.
 fn client_end(device: &Path) -> Result<OwnedFd, Errno> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     rustix::fs::open(device, flags, Mode::empty())

@@ -60,7 +60,6 @@ impl<P> Default for ServeOptions<P> {
 pub enum ServeEnd {
     /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP; or the drop of the handle.
     Interrupted,
-    /// The time is over.
     TimeOver,
     /// The clients have gone, and only they were waited for.
     ClientsGone,
@@ -83,7 +82,6 @@ pub enum ServeError {
     /// A socket does not listen.
     #[error(transparent)]
     Listen(#[from] ListenError),
-    /// The path exists already.
     #[error("{} exists already; name another path, or remove it if no program serves there", path.display())]
     Exists { path: PathBuf },
     /// The pseudo terminal cannot be made.
@@ -112,7 +110,6 @@ pub trait ServeHost {
     /// A line for people, without its end.
     fn say(&mut self, line: &str);
 
-    /// A socket listens.
     fn listens(&mut self, at: SocketAddr) {
         let _told_by_a_line = at;
     }
@@ -246,7 +243,6 @@ struct Shell<'a> {
     host: &'a mut dyn ServeHost,
     ending: EndRequest,
     clock: Clock,
-    /// Clients there are.
     here: usize,
     /// A client was there, and none is left.
     gone: bool,

@@ -102,7 +102,6 @@ impl Tcp {
         }
     }
 
-    /// Closes the connection.
     pub(super) fn close(&mut self) {
         self.client = None;
     }

@@ -55,7 +55,6 @@ impl FileForm {
     }
 }
 
-/// How rows are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RowPlacing {
     /// Row n is the n-th byte of each link.
@@ -156,7 +155,7 @@ pub trait SegmentReport: Debug + Sync {
         BTreeMap::new()
     }
 
-    /// The part of the table that a finding is about, behind an empty line, and the sections that say what is right.
+    /// The part of the table that a finding is about, after an empty line, and the sections that say what is right.
     fn around(&self, finding: &Mismatch, traces: &[Trace], sources: &[String]) -> String {
         let _all_of_the_end = finding;
         let mut text = String::new();
@@ -167,7 +166,7 @@ pub trait SegmentReport: Debug + Sync {
         text + &see(sources)
     }
 
-    /// The last rows of a table, at most `most` behind the line of heads: playing stops at the first line that is not met.
+    /// The last rows of a table, at most `most` after the line of heads: playing stops at the first line that is not met.
     fn last_rows(&self, trace: &Trace, most: usize) -> String {
         let all = self.rows(trace, &TablePart::default());
         let lines: Vec<_> = all.lines().collect();

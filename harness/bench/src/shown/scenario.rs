@@ -11,7 +11,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_sim::record::Trace;
 
-/// Bytes of a line shown before and behind the one that differs.
+/// Bytes of a line shown before and after the one that differs.
 const AROUND: usize = 12;
 
 /// Expectations shown at most.
@@ -23,9 +23,7 @@ const REMARKS: usize = 40;
 /// A scenario that was played.
 #[derive(Clone, Copy, Debug)]
 pub struct ScenarioView<'p> {
-    /// Its name.
     pub name: &'p str,
-    /// Its title.
     pub title: &'p str,
     /// Which tables of which manual it pins.
     pub sources: &'p [String],
@@ -276,7 +274,6 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
     parts
 }
 
-/// The scenario's own text.
 fn text(text: &str) -> Option<FoldedPart> {
     if text.is_empty() {
         return None;

@@ -13,7 +13,6 @@ use std::fmt::{Display, Write as _};
 /// What a page says of the run as a whole.
 #[derive(Clone, Debug)]
 pub struct Head<'h> {
-    /// The page's title.
     pub title: &'h str,
     /// Names and values: the rig, when it began. Nothing that differs between two runs that are the same.
     pub facts: Vec<(&'h str, String)>,

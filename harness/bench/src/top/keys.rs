@@ -9,7 +9,6 @@ const MOST: usize = 60;
 /// A key, whatever terminal it comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
-    /// A character.
     Char(char),
     Enter,
     Escape,
@@ -17,9 +16,7 @@ pub enum Key {
     Backspace,
     /// Ctrl-C.
     Interrupt,
-    /// A row up.
     Up,
-    /// A row down.
     Down,
     PageUp,
     PageDown,

@@ -44,7 +44,6 @@ pub struct Heading {
 /// A line above the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HeadLine {
-    /// What it says.
     pub text: String,
     /// Whether it tells of an error.
     pub is_error: bool,
@@ -71,7 +70,6 @@ pub struct TopEvent {
     pub what: String,
     /// Whether it is an error.
     pub is_error: bool,
-    /// How often.
     pub count: u64,
     /// When last.
     pub last: Span,

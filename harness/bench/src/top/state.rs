@@ -28,7 +28,7 @@ impl Sort {
         }
     }
 
-    /// The order behind this one.
+    /// The order after this one.
     pub const fn next(self) -> Self {
         match self {
             Self::Drive => Self::State,
@@ -42,14 +42,12 @@ impl Sort {
 /// What keys go to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeyTarget {
-    /// The commands.
     #[default]
     None,
     /// The text to filter by.
     Filter,
     /// The name of a drive that is to be stopped.
     Stop,
-    /// The help is shown.
     Help,
 }
 

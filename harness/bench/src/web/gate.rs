@@ -11,7 +11,7 @@ pub(super) const TOKEN: &str = "drivebench-token";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Route {
     Page,
-    /// The stream of events behind this one.
+    /// The stream of events after this one.
     Events(Option<u64>),
     /// An order, whose body is to be read.
     Order(Path),

@@ -137,7 +137,7 @@ impl LivePage {
         })
     }
 
-    /// The address to open, with the token behind its `#`, which no browser sends to a server.
+    /// The address to open, with the token after its `#`, which no browser sends to a server.
     #[must_use]
     pub(crate) fn url(&self) -> String {
         format!("http://{}/#{}", self.address, self.token)
@@ -324,7 +324,7 @@ fn routed(stream: &TcpStream, shared: &Shared, end: Instant) -> Result<Reply, Op
     }
 }
 
-/// Reads the body behind a head, of which `bytes` have come.
+/// Reads the body after a head, of which `bytes` have come.
 fn body(
     stream: &TcpStream,
     head: &Head,
@@ -423,7 +423,7 @@ fn drain(mut stream: &TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// The head of an answer, but for the empty line behind it.
+/// The head of an answer, but for the empty line after it.
 fn head(status: u16, kind: &str, more: &str) -> String {
     let reason = match status {
         200 => "OK",

@@ -79,7 +79,6 @@ pub struct LiveNews {
 /// A row of the picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LiveRow {
-    /// When.
     pub at: String,
     /// What stands in columns.
     pub cells: Vec<LiveCell>,

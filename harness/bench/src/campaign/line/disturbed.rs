@@ -268,7 +268,7 @@ impl<L: DisturbedLine> LineCampaign<L> {
         Ok((class, played))
     }
 
-    /// Plays every case, in order; `progress` is called behind each.
+    /// Plays every case, in order; `progress` is called after each.
     ///
     /// # Errors
     /// A case cannot be played: a defect of the bench.

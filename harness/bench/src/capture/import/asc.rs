@@ -7,7 +7,7 @@
 //! | `base hex  timestamps absolute` | the radix of identifiers and bytes; `relative` times count from the event before |
 //! | `0.001000 1  201x  Rx  d 3 3D 40 00 ...` | time, channel, identifier with `x` for 29 bits, direction, `d` data or `r` remote, length, bytes |
 //! | `0.001000 1  DriveRx  Rx  d 3 3D 40 00 ... ID = 513` | the same of a log with names: the identifier is decimal, at the end |
-//! | `0.001000 CANFD 1 Rx 201 0 0 3 3 3D 40 00 130000 130 0 ...` | a frame whose flags (behind duration and length) say whether it is of CAN FD (bit 12) |
+//! | `0.001000 CANFD 1 Rx 201 0 0 3 3 3D 40 00 130000 130 0 ...` | a frame whose flags (after duration and length) say whether it is of CAN FD (bit 12) |
 //! | `0.002000 1  ErrorFrame` | passed over and counted |
 //!
 //! All other lines that begin with a time are events of the program, in the user's language.
@@ -156,7 +156,7 @@ impl Reader {
     }
 }
 
-/// A line CANFD behind its direction: identifier, perhaps a name, BRS, ESI, length code, length, data, duration, bits, flags. All numbers but
+/// A line CANFD after its direction: identifier, perhaps a name, BRS, ESI, length code, length, data, duration, bits, flags. All numbers but
 /// the length are hexadecimal.
 fn with_flags(words: &[&str]) -> Result<What, String> {
     /// Bits of the flags.

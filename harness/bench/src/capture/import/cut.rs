@@ -63,7 +63,7 @@ pub(super) fn whole_part(
     Ok((whole, notes))
 }
 
-/// The lines that have an end, and how many bytes are behind them.
+/// The lines that have an end, and how many bytes are after them.
 fn lines(text: &[u8]) -> Result<(&[u8], usize), CaptureError> {
     let end = text.iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
     let (whole, rest) = text.split_at(end.map_or(0, |last| last + 1));
@@ -77,7 +77,7 @@ fn lines(text: &[u8]) -> Result<(&[u8], usize), CaptureError> {
     Ok((whole, if blank { 0 } else { rest.len() }))
 }
 
-/// The objects of a list that are whole, as a text of JSON, and how many bytes are behind them. What follows an object shows that it is whole.
+/// The objects of a list that are whole, as a text of JSON, and how many bytes are after them. What follows an object shows that it is whole.
 fn objects(text: &[u8]) -> (Cow<'_, [u8]>, usize) {
     let parsed = serde_json::from_slice::<serde::de::IgnoredAny>(text);
     let between = text.windows(3).rposition(|window| window == b"},{");
@@ -127,7 +127,7 @@ mod tests {
         (frames, read.notes)
     }
 
-    /// Cut anywhere in the last line but one or behind it, a log has the frames in front of the cut and no other.
+    /// Cut anywhere in the last line but one or after it, a log has the frames in front of the cut and no other.
     #[test]
     fn a_cut_log_has_its_whole_lines_and_no_other() {
         for parts in [&LINES[..], &ASC, &CSV] {

@@ -4,7 +4,7 @@ use super::super::{CaptureError, read_with};
 use super::tests::{digital, drawn, many, saleae, settings};
 use harness_proto::line::Parity;
 
-/// Any bytes behind the first ones of each format, and damaged files of each: a capture or a reason, never a panic.
+/// Any bytes after the first ones of each format, and damaged files of each: a capture or a reason, never a panic.
 #[test]
 fn hostile_files() {
     damaged_files(1_000);

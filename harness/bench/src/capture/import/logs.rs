@@ -2,7 +2,7 @@
 //!
 //! | form | a line |
 //! |---|---|
-//! | candump with `-l` or `-L` | `(1436509052.249713) can0 201#3D4000`, and the direction behind it in newer versions |
+//! | candump with `-l` or `-L` | `(1436509052.249713) can0 201#3D4000`, and the direction after it in newer versions |
 //! | candump on the screen | ` (2023-11-14 22:13:20.001000)  can0  201   [3]  3D 40 00`; the time of `-ta`, `-tA`, `-td`, `-tz`, or none |
 //!
 //! The other forms are in `forms`.
@@ -15,10 +15,9 @@ use crate::counted::counted;
 use crate::report::pcapng_frames::ERROR;
 use harness_proto::can::{Frame, Id};
 
-/// Where a line of a frame is looked for behind headings.
+/// Where a line of a frame is looked for after headings.
 const HEADING: usize = 4_096;
 
-/// A form of logs.
 pub(super) struct Form {
     /// Reads a line; `None` for one that has no frame.
     pub(super) line: fn(&mut State, &str) -> Result<Option<Logged>, String>,
@@ -63,7 +62,7 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
         lost: None,
     };
     let mut log = Log::default();
-    // What a terminal prints behind the last frame, such as the prompt of a shell: the first such line, and how many there are.
+    // What a terminal prints after the last frame, such as the prompt of a shell: the first such line, and how many there are.
     let mut behind: Option<(CaptureError, usize)> = None;
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -240,7 +239,7 @@ fn plain(line: &str) -> String {
     plain
 }
 
-/// The time at the beginning of a line of candump, and the words behind it.
+/// The time at the beginning of a line of candump, and the words after it.
 fn split_time(line: &str) -> Result<(Option<Time>, Vec<&str>), String> {
     let Some(rest) = line.trim_start().strip_prefix('(') else {
         return Ok((None, line.split_whitespace().collect()));
@@ -327,7 +326,7 @@ fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<Logged, Stri
     } else if id.len() == 8 && u32::from_str_radix(id, 16).is_ok_and(|id| id & ERROR != 0) {
         What::Error
     } else {
-        // Behind `_` stands the raw length code of a frame with 8 bytes.
+        // After `_` stands the raw length code of a frame with 8 bytes.
         let frame = frame.split('_').next().unwrap_or(frame);
         What::Frame(frame.parse().map_err(|bad| format!("{bad}"))?)
     };

@@ -46,7 +46,6 @@ pub struct ReadSettings {
 /// A capture, and what is to be told about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
-    /// The capture.
     pub capture: Capture,
     /// What was found and what was not read, in sentences.
     pub notes: Vec<String>,
@@ -99,7 +98,6 @@ enum Reader {
     Channels(fn(&[u8], &ReadSettings) -> Result<Channels, CaptureError>),
 }
 
-/// A format of files.
 #[derive(Clone, Copy)]
 struct Format {
     name: &'static str,

@@ -52,7 +52,7 @@ pub(super) fn levels(bytes: &[u8]) -> Result<Channels, CaptureError> {
     levels_of(Table::new(bytes), None)
 }
 
-/// The levels of the columns of a table behind the first one, which has the times; `sample` is the time between samples, where it is known.
+/// The levels of the columns of a table after the first one, which has the times; `sample` is the time between samples, where it is known.
 ///
 /// # Errors
 /// The row and the field that cannot be.

@@ -90,7 +90,7 @@ impl<'b> Table<'b> {
         columns.position(|column| column.eq_ignore_ascii_case(name))
     }
 
-    /// Goes to the next row; `false` behind the last one.
+    /// Goes to the next row; `false` after the last one.
     ///
     /// # Errors
     /// The text cannot be read on.

@@ -38,7 +38,7 @@ fn shared(trace: &Trace) -> bool {
     channels.any(|channel| channel.from.is_none() && channel.to.is_none())
 }
 
-/// What channels carried: `98->97: 88 FE! ...`, with `!` behind a damaged octet.
+/// What channels carried: `98->97: 88 FE! ...`, with `!` after a damaged octet.
 fn shown(capture: &Capture) -> String {
     let mut text = String::new();
     for (ring, trace) in capture.traces.iter().enumerate() {

@@ -221,7 +221,7 @@ impl<'b> Reader<'b> {
         }
     }
 
-    /// A token behind the header.
+    /// A token after the header.
     fn token(&mut self, at: usize, token: &'b [u8]) -> Result<(), CaptureError> {
         if std::mem::take(&mut self.passed_over) {
             return Ok(());

@@ -28,7 +28,7 @@ pub(in crate::capture) struct Packet {
     pub(in crate::capture) end: usize,
 }
 
-/// A frame behind a header of Linux: the length of the header, the number of the part, and the identifier as it stands.
+/// A frame after a header of Linux: the length of the header, the number of the part, and the identifier as it stands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cooked {
     packet: Packet,
@@ -194,7 +194,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The frames behind headers of Linux. Their identifiers have the order of bytes of the computer that captured them, or that of networks:
+    /// The frames after headers of Linux. Their identifiers have the order of bytes of the computer that captured them, or that of networks:
     /// the one in which more of them are identifiers of frames with 11 bits, or of frames at all, and else the first.
     pub(super) fn cooked_frames(&mut self) -> Result<(), CaptureError> {
         let cooked = std::mem::take(&mut self.cooked);

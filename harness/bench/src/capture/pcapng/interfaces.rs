@@ -23,12 +23,11 @@ const COOKED: [u16; 2] = [113, 276];
 /// How the packets of a link type hold what they carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Packets {
-    /// Octets behind a header with an event.
+    /// Octets after a header with an event.
     Serial,
-    /// Octets alone.
     Octets,
     Frames,
-    /// A frame behind a header of Linux, which names its protocol, as do packets of any other network.
+    /// A frame after a header of Linux, which names its protocol, as do packets of any other network.
     Cooked,
     /// The same, of the second version: the header has the number of the interface too.
     Cooked2,
@@ -101,7 +100,7 @@ impl Carries {
 pub(in crate::capture) type Clock = (u8, i64, Option<u64>);
 
 impl Reader<'_> {
-    /// An interface: its place in the file and its link type; its name with the place of that; its clock.
+    /// Adds an interface that is described at `start`; its name comes with the place of that.
     pub(in crate::capture) fn describe(
         &mut self,
         (start, link_type): (usize, u16),

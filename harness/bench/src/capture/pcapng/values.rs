@@ -34,7 +34,7 @@ pub(super) fn noted(events: Vec<String>) -> Vec<String> {
     notes
 }
 
-/// Whether bytes or frames are missing behind an event: they were lost, or the adapter was away.
+/// Whether bytes or frames are missing after an event: they were lost, or the adapter was away.
 pub(super) fn means_loss(event: &str) -> bool {
     event.contains(" lost: ") || event == AWAY
 }

@@ -28,7 +28,6 @@ impl<'s, B: LineBus> Maker<'s, B> {
         Self { scope, swarm }
     }
 
-    /// A new conversation.
     pub(crate) fn case(&self, dice: &mut Dice) -> LineTalk<B> {
         let mut acts = Vec::new();
         if let Some(station) = self.station(dice) {

@@ -94,7 +94,7 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
         stations: (Self::Station, &[Self::Station]),
         dice: &mut Dice,
     ) -> Vec<LineAct<Self::What>>;
-    /// The time behind an act, in microseconds.
+    /// The time after an act, in microseconds.
     fn wait(dice: &mut Dice) -> u64;
     /// Changes a part of an act.
     fn change(what: &mut Self::What, dice: &mut Dice);
@@ -117,7 +117,7 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
 
     /// With which values of the open points a search begins, the most likely ones first: a value for each drive.
     fn begins(setup: &Self::Setup) -> Vec<Vec<Self::Properties>>;
-    /// Values that differ from `own` in one open point of the drive at this place.
+    /// Values that differ from `properties` in one open point of the drive at this place.
     fn neighbours(
         setup: &Self::Setup,
         place: usize,

@@ -40,7 +40,6 @@ impl<B: LineBus> Oracle<B> {
         }
     }
 
-    /// The drives under test.
     pub(crate) const fn under_test(&self) -> &B::Setup {
         &self.under_test
     }

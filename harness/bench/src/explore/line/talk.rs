@@ -15,7 +15,7 @@ const MOST_SENT: u64 = 400;
 pub struct ActBounds {
     /// How many times in a row an act may happen.
     pub times: u8,
-    /// The longest time behind an act, in microseconds.
+    /// The longest time after an act, in microseconds.
     pub wait_us: u64,
     /// The longest conversation, in microseconds.
     pub total_us: u64,
@@ -25,16 +25,15 @@ pub struct ActBounds {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
 pub struct LineTalk<B: LineBus> {
-    /// The acts, in order.
     pub acts: Vec<LineAct<B::What>>,
 }
 
-/// An act, how often it happens, and the time behind it.
+/// An act, how often it happens, and the time after it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LineAct<W> {
     pub what: W,
-    /// How many times it happens, each with the time behind it.
+    /// How many times it happens, each with the time after it.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub times: u8,
     /// Microseconds to the next act; where a reply is waited for, from its end, or from when it would have begun.
@@ -63,7 +62,7 @@ const fn is_zero(wait: &u64) -> bool {
 }
 
 impl<W> LineAct<W> {
-    /// An act that happens once, with this time behind it.
+    /// An act that happens once, with this time after it.
     #[must_use]
     pub const fn new(what: W, wait_us: u64) -> Self {
         Self {
@@ -73,13 +72,13 @@ impl<W> LineAct<W> {
         }
     }
 
-    /// The time behind it.
+    /// The time after it.
     #[must_use]
     pub const fn wait(&self) -> Span {
         Span::from_micros(self.wait_us)
     }
 
-    /// The time behind it, as often as it happens, in microseconds.
+    /// The time after it, as often as it happens, in microseconds.
     const fn lasts(&self) -> u64 {
         self.wait_us.saturating_mul(self.times as u64)
     }

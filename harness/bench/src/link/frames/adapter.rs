@@ -159,11 +159,11 @@ pub(super) struct Slcan {
     answers: bool,
     /// Whether it was told to be silent.
     silenced: bool,
-    /// How many lines, one behind the other, were none that an adapter sends.
+    /// How many lines, one after the other, were none that an adapter sends.
     damaged: usize,
 }
 
-/// A serial line that has lost characters damages a line. From this number on, one behind the other, something else than an adapter sends.
+/// A serial line that has lost characters damages a line. From this number on, one after the other, something else than an adapter sends.
 const MOST_DAMAGED: usize = 8;
 
 impl Slcan {

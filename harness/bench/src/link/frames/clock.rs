@@ -18,7 +18,6 @@ pub(super) struct AdapterClock {
     last: Option<Last>,
 }
 
-/// The last stamp.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     /// When it was read.

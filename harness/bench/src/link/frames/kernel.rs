@@ -29,7 +29,7 @@ pub(super) struct Kernel {
     settings: AdapterSettings,
     name: String,
     index: u32,
-    /// Whether the kernel restarts it behind bus-off.
+    /// Whether the kernel restarts it after bus-off.
     restarts: bool,
     queue: VecDeque<[u8; socketcan::LENGTH]>,
 }
@@ -337,7 +337,7 @@ mod tests {
         CanEvent::Frame("181#AA".parse().expect("a frame"))
     }
 
-    /// An interface that is bus-off, gives what was waiting behind the error that ends it, and is back when it is looked for.
+    /// An interface that is bus-off, gives what was waiting after the error that ends it, and is back when it is looked for.
     #[derive(Debug)]
     struct Short {
         restarts: bool,

@@ -36,7 +36,7 @@ use transport::Transport;
 /// How far ahead of the bus frames are handed to the adapter.
 const AHEAD: Span = Span::from_millis(2);
 
-/// How long behind the bench's last frame an answer to it may come through an adapter and a busy computer.
+/// How long after the bench's last frame an answer to it may come through an adapter and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
 /// The longest sleep: a request to end is looked for at least this often.
@@ -291,7 +291,6 @@ impl FrameLink {
         }
     }
 
-    /// Waits for the stream.
     fn listen(&mut self, until: Instant) {
         let due = match self.queue.is_empty() {
             true => self.transport.due().map(|due| due - self.begun()),

@@ -96,7 +96,6 @@ impl fmt::Display for AdapterPlace {
 /// A CAN adapter and the settings of its bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSettings {
-    /// The adapter.
     pub place: AdapterPlace,
     /// The rate of the bus. A server of socketcand and an interface of the kernel have a rate of their own, which is not changed; that of
     /// an interface has to be this one.
@@ -133,27 +132,21 @@ pub enum AdapterError {
     )]
     Silent {
         port: String,
-        /// What was asked.
         command: &'static str,
-        /// What should be there.
         expected: &'static str,
     },
     /// It answers something else.
     #[error("{port} is no {expected}: {received}")]
     Other {
         port: String,
-        /// What should be there.
         expected: &'static str,
-        /// What was received.
         received: String,
     },
     /// It refuses a command.
     #[error("{port} refuses {what}: {remedy}")]
     Refused {
         port: String,
-        /// What it refuses.
         what: String,
-        /// What to do.
         remedy: &'static str,
     },
     /// An SLCAN adapter cannot have the rate.

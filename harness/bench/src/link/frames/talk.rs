@@ -164,7 +164,7 @@ impl<'a> Talk<'a> {
         self.name.to_ascii_lowercase().contains("canable")
     }
 
-    /// The lines that are no frames of the bus and no bare answers, up to a pause behind the first of them.
+    /// The lines that are no frames of the bus and no bare answers, up to a pause after the first of them.
     fn greetings(&mut self, patience: Duration) -> Result<Vec<String>, AdapterError> {
         let mut texts = Vec::new();
         let mut end = Instant::now() + patience;
@@ -288,7 +288,7 @@ impl<'a> Talk<'a> {
             &SocketcandAnswer::Ok,
             "use a server of socketcand with a raw mode",
         )?;
-        // A served drive reports frames late until its client has spoken behind the answer.
+        // A served drive reports frames late until its client has spoken after the answer.
         self.request(&SocketcandRequest::Echo)
     }
 

@@ -35,7 +35,7 @@ pub(super) trait Transport: fmt::Debug + Send {
     fn receive(&mut self, now: Instant, events: &mut Vec<Event>) -> Result<(), Trouble>;
     /// How another thread can send frames.
     fn last_words(&self) -> io::Result<LastWords>;
-    /// Whether it goes on by itself behind bus-off.
+    /// Whether it goes on by itself after bus-off.
     fn restarts(&self) -> bool {
         false
     }
@@ -45,12 +45,11 @@ pub(super) trait Transport: fmt::Debug + Send {
     }
 }
 
-/// A stream of characters.
 #[derive(Debug)]
 pub(super) struct Stream {
     pub(super) wire: Wire,
     pub(super) adapter: Adapter,
-    /// What the opening has read behind the last answer.
+    /// What the opening has read after the last answer.
     pub(super) come: VecDeque<u8>,
 }
 
@@ -63,7 +62,6 @@ impl Stream {
 }
 
 impl Drop for Stream {
-    /// Closes the channel.
     fn drop(&mut self) {
         let mut close = Vec::new();
         self.adapter.close(&mut close);

@@ -25,7 +25,6 @@ pub struct Curve {
     pub held: bool,
     /// Which dashes it has: curves of one recording have the same.
     pub dash: usize,
-    /// Its samples.
     pub points: Points,
 }
 

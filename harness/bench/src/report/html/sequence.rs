@@ -20,7 +20,6 @@ pub struct Arrow {
     pub to: Option<u8>,
     /// Whether it arrived undamaged.
     pub good: bool,
-    /// What it means.
     pub words: String,
 }
 

@@ -75,7 +75,7 @@ fn action<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> 
     }
 }
 
-/// What stands behind a symbol of which every bus says what it means.
+/// What follows a symbol of which every bus says what it means.
 fn bus_step<L: Language>(
     opening: Opening<'_>,
     scanner: &mut Scanner<'_>,

@@ -30,9 +30,7 @@ pub struct Plan<L: Language> {
     pub deadline: Span,
     /// What a rig must have.
     pub needs: Vec<Capability>,
-    /// The steps, in order.
     pub steps: Vec<PlannedStep<L>>,
-    /// The header.
     pub setup: L::Setup,
 }
 
@@ -72,14 +70,12 @@ impl<L: Language> DerefMut for Plan<L> {
     }
 }
 
-/// A step, settled.
 #[derive(Clone, Debug)]
 pub struct PlannedStep<L: Language> {
     /// The time in front.
     pub when: PlannedWhen,
     /// What happens.
     pub action: PlannedAction<L>,
-    /// Where it stands.
     pub span: TextSpan,
 }
 

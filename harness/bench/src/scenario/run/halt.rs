@@ -47,8 +47,8 @@ impl<L: Language> Runner<'_, L> {
         result
     }
 
-    /// Whether the conversation has to end here: the link is in trouble, or there is no room for more in the record. Looked at behind
-    /// every step and behind the last bytes, since no later step may follow.
+    /// Whether the conversation has to end here: the link is in trouble, or there is no room for more in the record. Looked at after
+    /// every step and after the last bytes, since no later step may follow.
     pub fn halted(&mut self) -> Result<(), Stop> {
         self.notice();
         match &self.full {
@@ -77,7 +77,7 @@ impl<L: Language> Runner<'_, L> {
             .or_else(|| trouble().map(Halt::Trouble));
     }
 
-    /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it. A drive that never stops
+    /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent after it. A drive that never stops
     /// sending must not fill the record.
     fn come_home(&mut self) {
         let end = self.link.now() + L::ROUND;
@@ -88,7 +88,7 @@ impl<L: Language> Runner<'_, L> {
     }
 
     /// Waits for bytes that a busy computer may still hold, where time is real and fewer came than were sent. A byte that comes now was
-    /// late; one that does not come is lost. Behind trouble neither is judged, and what the guard has denied has no answer.
+    /// late; one that does not come is lost. After trouble neither is judged, and what the guard has denied has no answer.
     fn wait_for_late(&mut self) {
         if self.link.time_tolerance() == Span::ZERO || self.link.trouble().is_some() {
             return;

@@ -22,7 +22,7 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// The first thing that was not as a step says; playing stops there.
     pub finding: Option<Mismatch>,
-    /// Where the steps begin that were not as they say, where playing has gone on behind the first one.
+    /// Where the steps begin that were not as they say, where playing has gone on after the first one.
     pub unmet: Vec<usize>,
     /// Notes, also when nothing failed.
     pub remarks: Vec<String>,
@@ -70,7 +70,7 @@ impl Outcome {
         Self::not_played(trouble.verdict(), trouble.to_string())
     }
 
-    /// The same where trouble of the link has come behind its last step: what was judged before is a remark.
+    /// The same where trouble of the link has come after its last step: what was judged before is a remark.
     #[must_use]
     pub fn ended_by(self, trouble: &Trouble) -> Self {
         let before = format!("before that: {}", self.verdict);
@@ -155,7 +155,6 @@ impl Trouble {
 /// Something that was not as a step says.
 #[derive(Clone, Debug)]
 pub struct Mismatch {
-    /// The step.
     pub span: TextSpan,
     /// What is wrong, in a sentence.
     pub message: String,

@@ -23,7 +23,7 @@ const PAUSE: Span = Span::from_millis(50);
 pub enum AtMismatch {
     /// Send nothing more.
     Stop,
-    /// Go on with the lines behind it: for a trace of the whole conversation.
+    /// Go on with the lines after it: for a trace of the whole conversation.
     GoOn,
 }
 
@@ -160,7 +160,7 @@ impl<L: Language> Runner<'_, L> {
         if let PlannedAction::Receive(ring, expected) = &step.action {
             let received = self.receive(step, *ring, expected);
             if received.is_err() && self.at_mismatch == AtMismatch::GoOn {
-                // The next line is about what comes behind it.
+                // The next line is about what follows it.
                 self.settle();
                 self.forget(*ring);
             }

@@ -30,7 +30,6 @@ pub struct CellRecord {
 /// What a cell held at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// When.
     pub at: Instant,
     bytes: [u8; 4],
     size: u8,

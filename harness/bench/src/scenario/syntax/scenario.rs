@@ -23,7 +23,6 @@ pub struct Scenario<L: Language> {
     pub strict: bool,
     /// How long a line without a time waits.
     pub deadline: Option<Duration>,
-    /// The steps, in order.
     pub steps: Vec<Step<L>>,
 }
 
@@ -76,7 +75,6 @@ pub struct ScenarioHead {
 pub struct Citation {
     /// The whole reference, single spaces between its words.
     pub text: String,
-    /// Where it stands.
     pub span: TextSpan,
 }
 
@@ -86,7 +84,6 @@ pub struct Step<L: Language> {
     pub when: When,
     /// What happens.
     pub action: Action<L>,
-    /// Where it stands.
     pub span: TextSpan,
 }
 

@@ -25,7 +25,6 @@ pub trait SharedBus {
     /// What is on the bus beside the clients: `2 drives`.
     fn about(&self) -> String;
 
-    /// Its time.
     fn now(&self) -> Instant;
 
     /// Lets everything happen up to `to`. A frame that has begun by then is carried to its end.

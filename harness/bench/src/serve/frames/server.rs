@@ -38,7 +38,6 @@ pub struct FrameServer<B> {
     started: Duration,
 }
 
-/// A client's place.
 #[derive(Debug, Default)]
 struct Seat {
     client: Option<Client>,

@@ -12,7 +12,7 @@ const VERSION: &str = "1010";
 /// The serial number that an SLCAN client reads.
 const SERIAL_NUMBER: &str = "SIM1";
 
-/// How long the daemon reports nothing behind the answer to `rawmode`, unless the client says more. A client may take the answer for the only
+/// How long the daemon reports nothing after the answer to `rawmode`, unless the client says more. A client may take the answer for the only
 /// message of its segment: the constructor of python-can refuses a frame there.
 const HOLD: Span = Span::from_millis(100);
 
@@ -45,13 +45,11 @@ pub(super) enum Act {
     Join { listen_only: bool },
     /// To be none any more, once its frames are sent.
     Leave,
-    /// To send a frame.
     Send(Frame),
     /// Nothing: a mistake, for people.
     Say(String),
 }
 
-/// A conversation.
 #[derive(Clone, Debug)]
 pub(super) enum Session {
     Slcan(Adapter),
@@ -103,7 +101,6 @@ impl Session {
     }
 }
 
-/// A serial CAN adapter.
 #[derive(Clone, Debug)]
 pub(super) struct Adapter {
     lines: slcan::Lines,
@@ -257,7 +254,6 @@ impl Adapter {
     }
 }
 
-/// The daemon socketcand.
 #[derive(Clone, Debug)]
 pub(super) struct Daemon {
     messages: Messages,

@@ -21,7 +21,6 @@ const CHUNK: usize = 4096;
 /// Where a bus is served, and in which language.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePlace {
-    /// The language.
     pub protocol: Protocol,
     /// A socket for several clients, or a pseudo terminal for one.
     pub at: ServedAt,
@@ -108,7 +107,6 @@ struct Shell<'a, B> {
     host: &'a mut dyn ServeHost,
     ending: EndRequest,
     clock: Clock,
-    /// Clients there are.
     here: usize,
     /// A client was there, and none is left.
     gone: bool,
@@ -214,7 +212,6 @@ impl<B: SharedBus> Shell<'_, B> {
         }
     }
 
-    /// Takes new connections.
     fn accept(&mut self) {
         for door in 0..self.doors.len() {
             let (protocol, listener) = &self.doors[door];
