@@ -79,7 +79,8 @@ impl Html {
         &mut self,
         id: &str,
         (width, height): (usize, usize),
-        (title, description): (&dyn Display, &str),
+        title: &dyn Display,
+        description: &str,
         inside: impl FnOnce(&mut Self),
     ) {
         let view = format!("0 0 {width} {height}");
@@ -112,7 +113,7 @@ impl Html {
     /// Text as text, whatever it holds.
     pub fn text(&mut self, text: impl Display) {
         // Writing to a String cannot fail.
-        let _infallible = write!(Escaped(&mut self.out), "{text}");
+        let _infallible = write!(Escaper(&mut self.out), "{text}");
     }
 
     /// A part that was written before.
@@ -192,9 +193,9 @@ const fn is_invisible(c: char) -> bool {
     matches!(c, '\u{061C}' | '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2060}'..='\u{2069}' | '\u{FEFF}')
 }
 
-struct Escaped<'o>(&'o mut String);
+struct Escaper<'o>(&'o mut String);
 
-impl fmt::Write for Escaped<'_> {
+impl fmt::Write for Escaper<'_> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         let mut plain = 0;
         for (at, c) in text.char_indices() {

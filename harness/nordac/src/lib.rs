@@ -62,10 +62,10 @@ pub static BUS: Bus = Bus {
     live: |_, _| Box::<report::live::TelegramText>::default(),
     report: &report::TelegramReport,
     judged: |capture, options| {
-        let pieces = report::TelegramReport.counted(&capture.traces);
-        judged_frames(capture::judged, pieces, (capture, options))
+        let (count, what) = report::TelegramReport.counted(&capture.traces);
+        judged_frames(capture::judged, count, what, capture, options)
     },
-    replayed: |capture, options| replayed_frames(capture::scenario, (capture, options)),
+    replayed: |capture, options| replayed_frames(capture::scenario, capture, options),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
     rigs: Some(rig::COMMANDS),
     campaigns: line::line_names::<campaign::Telegrams>,

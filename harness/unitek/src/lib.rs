@@ -56,10 +56,10 @@ pub static BUS: Bus = Bus {
     live: |_, _| Box::new(report::table::FrameText),
     report: &report::FrameReport,
     judged: |capture, options| {
-        let pieces = report::FrameReport.counted(&capture.traces);
-        judged_frames(capture::judged, pieces, (capture, options))
+        let (count, what) = report::FrameReport.counted(&capture.traces);
+        judged_frames(capture::judged, count, what, capture, options)
     },
-    replayed: |capture, options| replayed_frames(capture::scenario, (capture, options)),
+    replayed: |capture, options| replayed_frames(capture::scenario, capture, options),
     fuzz: (&fuzz::TARGETS, &fuzz::NOTING),
     rigs: Some(rig::COMMANDS),
     campaigns: line::line_names::<campaign::Frames>,

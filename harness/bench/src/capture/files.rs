@@ -133,7 +133,7 @@ impl Files {
 mod tests {
     use super::*;
     use crate::capture::recorder::{Carries, Piece};
-    use crate::capture::{Listened, read};
+    use crate::capture::{CaptureSpan, read};
     use harness_proto::line::Rate;
     use harness_proto::time::{Instant, Span};
     use harness_sim::record::LineByte;
@@ -204,7 +204,7 @@ mod tests {
         let until = Instant::START + Span::from_nanos(octet.as_nanos() + 120_000_000);
         assert_eq!(
             read().listened,
-            Some(Listened {
+            Some(CaptureSpan {
                 before: Span::from_millis(80),
                 until
             })

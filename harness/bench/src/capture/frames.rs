@@ -131,7 +131,7 @@ fn id_is_remote(header: &[u8]) -> bool {
 
 /// What a line of a log has.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum What {
+pub(super) enum LogItem {
     Frame(Frame),
     /// An error frame, of which the log does not say which frame it ended.
     Error,
@@ -141,10 +141,10 @@ pub(super) enum What {
 
 /// A line of a log: its channel, and its time in thirds of a nanosecond where the log has one.
 #[derive(Clone, Debug)]
-pub(super) struct Logged {
+pub(super) struct LogEntry {
     pub(super) channel: String,
     pub(super) at: Option<i64>,
-    pub(super) what: What,
+    pub(super) what: LogItem,
     /// Its number, counted from 1, and its block.
     pub(super) place: Place,
 }
@@ -152,7 +152,7 @@ pub(super) struct Logged {
 /// A log of frames as text.
 #[derive(Debug, Default)]
 pub(super) struct Log {
-    pub(super) frames: Vec<Logged>,
+    pub(super) frames: Vec<LogEntry>,
     pub(super) notes: Vec<String>,
     /// Whether the program that wrote it has noted that something is missing.
     pub(super) lost: bool,
@@ -176,12 +176,12 @@ pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureE
     let (mut frames, mut errors, mut end) = (Vec::new(), 0, Span::ZERO);
     for logged in &lines {
         let frame = match logged.what {
-            What::Frame(frame) => frame,
-            What::Error => {
+            LogItem::Frame(frame) => frame,
+            LogItem::Error => {
                 errors += 1;
                 continue;
             }
-            What::Fd => {
+            LogItem::Fd => {
                 return Err(CaptureError::Link {
                     place: format!("line {}", logged.place.number),
                     what: "a frame of CAN FD, and classic frames are expected; choose another channel with `--link bus=...` where there is one"
@@ -221,10 +221,10 @@ pub(super) fn of_log(log: Log, links: &[NamedLink]) -> Result<Imported, CaptureE
 
 /// The frames of one interface: that which `links` names, or the only one.
 fn one_bus(
-    frames: Vec<Logged>,
+    frames: Vec<LogEntry>,
     links: &[NamedLink],
     notes: &mut Vec<String>,
-) -> Result<Vec<Logged>, CaptureError> {
+) -> Result<Vec<LogEntry>, CaptureError> {
     let wrong = |what: String| CaptureError::Link {
         place: "the log".to_owned(),
         what,
@@ -254,7 +254,7 @@ fn one_bus(
     };
     let all = frames.len();
     let kept = frames.iter().filter(|logged| logged.channel == name);
-    let kept: Vec<Logged> = kept.cloned().collect();
+    let kept: Vec<LogEntry> = kept.cloned().collect();
     if kept.len() < all {
         let left = counted(all - kept.len(), "frame");
         notes.push(format!("{left} of other interfaces not read"));

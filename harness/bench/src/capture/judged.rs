@@ -77,8 +77,10 @@ type ReplayFrames = fn(&[Trace], &str, Option<&Source>) -> Result<String, String
 /// What is missing, in a sentence.
 pub fn judged_frames(
     judge: JudgeFrames,
-    pieces: (usize, &str),
-    (capture, options): (&Capture, &JudgeOptions<'_>),
+    count: usize,
+    what: &str,
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
 ) -> Result<JudgedCapture, String> {
     // Times of a log are those of the bus unless the user says how far they are off; a log without times has an order alone.
     let tolerance = match capture.timed {
@@ -87,7 +89,6 @@ pub fn judged_frames(
     };
     let stations = (options.stations, tolerance);
     let judged = judge(&capture.traces, options.setup, stations)?;
-    let (count, what) = pieces;
     Ok(JudgedCapture {
         verdict: judged.verdict,
         about: format!(
@@ -109,7 +110,8 @@ pub fn judged_frames(
 /// What is missing, in a sentence.
 pub fn replayed_frames(
     replay: ReplayFrames,
-    (capture, options): (&Capture, &JudgeOptions<'_>),
+    capture: &Capture,
+    options: &JudgeOptions<'_>,
 ) -> Result<String, String> {
     if options.tolerance.is_some() {
         return Err("--tolerance changes nothing in a scenario of frames or telegrams: each is sent at its own time; leave it out".to_owned());

@@ -50,14 +50,14 @@ pub struct Capture {
     /// The rings; of each the links that were captured, in ring order.
     pub traces: Vec<Trace>,
     /// How long the line was listened to, where the file says so.
-    pub listened: Option<Listened>,
+    pub listened: Option<CaptureSpan>,
     /// Whether the times are those of the line: a log may have none, and then the order alone is known.
     pub timed: bool,
 }
 
 /// When a capture began and ended, beside what was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Listened {
+pub struct CaptureSpan {
     /// Silence in front of the first byte.
     pub before: Span,
     /// The end of the capture.

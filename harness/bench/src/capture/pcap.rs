@@ -44,7 +44,7 @@ pub(super) fn read(
     // The upper bits say how long the check sequence of a network is.
     let link_type = reader.u32(20, all)? & 0xFFFF;
     let link_type = u16::try_from(link_type).unwrap_or(u16::MAX);
-    reader.describe((20, link_type), None, (resolution, 0, None))?;
+    reader.describe(20, link_type, None, resolution, 0, None)?;
     if !reader.reads_any() {
         let what = format!(
             "link type {link_type} is not read with these settings; {LINK_TYPES} are expected"

@@ -12,7 +12,7 @@ mod parts;
 mod statistics;
 mod values;
 
-use contents::Cooked;
+use contents::CookedFrame;
 pub(super) use contents::Packet;
 pub(super) use interfaces::LINK_TYPES;
 pub(super) use values::nanoseconds;
@@ -31,7 +31,7 @@ use crate::report::pcapng_telegrams::PacketOctet;
 use harness_proto::can::BitRate;
 use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
-use interfaces::{Carries, Interface};
+use interfaces::{Interface, Role};
 use parts::{Part, chosen};
 use statistics::{STATISTICS, listened_to};
 use std::collections::BTreeMap;
@@ -128,8 +128,8 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
         Part::Ring => {}
         Part::Stations => {
             let senders = of_part().filter_map(|interface| match interface.carries {
-                Carries::Station(station) => Some(station),
-                Carries::Link(..) | Carries::Frames(_) | Carries::Line => None,
+                Role::Station(station) => Some(station),
+                Role::Link(..) | Role::Frames(_) | Role::Line => None,
             });
             let octets = octets.map(|(_, from, _, octet)| (from, octet)).collect();
             return Ok(telegrams::assemble(senders, octets, octet).into());
@@ -160,8 +160,8 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
         .map_or(0, |first| first - byte_time.as_nanos());
     let mut assembly = Assembly::default();
     let link = |interface: &Option<Interface>| match interface.as_ref()?.carries {
-        Carries::Link(ring, from, to) => Some((ring, from, to)),
-        Carries::Frames(_) | Carries::Station(_) | Carries::Line => None,
+        Role::Link(ring, from, to) => Some((ring, from, to)),
+        Role::Frames(_) | Role::Station(_) | Role::Line => None,
     };
     for (ring, from, to) in known.iter().filter_map(link) {
         assembly.link(ring, from, to);
@@ -219,8 +219,8 @@ pub(super) struct Reader<'b> {
     octets: Vec<(usize, Option<u8>, u64, PacketOctet)>,
     /// Whether the last good packet had the time of its first octet.
     begun: bool,
-    /// Frames behind headers of Linux.
-    cooked: Vec<Cooked>,
+    /// Frames after headers of Linux.
+    cooked: Vec<CookedFrame>,
     /// Frames with the number of their part.
     frames: Vec<(usize, FrameRead)>,
     parts: Vec<Part>,
@@ -324,12 +324,12 @@ impl<'b> Reader<'b> {
                 format!("a block of {length} bytes says {again} at its end"),
             );
         }
-        let inner = (offset + 8, end - 4);
+        let (from, to) = (offset + 8, end - 4);
         match kind {
-            SECTION => self.section(inner)?,
-            INTERFACE => self.interface(inner)?,
-            PACKET => self.packet(inner)?,
-            STATISTICS => self.statistics(inner)?,
+            SECTION => self.section(from, to)?,
+            INTERFACE => self.interface(from, to)?,
+            PACKET => self.packet(from, to)?,
+            STATISTICS => self.statistics(from, to)?,
             SIMPLE | OBSOLETE => {
                 self.cut = true;
                 self.pass_over("their blocks are of a kind without a time or interface; save the file anew in Wireshark");
@@ -339,7 +339,7 @@ impl<'b> Reader<'b> {
         Ok(end)
     }
 
-    fn section(&mut self, (start, end): (usize, usize)) -> Result<(), CaptureError> {
+    fn section(&mut self, start: usize, end: usize) -> Result<(), CaptureError> {
         let major = self.u16(start + 4, end)?;
         if major != 1 {
             return self.wrong(
@@ -352,14 +352,14 @@ impl<'b> Reader<'b> {
         Ok(())
     }
 
-    fn interface(&mut self, (start, end): (usize, usize)) -> Result<(), CaptureError> {
+    fn interface(&mut self, start: usize, end: usize) -> Result<(), CaptureError> {
         if self.interfaces.len() >= MAX_INTERFACES {
             return self.wrong(start, format!("more than {MAX_INTERFACES} interfaces"));
         }
         let link_type = self.u16(start, end)?;
         let mut name = None;
         let (mut resolution, mut offset, mut speed) = (6, 0, None);
-        self.options((start + 8, end), |code, from, to| {
+        self.options(start + 8, end, |code, from, to| {
             match code {
                 IF_NAME => name = Some((from, to)),
                 IF_TSRESOL => [resolution] = self.take(from, to)?,
@@ -371,21 +371,22 @@ impl<'b> Reader<'b> {
         })?;
         let text = |(from, to): (usize, usize)| String::from_utf8_lossy(&self.bytes[from..to]);
         let name = name.map(|place| (place.0, text(place)));
-        self.describe((start, link_type), name, (resolution, offset, speed))
+        self.describe(start, link_type, name, resolution, offset, speed)
     }
 
-    fn packet(&mut self, (start, end): (usize, usize)) -> Result<(), CaptureError> {
+    fn packet(&mut self, start: usize, end: usize) -> Result<(), CaptureError> {
         let number = usize::try_from(self.u32(start, end)?).unwrap_or(usize::MAX);
         let interface = self.section.saturating_add(number);
         let Some(known) = self.interfaces.get(interface) else {
             return self.wrong(start, format!("interface {number} has not been described"));
         };
-        let clock = known
-            .as_ref()
-            .map_or((6, 0), |known| (known.resolution, known.offset));
+        let (resolution, offset) = match known {
+            Some(known) => (known.resolution, known.offset),
+            None => (6, 0),
+        };
         let ticks =
             u64::from(self.u32(start + 4, end)?) << 32 | u64::from(self.u32(start + 8, end)?);
-        let nanos = nanoseconds(ticks, clock.0, clock.1);
+        let nanos = nanoseconds(ticks, resolution, offset);
         let Some(nanos) = nanos.or(known.is_none().then_some(0)) else {
             return self.wrong(
                 start + 4,

@@ -133,7 +133,7 @@ impl<W: Write> LiveRecorder<W> {
             Piece::Telegram(_, octets) => {
                 let octet = recorded.and_then(|place| octet_time(place.bits_per_second.into()));
                 for part in octets.chunks(MOST) {
-                    pcapng_telegrams::packet(block, (place, RECEIVED), part, octet);
+                    pcapng_telegrams::packet(block, place, RECEIVED, part, octet);
                     block.end(out)?;
                 }
                 return Ok(());

@@ -110,7 +110,7 @@ fn is_low(byte: u8, error: Option<LineError>) -> bool {
 /// Telegrams as the times between their octets show them.
 fn by_time(octets: &[PacketOctet], octet: Span) -> Vec<Run> {
     let mut runs = Vec::new();
-    let mut line = Asked::default();
+    let mut line = OwedReply::default();
     let mut left = octets;
     while let Some(first) = left.first() {
         // 33 idle bits end a telegram in any case, and 11 a damaged one.
@@ -175,9 +175,9 @@ const SYN_OCTETS: u64 = SYN_BITS.div_ceil(OCTET_BITS);
 
 /// The slave that owes a reply.
 #[derive(Clone, Copy, Debug, Default)]
-struct Asked(Option<u8>);
+struct OwedReply(Option<u8>);
 
-impl Asked {
+impl OwedReply {
     /// The sender of the next telegram; `None` for a master.
     fn sender(&mut self, telegram: &Telegram) -> Option<u8> {
         match telegram {
@@ -203,7 +203,7 @@ impl Asked {
 #[derive(Clone, Debug)]
 pub struct TelegramCutter {
     octet: u64,
-    asked: Asked,
+    asked: OwedReply,
     /// What is not cut yet: when it was read, in nanoseconds, and what it is.
     waiting: Vec<(u64, Received)>,
     /// The end of the last telegram.
@@ -218,7 +218,7 @@ impl TelegramCutter {
     pub const fn new(octet: Span) -> Self {
         Self {
             octet: octet.as_nanos(),
-            asked: Asked(None),
+            asked: OwedReply(None),
             waiting: Vec::new(),
             end: 0,
         }
@@ -373,7 +373,7 @@ mod tests {
         assert_eq!(hear(&mut cutter, 36_000_000, &ask[3..]).len(), 1);
         // An octet is missing: the reply that follows shows where the damage ends.
         let damaged = hear(&mut cutter, 50_000_000, &[&ask[..4], reply].concat());
-        let damaged: Vec<_> = damaged.into_iter().map(|(_, bytes)| bytes).collect();
+        let damaged: Vec<_> = damaged.into_iter().map(|(_, bytes, _)| bytes).collect();
         assert_eq!(damaged, [&ask[..4], reply]);
         assert_eq!(hear(&mut cutter, 60_000_000, &ask[..4]), []);
         assert_eq!(hear(&mut cutter, 79_000_000, &[]), []);

@@ -65,7 +65,7 @@ pub fn write(
         for part in octets.chunks(MOST) {
             let good = if from.is_none() { SENT } else { RECEIVED };
             let interface = interface.unwrap_or_default();
-            packet(&mut block, (interface, good), part, octet);
+            packet(&mut block, interface, good, part, octet);
             block.end(&mut out)?;
         }
     }
@@ -75,7 +75,8 @@ pub fn write(
 /// The packet of octets that followed each other at the interface with this number; the event is that of good octets.
 pub(crate) fn packet(
     block: &mut Block,
-    (interface, good): (usize, u8),
+    interface: usize,
+    good: u8,
     octets: &[LineByte],
     octet: Option<Span>,
 ) {
@@ -204,7 +205,8 @@ pub fn time_of(event: u8) -> Option<bool> {
 /// The octets of a packet: of its event, its time and whether that is the time of its first octet, the octets that arrived, and its comment.
 /// `octet` is the time of one.
 pub fn octets(
-    (event, nanos): (u8, u64),
+    event: u8,
+    nanos: u64,
     begins: bool,
     arrived: &[u8],
     comment: &str,
@@ -289,7 +291,7 @@ mod tests {
             "byte 2 parity, byte 2 sent 08, byte 3 lost, byte 3 sent 02, byte 4 after 34000 ns, byte 4 sent nothing, byte 5 framing"
         );
         let arrived = [0x10, 0x09, 0x49, 0x53, 0x16];
-        let read = octets((0x08, 144_000), false, &arrived, &text, BYTE);
+        let read = octets(0x08, 144_000, false, &arrived, &text, BYTE);
         let expected: Vec<_> = line
             .iter()
             .map(|byte| PacketOctet {
@@ -311,7 +313,8 @@ mod tests {
     #[test]
     fn packets_of_others() {
         let first = octets(
-            (0x02, 22_000),
+            0x02,
+            22_000,
             true,
             &[0x10, 0x16],
             "my favourite, byte",
@@ -319,19 +322,17 @@ mod tests {
         );
         let nanos: Vec<_> = first.iter().map(|octet| octet.nanos).collect();
         assert_eq!(nanos, [22_000, 44_000]);
-        let damaged = octets((0x08, 44_000), false, &[0x10, 0x16], "", BYTE);
+        let damaged = octets(0x08, 44_000, false, &[0x10, 0x16], "", BYTE);
         assert_eq!(damaged[0].error, Some(LineError::Parity));
         // Some programs write one event, and not one that says anything, in front of all octets.
         for event in [0x00, 0x06, 0x77] {
             assert_eq!(time_of(event), Some(true));
-            assert_eq!(
-                octets((event, 22_000), true, &[0x10, 0x16], "", BYTE),
-                first
-            );
+            assert_eq!(octets(event, 22_000, true, &[0x10, 0x16], "", BYTE), first);
         }
         // Numbers that no octet has.
         let odd = octets(
-            (0x04, 10),
+            0x04,
+            10,
             false,
             &[0x10],
             "byte 0 lost, byte 9 lost, byte 999999 lost",

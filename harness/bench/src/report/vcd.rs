@@ -70,11 +70,11 @@ pub fn write<'t>(
     drawing: Drawing,
     out: &mut dyn Write,
 ) -> std::io::Result<()> {
-    let drawn = wires.into_iter().map(|wire| Drawn::new(wire, drawing));
+    let drawn = wires.into_iter().map(|wire| Waveform::new(wire, drawing));
     draw(&mut drawn.collect::<Vec<_>>(), drawing, out)
 }
 
-fn draw(links: &mut [Drawn<'_>], drawing: Drawing, out: &mut dyn Write) -> std::io::Result<()> {
+fn draw(links: &mut [Waveform<'_>], drawing: Drawing, out: &mut dyn Write) -> std::io::Result<()> {
     head(links, drawing, out)?;
     let mut heap: BinaryHeap<Reverse<(u64, usize)>> = BinaryHeap::new();
     for (place, link) in links.iter_mut().enumerate() {
@@ -109,7 +109,7 @@ fn draw(links: &mut [Drawn<'_>], drawing: Drawing, out: &mut dyn Write) -> std::
     out.flush()
 }
 
-fn head(links: &[Drawn<'_>], drawing: Drawing, out: &mut dyn Write) -> std::io::Result<()> {
+fn head(links: &[Waveform<'_>], drawing: Drawing, out: &mut dyn Write) -> std::io::Result<()> {
     let vectors = drawing.signals == Signals::All;
     let scale = drawing.scale;
     writeln!(out, "$version drivebench $end\n$timescale {scale} $end")?;
@@ -153,7 +153,7 @@ enum Change {
 }
 
 /// One link on its way through its bytes.
-struct Drawn<'t> {
+struct Waveform<'t> {
     name: String,
     codes: [String; 4],
     bytes: std::slice::Iter<'t, LineByte>,
@@ -166,7 +166,7 @@ struct Drawn<'t> {
     shown: (Option<u8>, u8, u8),
 }
 
-impl<'t> Drawn<'t> {
+impl<'t> Waveform<'t> {
     fn new(wire: DrawnLine<'t>, drawing: Drawing) -> Self {
         let code = |kind| code(wire.place * 4 + kind);
         Self {

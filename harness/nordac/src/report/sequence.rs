@@ -33,7 +33,7 @@ pub(crate) fn sequence(html: &mut Html, id: &str, title: &str, trace: &Trace) ->
         carried: "telegrams",
         room: WORDS,
     };
-    html::sequence::sequence(html, (id, title), &slaves, arrows, words)
+    html::sequence::sequence(html, id, title, &slaves, arrows, words)
 }
 
 /// The arrows. A request and its reply are folded into those before them where both mean the same.

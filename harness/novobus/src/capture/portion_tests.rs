@@ -2,7 +2,7 @@
 
 use super::tests::run;
 use crate::capture::judge::{Judged, judge};
-use harness_bench::capture::{Capture, JudgeOptions, Listened};
+use harness_bench::capture::{Capture, CaptureSpan, JudgeOptions};
 use harness_bench::scenario::verdict::Verdict;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, LineByte};
@@ -91,7 +91,7 @@ fn a_short_answer_fails() {
     let late = shortened(in_portions, 22);
     assert_eq!(judged(&late).verdict, Verdict::Inconclusive);
     let went_on = Capture {
-        listened: Some(Listened {
+        listened: Some(CaptureSpan {
             before: Span::from_millis(100),
             until: Instant::START + Span::from_millis(500),
         }),
@@ -113,7 +113,7 @@ fn silence_in_front_is_known() {
             .drain(4..6),
     );
     assert_eq!(judged(&short).verdict, Verdict::Inconclusive);
-    let listened = Some(Listened {
+    let listened = Some(CaptureSpan {
         before: Span::from_millis(100),
         until: short.end(),
     });

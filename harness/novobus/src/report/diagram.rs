@@ -59,7 +59,7 @@ pub(crate) fn diagram(
         html.scroll(title, |html| {
             let title = format!("Space-time diagram: {title}");
             let (id, words) = (format!("{id}-"), picture.description());
-            html.picture(&id, picture.size(), (&title, &words), |html| {
+            html.picture(&id, picture.size(), &title, &words, |html| {
                 picture.draw(html);
             });
         });

@@ -409,37 +409,32 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
                  The table below says the same.";
     let title = "Sequence of jobs and answers";
     html.scroll("What was said, as a picture", |html| {
-        html.picture(
-            &format!("{id}-q"),
-            (width, height),
-            (&title, words),
-            |html| {
-                for one in &who {
-                    let at = x(*one);
-                    html.line(
-                        "text",
-                        &[("class", &"m"), ("x", &at), ("y", &16)],
-                        one.name(),
-                    );
-                    html.shape(
-                        "path",
-                        &[
-                            ("class", &"zero"),
-                            ("d", &format!("M{at} 22V{}", height - 8)),
-                        ],
-                    );
-                }
-                for (row, event) in drawn.iter().enumerate() {
-                    arrow(
-                        html,
-                        event,
-                        (x(event.from), x(event.to)),
-                        TOP + ROW * row + 16,
-                        words_at,
-                    );
-                }
-            },
-        );
+        html.picture(&format!("{id}-q"), (width, height), &title, words, |html| {
+            for one in &who {
+                let at = x(*one);
+                html.line(
+                    "text",
+                    &[("class", &"m"), ("x", &at), ("y", &16)],
+                    one.name(),
+                );
+                html.shape(
+                    "path",
+                    &[
+                        ("class", &"zero"),
+                        ("d", &format!("M{at} 22V{}", height - 8)),
+                    ],
+                );
+            }
+            for (row, event) in drawn.iter().enumerate() {
+                arrow(
+                    html,
+                    event,
+                    (x(event.from), x(event.to)),
+                    TOP + ROW * row + 16,
+                    words_at,
+                );
+            }
+        });
     });
     if events.len() > DRAWN {
         let more = events.len() - DRAWN;

@@ -40,7 +40,7 @@ pub(crate) fn sequence(html: &mut Html, id: &str, title: &str, trace: &Trace) ->
         carried: "frames",
         room: WORDS,
     };
-    html::sequence::sequence(html, (id, title), &drives(trace), arrows, words)
+    html::sequence::sequence(html, id, title, &drives(trace), arrows, words)
 }
 
 fn frames(trace: &Trace) -> impl Iterator<Item = &LineFrame> {

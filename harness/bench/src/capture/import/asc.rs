@@ -13,7 +13,7 @@
 //! All other lines that begin with a time are events of the program, in the user's language.
 
 use super::super::CaptureError;
-use super::super::frames::{Log, Logged, What};
+use super::super::frames::{Log, LogEntry, LogItem};
 use super::super::order::Place;
 use super::logs::{frame, identifier, logged};
 use super::numbers::{Time, seconds};
@@ -63,7 +63,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
                 what: format!("{shown:?}: {what}"),
             }
         })?;
-        log.frames.extend(read.map(|logged| Logged {
+        log.frames.extend(read.map(|logged| LogEntry {
             place: reader.place,
             ..logged
         }));
@@ -73,7 +73,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Log, CaptureError> {
 
 impl Reader {
     /// A line; `None` where it has no frame.
-    fn line(&mut self, line: &str) -> Result<Option<Logged>, String> {
+    fn line(&mut self, line: &str) -> Result<Option<LogEntry>, String> {
         let words: Vec<&str> = line.split_whitespace().take(40).collect();
         match words.as_slice() {
             ["base", radix, rest @ ..] => {
@@ -110,11 +110,11 @@ impl Reader {
         }
     }
 
-    /// What stands behind a time.
-    fn event(&self, at: Time, words: &[&str]) -> Result<Option<Logged>, String> {
+    /// What follows a time.
+    fn event(&self, at: Time, words: &[&str]) -> Result<Option<LogEntry>, String> {
         let (channel, what) = match words {
             ["CANFD", channel, "Rx" | "Tx", rest @ ..] => (channel, with_flags(rest)?),
-            [channel, "ErrorFrame", ..] => (channel, What::Error),
+            [channel, "ErrorFrame", ..] => (channel, LogItem::Error),
             [channel, id, "Rx" | "Tx", kind @ ("d" | "r"), rest @ ..] => {
                 (channel, self.classic(id, *kind == "r", rest)?)
             }
@@ -123,8 +123,8 @@ impl Reader {
         Ok(Some(logged(channel, Some(at), what)))
     }
 
-    /// A frame by its identifier or name, and what stands behind `d` or `r`.
-    fn classic(&self, name: &str, remote: bool, rest: &[&str]) -> Result<What, String> {
+    /// A frame by its identifier or name, and what follows `d` or `r`.
+    fn classic(&self, name: &str, remote: bool, rest: &[&str]) -> Result<LogItem, String> {
         // A name may look like a number.
         let stated = rest.windows(3).find_map(|words| match words {
             ["ID", "=", id] => Some(*id),
@@ -152,14 +152,13 @@ impl Reader {
         };
         let data = rest.get(1..).unwrap_or_default();
         let id = (number, Some(extended));
-        Ok(What::Frame(frame(id, remote, length, data, self.radix)?))
+        Ok(LogItem::Frame(frame(id, remote, length, data, self.radix)?))
     }
 }
 
 /// A line CANFD after its direction: identifier, perhaps a name, BRS, ESI, length code, length, data, duration, bits, flags. All numbers but
 /// the length are hexadecimal.
-fn with_flags(words: &[&str]) -> Result<What, String> {
-    /// Bits of the flags.
+fn with_flags(words: &[&str]) -> Result<LogItem, String> {
     const REMOTE: u32 = 1 << 4;
     const FD: u32 = 1 << 12;
     let (id, rest) = match words {
@@ -183,8 +182,8 @@ fn with_flags(words: &[&str]) -> Result<What, String> {
         Some(flags) if flags & FD == 0 && *switch == "0" && length <= 8 => {
             let id = (identifier(digits, 16)?, Some(extended));
             let frame = frame(id, flags & REMOTE != 0, length, rest, 16)?;
-            Ok(What::Frame(frame))
+            Ok(LogItem::Frame(frame))
         }
-        _ => Ok(What::Fd),
+        _ => Ok(LogItem::Fd),
     }
 }

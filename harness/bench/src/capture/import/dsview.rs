@@ -44,7 +44,7 @@ fn unit(name: &str) -> Option<&'static str> {
 }
 
 /// A row of a decoder.
-enum Decoded {
+enum RowItem {
     Octet(u8),
     /// The octet in front of it is damaged.
     Error(LineError),
@@ -71,7 +71,7 @@ impl Radix {
         (octets.peek().is_none() || octets.any(shows)).then_some(Self::Hexadecimal)
     }
 
-    fn read(self, field: &str) -> Option<Decoded> {
+    fn read(self, field: &str) -> Option<RowItem> {
         let hexadecimal = |text: &str| {
             let digits = text.len() == 2 && text.bytes().all(|digit| digit.is_ascii_hexdigit());
             digits.then(|| u8::from_str_radix(text, 16).ok())?
@@ -89,11 +89,11 @@ impl Radix {
         let words = field.to_ascii_lowercase();
         let is_error = words.contains("err");
         match octet {
-            Some(octet) => Some(Decoded::Octet(octet)),
-            None if words.contains("break") => Some(Decoded::Error(LineError::Break)),
-            None if is_error && words.contains("parity") => Some(Decoded::Error(LineError::Parity)),
-            None if is_error && words.contains("frame") => Some(Decoded::Error(LineError::Framing)),
-            None => words.ends_with(" bit").then_some(Decoded::Bit),
+            Some(octet) => Some(RowItem::Octet(octet)),
+            None if words.contains("break") => Some(RowItem::Error(LineError::Break)),
+            None if is_error && words.contains("parity") => Some(RowItem::Error(LineError::Parity)),
+            None if is_error && words.contains("frame") => Some(RowItem::Error(LineError::Framing)),
+            None => words.ends_with(" bit").then_some(RowItem::Bit),
         }
     }
 }
@@ -164,13 +164,13 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Channels, CaptureError> {
                 return Err(row.wrong("this octet is before the one above it"));
             }
             match (read, octets.last_mut()) {
-                (Decoded::Octet(byte), _) => octets.push(OctetRead {
+                (RowItem::Octet(byte), _) => octets.push(OctetRead {
                     start,
                     byte,
                     error: None,
                 }),
-                (Decoded::Error(error), Some(last)) => last.error = Some(error),
-                (Decoded::Error(_) | Decoded::Bit, _) => {}
+                (RowItem::Error(error), Some(last)) => last.error = Some(error),
+                (RowItem::Error(_) | RowItem::Bit, _) => {}
             }
         }
         channels.push(ChannelRead {

@@ -13,7 +13,7 @@
 use super::logs::{Form, State, frame, identifier, logged, shows};
 use super::numbers::{Time, seconds};
 use super::table::first_line;
-use crate::capture::frames::{Logged, What};
+use crate::capture::frames::{LogEntry, LogItem};
 
 /// Units of a second.
 const SECOND: Time = 3_000_000_000;
@@ -95,7 +95,7 @@ fn stated(text: &str) -> Result<usize, String> {
 }
 
 /// N number, O time in milliseconds, B bus, T type, d direction or type, I identifier, R reserved, l or L length, D data.
-fn trc(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn trc(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     if let Some(heading) = line.strip_prefix(';') {
         if let Some(version) = heading.strip_prefix("$FILEVERSION=") {
             let columns = match version.trim() {
@@ -128,8 +128,8 @@ fn trc(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
     let remote = kind == "RR";
     match kind {
         "DT" | "RR" | "Rx" | "Tx" => {}
-        "FD" | "FB" | "FE" | "BI" => return Ok(Some(logged(channel, Some(at), What::Fd))),
-        "ER" | "Error" => return Ok(Some(logged(channel, Some(at), What::Error))),
+        "FD" | "FB" | "FE" | "BI" => return Ok(Some(logged(channel, Some(at), LogItem::Fd))),
+        "ER" | "Error" => return Ok(Some(logged(channel, Some(at), LogItem::Error))),
         _ => return Ok(None),
     }
     let id = word('I').ok_or("an identifier is expected")?;
@@ -145,10 +145,10 @@ fn trc(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
     let remote = remote || data.first() == Some(&"RTR");
     let id = (number, Some(id.len() > 4));
     let frame = frame(id, remote, stated(length)?, data, 16)?;
-    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
+    Ok(Some(logged(channel, Some(at), LogItem::Frame(frame))))
 }
 
-fn gvret(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn gvret(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     if line.starts_with("Time Stamp") {
         line.clone_into(&mut state.columns);
         return Ok(None);
@@ -170,13 +170,13 @@ fn gvret(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
         .unwrap_or_default();
     let what = match stated(field("LEN"))? {
         // Frames of CAN FD stand in the same columns.
-        9.. => What::Fd,
-        length => What::Frame(frame((number, Some(extended)), false, length, data, 16)?),
+        9.. => LogItem::Fd,
+        length => LogItem::Frame(frame((number, Some(extended)), false, length, data, 16)?),
     };
     Ok(Some(logged(field("Bus"), Some(at), what)))
 }
 
-fn busmaster(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn busmaster(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     if let Some(heading) = line.strip_prefix("***") {
         match heading.trim_end_matches('*') {
             "DEC" => state.radix = 10,
@@ -217,7 +217,7 @@ fn busmaster(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
         data,
         state.radix,
     )?;
-    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
+    Ok(Some(logged(channel, Some(at), LogItem::Frame(frame))))
 }
 
 /// The bus of `2R11`, and whether identifiers have 29 bits.
@@ -232,7 +232,7 @@ fn crtd_kind(kind: &str) -> Option<(&str, bool)> {
     }
 }
 
-fn crtd(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn crtd(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let (time, kind, rest) = match words.as_slice() {
         [time, kind, rest @ ..] => (*time, *kind, rest),
@@ -252,10 +252,10 @@ fn crtd(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
         return Err("at most 8 data bytes are expected".to_owned());
     }
     let frame = frame(id, false, data.len(), data, 16)?;
-    Ok(Some(logged(bus, Some(at), What::Frame(frame))))
+    Ok(Some(logged(bus, Some(at), LogItem::Frame(frame))))
 }
 
-fn printed(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn printed(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let behind = |name: &str| {
         let at = words.iter().position(|word| *word == name)?;
@@ -271,18 +271,18 @@ fn printed(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
     let flags = words.iter().take_while(|word| **word != "DL:");
     let has = |flag: &str| flags.clone().any(|word| *word == flag);
     let what = if has("E") {
-        What::Error
+        LogItem::Error
     } else if has("F") {
-        What::Fd
+        LogItem::Fd
     } else {
         let id = (identifier(id, 16)?, Some(has("X")));
-        What::Frame(frame(id, has("R"), stated(length)?, data, 16)?)
+        LogItem::Frame(frame(id, has("R"), stated(length)?, data, 16)?)
     };
     let channel = first("Channel:").unwrap_or_default();
     Ok(Some(logged(channel, Some(at), what)))
 }
 
-fn kvaser(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn kvaser(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [channel, id, rest @ .., time, "R" | "T"] = words.as_slice() else {
         return match words.first() {
@@ -292,7 +292,7 @@ fn kvaser(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
     };
     let at = seconds(time).ok_or("a time in seconds is expected")?;
     if id.contains("Error") {
-        return Ok(Some(logged(channel, Some(at), What::Error)));
+        return Ok(Some(logged(channel, Some(at), LogItem::Error)));
     }
     let number = identifier(id, 16)?;
     // Flags may stand in front of the length.
@@ -310,10 +310,10 @@ fn kvaser(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
         );
     }
     let frame = frame((number, None), remote, stated(length)?, data, 16)?;
-    Ok(Some(logged(channel, Some(at), What::Frame(frame))))
+    Ok(Some(logged(channel, Some(at), LogItem::Frame(frame))))
 }
 
-fn canhacker(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn canhacker(_: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [time, id, length, data @ ..] = words.as_slice() else {
         return Err("17,123 201 3 3D 40 00 is expected".to_owned());
@@ -329,5 +329,5 @@ fn canhacker(_: &mut State, line: &str) -> Result<Option<Logged>, String> {
         data,
         16,
     )?;
-    Ok(Some(logged("", Some(at), What::Frame(frame))))
+    Ok(Some(logged("", Some(at), LogItem::Frame(frame))))
 }

@@ -103,7 +103,7 @@ pub(super) struct ChannelRead {
 }
 
 /// A channel of which is known what it is the record of.
-struct Chosen {
+struct LinkChannel {
     target: ChannelTarget,
     channel: ChannelRead,
 }
@@ -146,7 +146,7 @@ fn choose(
     mut channels: Vec<ChannelRead>,
     settings: &ReadSettings,
     notes: &mut Vec<String>,
-) -> Result<Vec<Chosen>, CaptureError> {
+) -> Result<Vec<LinkChannel>, CaptureError> {
     let mut targets: Vec<Option<ChannelTarget>> = vec![None; channels.len()];
     for link in &settings.links {
         if link.target == ChannelTarget::Ring {
@@ -191,7 +191,7 @@ fn choose(
             listed(&channels)
         )));
     }
-    let mut chosen: Vec<Chosen> = Vec::new();
+    let mut chosen: Vec<LinkChannel> = Vec::new();
     let mut left = Vec::new();
     for (channel, target) in channels.drain(..).zip(targets) {
         match target {
@@ -203,7 +203,7 @@ fn choose(
             }
             Some(target) => match channel.signal {
                 Signal::Other(why) => return Err(why),
-                _ => chosen.push(Chosen { target, channel }),
+                _ => chosen.push(LinkChannel { target, channel }),
             },
             None => left.push(channel),
         }
@@ -226,7 +226,7 @@ pub(in crate::capture) fn unread_octets(read: &LineRead) -> Option<String> {
 
 /// The format of the lines: as it was given, or as it is found.
 fn format(
-    chosen: &[Chosen],
+    chosen: &[LinkChannel],
     settings: &ReadSettings,
     shared: bool,
     notes: &mut Vec<String>,
@@ -272,7 +272,7 @@ fn format(
 }
 
 /// Says where a line was sampled too seldom for its rate.
-fn too_few_samples(chosen: &[Chosen], uart: UartFormat) -> Option<String> {
+fn too_few_samples(chosen: &[LinkChannel], uart: UartFormat) -> Option<String> {
     const LEAST: i64 = 4;
     let bit = 3_000_000_000 / i64::from(uart.format.bits_per_second).max(1);
     let samples = chosen.iter().filter_map(|line| match &line.channel.signal {
@@ -301,7 +301,7 @@ pub(super) fn settle(
     mut notes: Vec<String>,
 ) -> Result<Imported, CaptureError> {
     let chosen = choose(channels, settings, &mut notes)?;
-    let of_ring = |line: &Chosen| matches!(line.target, ChannelTarget::Link(..));
+    let of_ring = |line: &LinkChannel| matches!(line.target, ChannelTarget::Link(..));
     let (links, all) = (
         chosen.iter().filter(|line| of_ring(line)).count(),
         chosen.len(),

@@ -8,7 +8,7 @@
 //! The other forms are in `forms`.
 
 use super::super::CaptureError;
-use super::super::frames::{Log, Logged, What};
+use super::super::frames::{Log, LogEntry, LogItem};
 use super::super::order::Place;
 use super::numbers::{Time, date, seconds};
 use crate::counted::counted;
@@ -20,7 +20,7 @@ const HEADING: usize = 4_096;
 
 pub(super) struct Form {
     /// Reads a line; `None` for one that has no frame.
-    pub(super) line: fn(&mut State, &str) -> Result<Option<Logged>, String>,
+    pub(super) line: fn(&mut State, &str) -> Result<Option<LogEntry>, String>,
     /// After how long its clock begins again.
     pub(super) wraps: Option<Time>,
 }
@@ -76,7 +76,7 @@ pub(super) fn read(bytes: &[u8], form: &Form) -> Result<Log, CaptureError> {
                     return Err(error);
                 }
                 state.begun = true;
-                log.frames.push(Logged {
+                log.frames.push(LogEntry {
                     place: Place::of(number + 1),
                     ..logged
                 });
@@ -156,7 +156,7 @@ fn settle_times(log: &mut Log, state: &mut State) {
 }
 
 /// Times of a clock that begins again after `period`, as times since the first frame.
-fn unwrap_times(frames: &mut [Logged], period: Time) {
+fn unwrap_times(frames: &mut [LogEntry], period: Time) {
     let first = frames.iter().find_map(|logged| logged.at).unwrap_or(0);
     let (mut before, mut added) = (None, first.saturating_neg());
     for logged in frames {
@@ -219,8 +219,8 @@ pub(super) fn identifier(text: &str, radix: u32) -> Result<u32, String> {
     number.ok_or_else(|| format!("`{text}` is no identifier"))
 }
 
-pub(super) fn logged(channel: &str, at: Option<Time>, what: What) -> Logged {
-    Logged {
+pub(super) fn logged(channel: &str, at: Option<Time>, what: LogItem) -> LogEntry {
+    LogEntry {
         channel: channel.to_owned(),
         at,
         what,
@@ -288,7 +288,7 @@ fn length(word: &str) -> Option<&str> {
     (digits && (1..=3).contains(&inner.len())).then_some(inner)
 }
 
-fn candump(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
+fn candump(state: &mut State, line: &str) -> Result<Option<LogEntry>, String> {
     const FORM: &str = "(1436509052.249713) can0 201#3D4000 is expected, as candump -L writes it";
     if line.starts_with('#') || line.starts_with("^C") {
         return Ok(None);
@@ -319,23 +319,23 @@ fn candump(state: &mut State, line: &str) -> Result<Option<Logged>, String> {
 }
 
 /// The frame of a line of candump -L.
-fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<Logged, String> {
+fn one_word(channel: &str, at: Option<Time>, frame: &str) -> Result<LogEntry, String> {
     let (id, data) = frame.split_once('#').unwrap_or((frame, ""));
     let what = if data.starts_with('#') {
-        What::Fd
+        LogItem::Fd
     } else if id.len() == 8 && u32::from_str_radix(id, 16).is_ok_and(|id| id & ERROR != 0) {
-        What::Error
+        LogItem::Error
     } else {
         // After `_` stands the raw length code of a frame with 8 bytes.
         let frame = frame.split('_').next().unwrap_or(frame);
-        What::Frame(frame.parse().map_err(|bad| format!("{bad}"))?)
+        LogItem::Frame(frame.parse().map_err(|bad| format!("{bad}"))?)
     };
     Ok(logged(channel, at, what))
 }
 
-/// The frame of a line on the screen: `can0  201   [3]  3D 40 00`, with `RX - -` behind the interface (`-x`), bytes in binary (`-i`), or
-/// their characters behind them (`-a`).
-fn screen(at: Option<Time>, words: &[&str]) -> Result<Logged, String> {
+/// The frame of a line on the screen: `can0  201   [3]  3D 40 00`, with `RX - -` after the interface (`-x`), bytes in binary (`-i`), or
+/// their characters after them (`-a`).
+fn screen(at: Option<Time>, words: &[&str]) -> Result<LogEntry, String> {
     let (channel, rest) = match words {
         [channel, "RX" | "TX", _, _, rest @ ..] | [channel, rest @ ..] => (*channel, rest),
         [] => ("", words),
@@ -346,16 +346,16 @@ fn screen(at: Option<Time>, words: &[&str]) -> Result<Logged, String> {
     let stated = length(stated).ok_or("a length in brackets is expected")?;
     let number = identifier(id, 16)?;
     let what = if id.len() == 8 && number & ERROR != 0 {
-        What::Error
+        LogItem::Error
     } else if stated.len() > 1 {
         // candump states the length of a frame of CAN FD with two digits.
-        What::Fd
+        LogItem::Fd
     } else {
         let binary = rest.first().is_some_and(|word| word.len() == 8);
         let remote = rest.first() == Some(&"remote");
         let id = (number, Some(id.len() == 8));
         let length = usize::from_str_radix(stated, 16).unwrap_or(usize::MAX);
-        What::Frame(frame(
+        LogItem::Frame(frame(
             id,
             remote,
             length,

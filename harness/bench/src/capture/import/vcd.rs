@@ -71,14 +71,14 @@ fn shown(token: &[u8]) -> String {
 
 /// A wire that is being read.
 #[derive(Default)]
-struct Wire {
+struct VcdWire {
     names: Vec<String>,
     levels: Levels,
 }
 
 #[derive(Default)]
 struct Reader<'b> {
-    wires: Vec<Wire>,
+    wires: Vec<VcdWire>,
     /// The time between samples, which sigrok writes into a comment.
     sample: Option<Time>,
     by_identifier: HashMap<&'b [u8], usize>,
@@ -198,7 +198,7 @@ impl<'b> Reader<'b> {
             .entry(identifier)
             .or_insert(self.wires.len());
         if place == self.wires.len() {
-            self.wires.push(Wire::default());
+            self.wires.push(VcdWire::default());
         }
         let name = String::from_utf8_lossy(name).into_owned();
         // By its name, with its scope, and with all scopes around it.

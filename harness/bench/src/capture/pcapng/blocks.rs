@@ -48,7 +48,8 @@ impl Reader<'_> {
     /// Calls `each` with every option from `start` on: its code, and where its value begins and ends.
     pub(super) fn options(
         &self,
-        (start, end): (usize, usize),
+        start: usize,
+        end: usize,
         mut each: impl FnMut(u16, usize, usize) -> Result<(), CaptureError>,
     ) -> Result<(), CaptureError> {
         let mut at = start;

@@ -1,6 +1,6 @@
 //! What packets hold: octets, telegrams and frames.
 
-use super::interfaces::{Carries, Interface, Packets};
+use super::interfaces::{Interface, Packets, Role};
 use super::parts::Part;
 use super::values::sent;
 use super::{Byte, CaptureError, OCTET, Reader};
@@ -30,7 +30,7 @@ pub(in crate::capture) struct Packet {
 
 /// A frame after a header of Linux: the length of the header, the number of the part, and the identifier as it stands.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cooked {
+pub(super) struct CookedFrame {
     packet: Packet,
     header: usize,
     part: usize,
@@ -72,7 +72,7 @@ impl Reader<'_> {
         } = known;
         let octet = octet.unwrap_or(OCTET);
         let payload = packet.data..packet.data + packet.captured;
-        if packet.captured < packet.original && !matches!(carries, Carries::Frames(_)) {
+        if packet.captured < packet.original && !matches!(carries, Role::Frames(_)) {
             self.cut = true;
         }
         let header = match packets {
@@ -94,10 +94,10 @@ impl Reader<'_> {
         };
         let arrived = payload.start + header..payload.end;
         match carries {
-            Carries::Frames(sender) => self.frame(packet, (packets, part), sender),
-            Carries::Station(from) => self.telegram(packet, (part, from), (event, arrived), octet),
-            Carries::Line => self.telegram(packet, (part, None), (event, arrived), octet),
-            Carries::Link(..) => self.bytes_of(packet, event, arrived),
+            Role::Frames(sender) => self.frame(packet, packets, part, sender),
+            Role::Station(from) => self.telegram(packet, part, from, event, arrived, octet),
+            Role::Line => self.telegram(packet, part, None, event, arrived, octet),
+            Role::Link(..) => self.bytes_of(packet, event, arrived),
         }
     }
 
@@ -105,7 +105,7 @@ impl Reader<'_> {
     fn comments(&self, packet: &Packet) -> Result<Vec<Cow<'_, [u8]>>, CaptureError> {
         let mut all = Vec::new();
         let options = packet.data + packet.captured.next_multiple_of(4);
-        self.options((options, packet.end), |code, from, to| {
+        self.options(options, packet.end, |code, from, to| {
             if code == COMMENT {
                 all.push((from, to));
             }
@@ -129,8 +129,10 @@ impl Reader<'_> {
     fn telegram(
         &mut self,
         packet: &Packet,
-        (part, from): (usize, Option<u8>),
-        (event, arrived): (u8, Range<usize>),
+        part: usize,
+        from: Option<u8>,
+        event: u8,
+        arrived: Range<usize>,
         octet: Span,
     ) -> Result<(), CaptureError> {
         let comments = self.comments(packet)?;
@@ -143,7 +145,7 @@ impl Reader<'_> {
         }
         let timed = time_of(event);
         let begins = timed.unwrap_or(self.begun);
-        let found = octets((event, packet.nanos), begins, arrived, &comment, octet);
+        let found = octets(event, packet.nanos, begins, arrived, &comment, octet);
         self.begun = begins;
         let found = found
             .into_iter()
@@ -156,7 +158,8 @@ impl Reader<'_> {
     fn frame(
         &mut self,
         packet: &Packet,
-        (packets, mut part): (Packets, usize),
+        packets: Packets,
+        mut part: usize,
         sender: Sender,
     ) -> Result<(), CaptureError> {
         let end = packet.data + packet.captured;
@@ -184,7 +187,7 @@ impl Reader<'_> {
             part = self.part(Part::Frames(format!("interface {number}")));
         }
         let id = self.take(packet.data + header, end)?;
-        self.cooked.push(Cooked {
+        self.cooked.push(CookedFrame {
             packet: *packet,
             header,
             part,

@@ -51,7 +51,7 @@ impl Packets {
 }
 
 pub(super) struct Interface {
-    pub(super) carries: Carries,
+    pub(super) carries: Role,
     pub(super) packets: Packets,
     /// The number of its part.
     pub(super) part: usize,
@@ -67,7 +67,7 @@ pub(super) struct Interface {
 
 /// What an interface stands for.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Carries {
+pub(super) enum Role {
     /// A link of a ring: the ring, and the ends of the link.
     Link(usize, Option<u8>, Option<u8>),
     /// What a station sends on a line that all stations share; `None` is the master.
@@ -78,7 +78,7 @@ pub(super) enum Carries {
     Frames(Sender),
 }
 
-impl Carries {
+impl Role {
     fn named(name: &str) -> Option<Self> {
         let link = ends(name).map(|(ring, from, to)| Self::Link(ring, from, to));
         let alone = || station(name).map(Self::Station);
@@ -96,16 +96,16 @@ impl Carries {
     }
 }
 
-/// What a file says of an interface beside its link type and its name: its resolution, offset and speed.
-pub(in crate::capture) type Clock = (u8, i64, Option<u64>);
-
 impl Reader<'_> {
     /// Adds an interface that is described at `start`; its name comes with the place of that.
     pub(in crate::capture) fn describe(
         &mut self,
-        (start, link_type): (usize, u16),
+        start: usize,
+        link_type: u16,
         name: Option<(usize, Cow<'_, str>)>,
-        (resolution, offset, speed): Clock,
+        resolution: u8,
+        offset: i64,
+        speed: Option<u64>,
     ) -> Result<(), CaptureError> {
         let (place, name) = name.map_or((start, None), |(place, name)| (place, Some(name)));
         let name = name.as_deref().map(|name| name.trim_end_matches('\0'));
@@ -121,9 +121,9 @@ impl Reader<'_> {
             let known = speed.and_then(|speed| u32::try_from(speed).ok());
             self.speed = self.speed.or(known.and_then(Rate::from_bits_per_second));
             let part = match carries {
-                Carries::Link(..) => Part::Ring,
-                Carries::Station(_) | Carries::Frames(_) => Part::Stations,
-                Carries::Line => Part::Line(text),
+                Role::Link(..) => Part::Ring,
+                Role::Station(_) | Role::Frames(_) => Part::Stations,
+                Role::Line => Part::Line(text),
             };
             (carries, part)
         } else {
@@ -136,7 +136,7 @@ impl Reader<'_> {
                 Sender::Known(_) => Part::Senders,
                 Sender::ByIdentifier => Part::Frames(name.to_owned()),
             };
-            (Carries::Frames(sender), part)
+            (Role::Frames(sender), part)
         };
         let part = self.part(part);
         self.interfaces.push(Some(Interface {
@@ -164,21 +164,21 @@ impl Reader<'_> {
         packets: Packets,
         name: Option<&str>,
         place: usize,
-    ) -> Result<Option<(Carries, String)>, CaptureError> {
+    ) -> Result<Option<(Role, String)>, CaptureError> {
         let number = self.interfaces.len() - self.section;
         let shown = name.map_or_else(|| number.to_string(), str::to_owned);
         let links = self.links;
-        let of = |link: &NamedLink| Some((Carries::given(link.target)?, shown.clone()));
+        let of = |link: &NamedLink| Some((Role::given(link.target)?, shown.clone()));
         let chosen = links
             .iter()
             .find(|link| link.channel.as_ref() == Some(&shown))
             .and_then(of);
-        let named = name.and_then(Carries::named);
+        let named = name.and_then(Role::named);
         if let Some(found) = chosen.or(named.map(|carries| (carries, shown.clone()))) {
             return Ok(Some(found));
         }
         let mut unnamed = links.iter().filter(|link| link.channel.is_none());
-        let given = |link: &NamedLink| Some((Carries::given(link.target)?, link.link.clone()));
+        let given = |link: &NamedLink| Some((Role::given(link.target)?, link.link.clone()));
         if let Some((carries, link)) = unnamed.find_map(given) {
             if self.taken.replace(number).is_some() {
                 return self.wrong(

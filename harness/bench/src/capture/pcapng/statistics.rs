@@ -1,6 +1,6 @@
 //! The statistics of an interface: when a capture began and ended, beside what was heard.
 
-use super::super::{CaptureError, Listened};
+use super::super::{CaptureError, CaptureSpan};
 use super::{Reader, nanoseconds};
 use crate::report::pcapng::{ISB_ENDTIME, ISB_STARTTIME};
 use harness_proto::time::{Instant, Span};
@@ -9,7 +9,7 @@ pub(super) use crate::report::pcapng::STATISTICS;
 
 impl Reader<'_> {
     /// When the capture began and ended at an interface.
-    pub(super) fn statistics(&mut self, (start, end): (usize, usize)) -> Result<(), CaptureError> {
+    pub(super) fn statistics(&mut self, start: usize, end: usize) -> Result<(), CaptureError> {
         let number = usize::try_from(self.u32(start, end)?).unwrap_or(usize::MAX);
         let place = self.section.saturating_add(number);
         let Some(Some(interface)) = self.interfaces.get(place) else {
@@ -17,7 +17,7 @@ impl Reader<'_> {
         };
         let (resolution, offset) = (interface.resolution, interface.offset);
         let (mut began, mut ended) = (None, None);
-        self.options((start + 12, end), |code, from, to| {
+        self.options(start + 12, end, |code, from, to| {
             if code == ISB_STARTTIME || code == ISB_ENDTIME {
                 let (high, low) = (self.u32(from, to)?, self.u32(from + 4, to)?);
                 let ticks = (u64::from(high) << 32) | u64::from(low);
@@ -38,8 +38,8 @@ impl Reader<'_> {
 }
 
 /// When a capture began and ended, by the time of its first byte and that from which its times count, in nanoseconds.
-pub(super) fn listened_to((began, ended): (u64, u64), first: u64, base: u64) -> Listened {
-    Listened {
+pub(super) fn listened_to((began, ended): (u64, u64), first: u64, base: u64) -> CaptureSpan {
+    CaptureSpan {
         before: Span::from_nanos(first.saturating_sub(began)),
         until: Instant::START + Span::from_nanos(ended.saturating_sub(base)),
     }

@@ -163,7 +163,7 @@ pub mod tests {
     #[test]
     fn gaps_stay_open() {
         let v = Some(1.0);
-        let curve = curve(&[
+        let gapped = curve(&[
             (0.0, v),
             (1.0, v),
             (2.0, None),
@@ -171,17 +171,17 @@ pub mod tests {
             (4.0, v),
             (9.0, v),
         ]);
-        let pieces = curve.pieces();
+        let pieces = gapped.pieces();
         assert_eq!(
             pieces.iter().map(Vec::len).collect::<Vec<_>>(),
             [2, 2, 1],
             "{pieces:?}"
         );
         assert_eq!(
-            curve.words(Along::Time),
+            gapped.words(Along::Time),
             "a [rpm]: 5 samples, about every 1 ms, 2 gaps"
         );
-        let (line, dots) = paths(&curve, &|x| x, &|y| y);
+        let (line, dots) = paths(&gapped, &|x| x, &|y| y);
         assert_eq!(line, "M0.0 1.0L1.0 1.0M3.0 1.0L4.0 1.0M9.0 1.0");
         assert_eq!(dots.matches('M').count(), 5);
         // Where changes were noted, a value holds.

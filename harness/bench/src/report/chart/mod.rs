@@ -41,18 +41,18 @@ const STYLE: &str = include_str!("style.css");
 
 /// What the script shows.
 #[derive(Serialize)]
-struct Shown<'c> {
+struct ChartData<'c> {
     from: f64,
     to: f64,
     unit: &'static str,
     per: f64,
     decimals: usize,
     panels: Vec<[f64; 4]>,
-    curves: Vec<ShownCurve<'c>>,
+    curves: Vec<CurveData<'c>>,
 }
 
 #[derive(Serialize)]
-struct ShownCurve<'c> {
+struct CurveData<'c> {
     name: &'c str,
     unit: &'c str,
     panel: usize,
@@ -382,7 +382,7 @@ impl Chart<'_> {
         });
     }
 
-    fn data(&self, panels: &[Panel<'_>]) -> Shown<'_> {
+    fn data(&self, panels: &[Panel<'_>]) -> ChartData<'_> {
         let (from, to) = self.ends();
         let (unit, per) = self.along.unit((from, to));
         let mut curves: Vec<_> = Vec::new();
@@ -392,7 +392,7 @@ impl Chart<'_> {
                 let points = curve.drawn().concat();
                 let every = (curve.known().count() as f64 / points.len().max(1) as f64).ceil();
                 let rounded = |at: f64| (at * 1e6).round() / 1e6;
-                curves.push(ShownCurve {
+                curves.push(CurveData {
                     name: &curve.name,
                     unit: &curve.unit,
                     panel: place,
@@ -407,7 +407,7 @@ impl Chart<'_> {
                 });
             }
         }
-        Shown {
+        ChartData {
             from,
             to,
             unit,

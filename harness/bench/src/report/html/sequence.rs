@@ -37,7 +37,8 @@ pub struct SequenceWords {
 /// Writes the picture; false where there is nothing to draw. Only arrows that are drawn are taken.
 pub fn sequence(
     html: &mut Html,
-    (id, title): (&str, &str),
+    id: &str,
+    title: &str,
     drives: &[u8],
     arrows: impl ExactSizeIterator<Item = Arrow>,
     words: SequenceWords,
@@ -58,7 +59,8 @@ pub fn sequence(
         html.picture(
             &format!("{id}-s"),
             (width, height),
-            (&title, &description),
+            &title,
+            &description,
             |html| {
                 lifelines(html, drives, words.drive, height);
                 for (row, arrow) in arrows.take(drawn).enumerate() {
