@@ -76,8 +76,9 @@ pub fn impossible<C: FuzzCase>(kept: &KeptRun<C>) -> Vec<String> {
                     wrong.push(format!("round {round} is not the one that follows"));
                 }
                 rounds = round.saturating_add(1);
-                if let Some(own) = spices.iter().find(|own| !kept.about.spices.contains(own)) {
-                    wrong.push(format!("round {round}: the run has no `{own}`"));
+                let mut spices = spices.iter();
+                if let Some(spice) = spices.find(|spice| !kept.about.spices.contains(spice)) {
+                    wrong.push(format!("round {round}: the run has no `{spice}`"));
                 }
             }
             LogLine::Kept { number, .. } | LogLine::Finding { number, .. } => {
@@ -124,7 +125,7 @@ pub fn impossible<C: FuzzCase>(kept: &KeptRun<C>) -> Vec<String> {
     if counted.fold(0, u64::saturating_add) > cases {
         wrong.push("more came of the cases than there are".to_owned());
     }
-    let counts = |own: &Progress| [own.cases, own.not_sent, own.repeats, own.wire_ns];
+    let counts = |row: &Progress| [row.cases, row.not_sent, row.repeats, row.wire_ns];
     let falls = |pair: &[Progress]| {
         let pairs = counts(&pair[0]).into_iter().zip(counts(&pair[1]));
         pairs.into_iter().any(|(before, behind)| before > behind)

@@ -170,20 +170,20 @@ impl<C: FuzzCase> FuzzRun<C> {
             }
             let number = self.progress.cases;
             let round = number / ROUND;
-            let own = match swarm.take() {
-                Some((known, own)) if known == round => own,
+            let drawn = match swarm.take() {
+                Some((known, drawn)) if known == round => drawn,
                 _ => {
-                    let own = C::swarm(self.about.seed, round, &self.scope);
-                    watcher.round(round, &own);
+                    let drawn = C::swarm(self.about.seed, round, &self.scope);
+                    watcher.round(round, &drawn);
                     if number.is_multiple_of(ROUND) {
-                        let spices = own.names().into_iter().map(str::to_owned).collect();
+                        let spices = drawn.names().into_iter().map(str::to_owned).collect();
                         write::<C>(&mut record, || LogLine::Swarm { round, spices })?;
                     }
-                    own
+                    drawn
                 }
             };
-            let case = self.case(number, &own);
-            swarm = Some((round, own));
+            let case = self.case(number, &drawn);
+            swarm = Some((round, drawn));
             let rehearsal = target.rehearse(&case)?;
             if self.too_long(bounds, rehearsal.took) {
                 break RunEnd::Wire;
@@ -214,8 +214,8 @@ impl<C: FuzzCase> FuzzRun<C> {
     ) -> Result<RunEnd, ExploreError> {
         let mut end = RunEnd::Cases;
         for case in cases {
-            if let Some(own) = self.end(bounds, target) {
-                end = own;
+            if let Some(reason) = self.end(bounds, target) {
+                end = reason;
                 break;
             }
             let rehearsal = target.rehearse(case)?;

@@ -48,14 +48,14 @@ impl<'k> Confirmation<'k> {
             true => (TIMES_LATE, TIMES_LATE),
             false => (self.confirm, self.of),
         };
-        let own = finding.difference.clone();
+        let original = finding.difference.clone();
         while finding.of < of && target.over().is_none() {
             target.begin();
             let tried = target.attempt(&finding.case, rehearsal)?;
             self.took = self.took + tried.took;
             finding.attempts.extend(target.recorded());
             finding.of += 1;
-            let Some(other) = tried.difference.filter(|other| other.is_like(&own)) else {
+            let Some(other) = tried.difference.filter(|other| other.is_like(&original)) else {
                 if confirm > finding.seen_again + (of - finding.of) {
                     return Ok(());
                 }

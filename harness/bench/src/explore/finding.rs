@@ -117,6 +117,6 @@ pub fn bus_of(path: &Path) -> Option<BusName> {
     let text = read_text(&json_of(path)).ok()?;
     let finding: serde_json::Value = serde_json::from_str(&text).ok()?;
     let name = finding.get("setup")?.get("bus")?.as_str()?;
-    let known = BusName::NAMES.iter().find(|(own, _)| *own == name);
+    let known = BusName::NAMES.iter().find(|(known, _)| *known == name);
     known.map(|(_, bus)| *bus)
 }

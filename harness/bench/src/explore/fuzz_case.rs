@@ -15,7 +15,7 @@ pub trait Spiced: Copy + Ord + Debug + 'static {
     const ALL: &'static [(&'static str, Self)];
 
     fn name(self) -> &'static str {
-        let named = Self::ALL.iter().find(|(_, own)| *own == self);
+        let named = Self::ALL.iter().find(|(_, known)| *known == self);
         named.map_or("", |(name, _)| name)
     }
 }

@@ -54,8 +54,8 @@ impl<C: FuzzCase> Pool<C> {
         if self.cases.len() >= MOST_KEPT {
             return 0;
         }
-        let new = features.iter().filter(|own| self.shown.insert(**own));
-        let new = new.count();
+        let is_new = |feature: &&u32| self.shown.insert(**feature);
+        let new = features.iter().filter(is_new).count();
         if new == 0 {
             return 0;
         }
@@ -78,13 +78,13 @@ impl<C: FuzzCase> Pool<C> {
 
     /// One of them with these drives ([`FuzzCase::lane`]); the younger ones more often.
     pub fn pick(&self, lane: usize, dice: &mut Dice) -> Option<&C> {
-        let own = self.of_lane.get(lane)?;
+        let of_lane = self.of_lane.get(lane)?;
         let from = if dice.percent(50) {
-            own.len() * 3 / 4
+            of_lane.len() * 3 / 4
         } else {
             0
         };
-        let at = own.get(from + dice.below(own.len() - from))?;
+        let at = of_lane.get(from + dice.below(of_lane.len() - from))?;
         self.cases.get(*at)
     }
 }

@@ -126,7 +126,8 @@ pub fn promote<C: Promotes>(
     }
     let deviating = C::on_deviating(finding)?;
     let deviating = deviating.map(|text| played("the drives under test", &text));
-    let fails_on_deviating = deviating.transpose()?.map(|own| own.0 == Verdict::Failed);
+    let deviating = deviating.transpose()?;
+    let fails_on_deviating = deviating.map(|(verdict, ..)| verdict == Verdict::Failed);
     for (file, text) in &files {
         if let Err(error) = write_whole(file, text) {
             // All of them or none: none was there before.

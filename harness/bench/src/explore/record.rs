@@ -203,8 +203,8 @@ impl FuzzRecord {
 fn unsettled(folder: &Path, cases: u64) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let stem = Path::new(&name).file_stem().and_then(|own| own.to_str());
-        let number = stem.and_then(|own| own.strip_prefix("finding-")?.parse::<u64>().ok());
+        let stem = Path::new(&name).file_stem().and_then(|stem| stem.to_str());
+        let number = stem.and_then(|stem| stem.strip_prefix("finding-")?.parse::<u64>().ok());
         if number.is_some_and(|number| number >= cases) {
             // One that stays is refused by `verify`, or written anew.
             let _removed = std::fs::remove_file(entry.path());
@@ -275,8 +275,8 @@ pub fn read_as<C: FuzzCase>(folder: &Path) -> Result<(KeptRun<C>, usize), Explor
         let line: LogLine<C> =
             serde_json::from_str(line).map_err(|error| damaged(number, &error.to_string()))?;
         match line {
-            LogLine::Run(own) if number == 0 && own.schema == FuzzSettings::<C>::SCHEMA => {
-                about = Some(own)
+            LogLine::Run(run) if number == 0 && run.schema == FuzzSettings::<C>::SCHEMA => {
+                about = Some(run)
             }
             LogLine::Run(_) => return Err(damaged(number, "another kind of record")),
             LogLine::Progress(progress) => {

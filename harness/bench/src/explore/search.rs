@@ -16,7 +16,7 @@ const MOST_CHANGED: usize = 8;
 const FOLLOWED: usize = 3;
 
 /// A conversation that was seen, and models of its drives.
-pub trait Explains {
+pub trait ModelSpace {
     /// Values of the open points of all drives.
     type Assumed: Clone + Debug;
     /// How far a model agrees with what was seen. More is better.
@@ -31,7 +31,7 @@ pub trait Explains {
 
 /// The outcome of a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Explained<A> {
+pub enum SearchOutcome<A> {
     /// A model with these values explains all.
     By(A),
     /// No model explains all; the one with these values explains most.
@@ -41,10 +41,10 @@ pub enum Explained<A> {
 }
 
 /// Looks for values that explain what was seen, beginning with each of `begins`.
-pub fn explain<E: Explains>(
+pub fn explain<E: ModelSpace>(
     seen: &E,
     begins: impl IntoIterator<Item = E::Assumed>,
-) -> Explained<E::Assumed> {
+) -> SearchOutcome<E::Assumed> {
     let mut search = Search {
         seen,
         tried: BTreeSet::new(),
@@ -52,26 +52,26 @@ pub fn explain<E: Explains>(
     };
     for begin in begins {
         if let Some(found) = search.from(begin, MOST_CHANGED) {
-            return Explained::By(found);
+            return SearchOutcome::By(found);
         }
     }
     match search.best {
-        Some((_, best)) if search.tried.len() < MOST_PLAYED => Explained::Not(best),
-        _ => Explained::Undecided,
+        Some((_, best)) if search.tried.len() < MOST_PLAYED => SearchOutcome::Not(best),
+        _ => SearchOutcome::Undecided,
     }
 }
 
-struct Search<'s, E: Explains> {
+struct Search<'s, E: ModelSpace> {
     seen: &'s E,
     /// What was played, by its words.
     tried: BTreeSet<String>,
     best: Option<(E::Agreement, E::Assumed)>,
 }
 
-impl<E: Explains> Search<'_, E> {
+impl<E: ModelSpace> Search<'_, E> {
     /// Follows changes that explain more. `None` if none of them explains all.
     fn from(&mut self, begin: E::Assumed, left: usize) -> Option<E::Assumed> {
-        let Some(own) = self.agreement(&begin) else {
+        let Some(agreement) = self.agreement(&begin) else {
             return Some(begin);
         };
         if left == 0 {
@@ -85,7 +85,7 @@ impl<E: Explains> Search<'_, E> {
             }
             match self.agreement(&next) {
                 None => return Some(next),
-                Some(other) if other > own => better.push((other, next)),
+                Some(other) if other > agreement => better.push((other, next)),
                 Some(_) => {}
             }
         }
@@ -112,7 +112,7 @@ mod tests {
     /// A number is explained digit by digit; nines cannot be assumed.
     struct Digits([u8; 4]);
 
-    impl Explains for Digits {
+    impl ModelSpace for Digits {
         type Assumed = [u8; 4];
         type Agreement = usize;
 
@@ -120,7 +120,7 @@ mod tests {
             self.0
                 .iter()
                 .zip(assumed)
-                .position(|(own, other)| own != other)
+                .position(|(wanted, value)| wanted != value)
         }
 
         fn neighbours(&self, assumed: &[u8; 4]) -> Vec<[u8; 4]> {
@@ -137,12 +137,12 @@ mod tests {
     #[test]
     fn several_values_are_changed_in_a_row() {
         let found = explain(&Digits([3, 1, 4, 1]), [[0; 4]]);
-        assert_eq!(found, Explained::By([3, 1, 4, 1]));
+        assert_eq!(found, SearchOutcome::By([3, 1, 4, 1]));
     }
 
     #[test]
     fn what_no_value_explains_is_a_difference() {
-        let Explained::Not(best) = explain(&Digits([3, 1, 9, 1]), [[0; 4]]) else {
+        let SearchOutcome::Not(best) = explain(&Digits([3, 1, 9, 1]), [[0; 4]]) else {
             panic!("it is not explained");
         };
         assert_eq!(best[..2], [3, 1]);

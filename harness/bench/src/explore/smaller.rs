@@ -86,8 +86,8 @@ impl<C: Acts> Shrinker<'_, C> {
         self.runs += 1;
         self.target.begin();
         let tried = self.target.attempt(&case, &rehearsal)?;
-        let same = tried.difference.filter(|own| own.is_like(&self.difference));
-        let Some(difference) = same else {
+        let found = tried.difference;
+        let Some(difference) = found.filter(|found| found.is_like(&self.difference)) else {
             return Ok(false);
         };
         self.difference = difference;
@@ -141,12 +141,12 @@ impl<C: Acts> Shrinker<'_, C> {
     /// Lowers waits: to none, to that of a reply, to whole milliseconds, by halves.
     fn hurry(&mut self) -> Result<(), ExploreError> {
         for at in 0..self.count() {
-            let Some(own) = self.best.acts().get_mut(at).map(|act| *C::wait(act)) else {
+            let Some(waited) = self.best.acts().get_mut(at).map(|act| *C::wait(act)) else {
                 break;
             };
-            let round = own / 1_000 * 1_000;
-            let steps = [0, 1_000, 2_000, 5_000, 10_000, 50_000, own / 2, round];
-            for wait in steps.into_iter().filter(|wait| *wait < own) {
+            let round = waited / 1_000 * 1_000;
+            let steps = [0, 1_000, 2_000, 5_000, 10_000, 50_000, waited / 2, round];
+            for wait in steps.into_iter().filter(|wait| *wait < waited) {
                 if self.change(at, |act| *C::wait(act) = wait)? {
                     break;
                 }
@@ -164,7 +164,7 @@ impl<C: Acts> Shrinker<'_, C> {
                 };
                 let mut taken = false;
                 for simpler in C::simpler(&act) {
-                    taken = self.change(at, |own| *own = simpler)?;
+                    taken = self.change(at, |act| *act = simpler)?;
                     if taken {
                         break;
                     }

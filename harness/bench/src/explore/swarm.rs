@@ -24,11 +24,11 @@ impl<S: Spiced> Swarm<S> {
     pub fn drawn(seed: u64, round: u64, all: &[S], (needed, least): (&[S], S)) -> Self {
         // Other numbers than those of the cases.
         let mut dice = Dice::of_part(!seed, round);
-        let mut own: BTreeSet<_> = all.iter().copied().filter(|_| dice.percent(50)).collect();
-        if !own.iter().any(|spice| needed.contains(spice)) {
-            own.insert(least);
+        let mut chosen: BTreeSet<_> = all.iter().copied().filter(|_| dice.percent(50)).collect();
+        if !chosen.iter().any(|spice| needed.contains(spice)) {
+            chosen.insert(least);
         }
-        Self(own)
+        Self(chosen)
     }
 
     #[must_use]
@@ -39,8 +39,8 @@ impl<S: Spiced> Swarm<S> {
     /// What of these it has.
     #[must_use]
     pub fn of(&self, spices: &[S]) -> Vec<S> {
-        let own = spices.iter().copied();
-        own.filter(|spice| self.has(*spice)).collect()
+        let spices = spices.iter().copied();
+        spices.filter(|spice| self.has(*spice)).collect()
     }
 
     #[must_use]

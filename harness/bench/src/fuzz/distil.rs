@@ -27,14 +27,14 @@ const MOST_TRIES: usize = 20_000;
 
 /// An input that is worth keeping.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Distilled {
+pub struct KeptInput {
     /// The input as the target takes it.
     pub input: Vec<u8>,
     /// What it reaches and those before it do not, in the manual's order.
     pub new: Vec<Feature>,
 }
 
-impl Distilled {
+impl KeptInput {
     /// A name for its file, without ending: that of the first thing that is new.
     #[must_use]
     pub fn name(&self) -> String {
@@ -101,7 +101,7 @@ pub fn distil(
     pieces: InputPieces,
     inputs: &[Vec<u8>],
     kept: &BTreeSet<Feature>,
-) -> Vec<Distilled> {
+) -> Vec<KeptInput> {
     let mut sorted: Vec<_> = inputs.iter().collect();
     sorted.sort_by_key(|input| (input.len(), *input));
     sorted.dedup();
@@ -133,7 +133,7 @@ pub fn distil(
 }
 
 /// An input and all features that it reaches.
-type Chosen = (Vec<u8>, BTreeSet<Feature>);
+type InputFeatures = (Vec<u8>, BTreeSet<Feature>);
 
 /// Joins two inputs. The head of the first one serves both; a line that the first text already has is not repeated.
 fn together(pieces: InputPieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
@@ -154,10 +154,10 @@ fn together(pieces: InputPieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>>
 fn joined(
     body: Body,
     pieces: InputPieces,
-    chosen: Vec<Chosen>,
+    chosen: Vec<InputFeatures>,
     kept: &BTreeSet<Feature>,
-) -> Vec<Chosen> {
-    let mut joined: Vec<Chosen> = Vec::new();
+) -> Vec<InputFeatures> {
+    let mut joined: Vec<InputFeatures> = Vec::new();
     let mut left: VecDeque<_> = chosen.into();
     while let Some((input, reached)) = left.pop_front() {
         let place = (0..joined.len()).find_map(|place| {
@@ -189,7 +189,7 @@ fn joined(
 }
 
 /// Those that reach something which neither the others nor `kept` do, in their order.
-fn needed(mut chosen: Vec<Chosen>, kept: &BTreeSet<Feature>) -> Vec<Chosen> {
+fn needed(mut chosen: Vec<InputFeatures>, kept: &BTreeSet<Feature>) -> Vec<InputFeatures> {
     for place in (0..chosen.len()).rev() {
         let others = chosen
             .iter()
@@ -207,12 +207,12 @@ fn needed(mut chosen: Vec<Chosen>, kept: &BTreeSet<Feature>) -> Vec<Chosen> {
 }
 
 /// Each input with its new features.
-fn named(chosen: Vec<Chosen>, kept: &BTreeSet<Feature>) -> Vec<Distilled> {
+fn named(chosen: Vec<InputFeatures>, kept: &BTreeSet<Feature>) -> Vec<KeptInput> {
     let mut before = kept.clone();
-    let new = |(input, reached): Chosen| {
+    let new = |(input, reached): InputFeatures| {
         let new = (&reached - &before).into_iter().collect();
         before.extend(reached);
-        Distilled { input, new }
+        KeptInput { input, new }
     };
     chosen.into_iter().map(new).collect()
 }
@@ -426,7 +426,7 @@ mod tests {
 
     #[test]
     fn records_stand_on_lines_of_their_own() {
-        let one = Distilled {
+        let one = KeptInput {
             input: vec![3, 4, 1, 2, 3, 4, 5, 6, 7],
             new: Vec::new(),
         };
@@ -438,7 +438,7 @@ mod tests {
     /// A text stays one, unless something in it cannot be seen.
     #[test]
     fn texts_stay_texts() {
-        let one = |input: &[u8]| Distilled {
+        let one = |input: &[u8]| KeptInput {
             input: input.to_vec(),
             new: vec![Feature::new("", "a", "b")],
         };

@@ -61,8 +61,8 @@ fn open_points() -> Vec<Vec<String>> {
 fn right_slaves(lines: impl IntoIterator<Item = Vec<String>>, seconds: u64) {
     let factory = trial(PpoType::One, &["slave 8", "slave 8 parameter 1621 = 2"]);
     for line in lines {
-        usual().accuses_nobody(&line, (1, seconds));
-        factory.accuses_nobody(&line, (2, seconds));
+        usual().accuses_nobody(&line, 1, seconds);
+        factory.accuses_nobody(&line, 2, seconds);
     }
 }
 
@@ -118,6 +118,6 @@ fn nearly_all_wrong_slaves_are_found() {
 
 #[test]
 fn the_same_seed_finds_the_same() {
-    let once = || usual().explored(&[], Some("set-not-shown"), (7, 60, 1)).0;
+    let once = || usual().explored(&[], Some("set-not-shown"), 7, 60, 1).0;
     assert_eq!(once(), once());
 }

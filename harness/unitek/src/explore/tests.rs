@@ -46,7 +46,7 @@ fn right_drives() -> Vec<Vec<String>> {
 #[test]
 fn no_right_drive_is_accused() {
     for header in right_drives() {
-        usual().accuses_nobody(&header, (1, 15));
+        usual().accuses_nobody(&header, 1, 15);
     }
 }
 
@@ -54,7 +54,7 @@ fn no_right_drive_is_accused() {
 #[ignore = "takes seconds; .ci/nightly runs it"]
 fn no_right_drive_is_accused_in_more_cases() {
     for header in right_drives() {
-        usual().accuses_nobody(&header, (1, 60));
+        usual().accuses_nobody(&header, 1, 60);
     }
 }
 
@@ -93,6 +93,6 @@ fn nearly_all_wrong_drives_are_found() {
 
 #[test]
 fn the_same_seed_finds_the_same() {
-    let once = || usual().explored(&[], Some("four-cycles"), (7, 60, 2)).0;
+    let once = || usual().explored(&[], Some("four-cycles"), 7, 60, 2).0;
     assert_eq!(once(), once());
 }

@@ -27,7 +27,7 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
     type Act = LineAct<B::What>;
 
     fn swarm(seed: u64, round: u64, scope: &LineScope<B>) -> Swarm<B::Spice> {
-        let has = |own: &&B::Spice| scope.spices.contains(own);
+        let has = |spice: &&B::Spice| scope.spices.contains(spice);
         let least = B::NEEDED.iter().find(has).unwrap_or(&B::NEEDED[0]);
         Swarm::drawn(seed, round, &scope.spices, (B::NEEDED, *least))
     }
@@ -63,7 +63,7 @@ impl<B: LineBus> FuzzCase for LineTalk<B> {
 
     fn text(finding: &Finding<Self>) -> Result<String, ExploreError> {
         let title = format!("Found by fuzzing: {}", finding.difference.signature());
-        text(finding, (&title, None), false)
+        text(finding, &title, None, false)
     }
 
     fn again(
@@ -105,12 +105,12 @@ impl<B: LineBus> Promotes for LineTalk<B> {
         title: &str,
         source: Option<&str>,
     ) -> Result<String, ExploreError> {
-        text(finding, (title, source), false)
+        text(finding, title, source, false)
     }
 
     fn on_deviating(finding: &Finding<Self>) -> Result<Option<String>, ExploreError> {
         let planted = !finding.setup.deviates.is_empty();
-        let under_test = || text(finding, ("the drives under test", None), true);
+        let under_test = || text(finding, "the drives under test", None, true);
         planted.then(under_test).transpose()
     }
 

@@ -82,7 +82,7 @@ impl<'s, B: LineBus> Maker<'s, B> {
 
     /// A part of a conversation, or all acts of an idiom.
     fn acts(&self, dice: &mut Dice) -> Vec<LineAct<B::What>> {
-        let all: Vec<_> = B::Spice::ALL.iter().map(|(_, own)| *own).collect();
+        let all: Vec<_> = B::Spice::ALL.iter().map(|(_, spice)| *spice).collect();
         let spice = dice.pick(&self.swarm.of(&all)).copied();
         let (Some(spice), Some(station)) = (spice, self.station(dice)) else {
             return Vec::new();

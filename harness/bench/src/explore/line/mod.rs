@@ -121,7 +121,7 @@ pub trait LineBus: Copy + Debug + PartialEq + Eq + 'static {
     fn neighbours(
         setup: &Self::Setup,
         place: usize,
-        own: &Self::Properties,
+        properties: &Self::Properties,
     ) -> Vec<Self::Properties>;
     /// Values of the open points as header lines, where they are not the usual ones.
     fn lines(setup: &Self::Setup, values: &[Self::Properties]) -> Vec<String>;

@@ -4,7 +4,7 @@
 //! points (`explore::search`). Only what no such model explains is a difference.
 
 use super::{LineBus, LineTalk, Seen};
-use crate::explore::search::{Explained, Explains, explain};
+use crate::explore::search::{ModelSpace, SearchOutcome, explain};
 
 /// How unlike a piece and none are.
 const UNLIKE: i64 = 1_000_000;
@@ -51,46 +51,46 @@ impl<B: LineBus> Oracle<B> {
 
     /// Judges what the drives under test have done in a conversation.
     pub(crate) fn judge(&mut self, talk: &LineTalk<B>, seen: &Seen<B>) -> Judgement<B::Difference> {
-        let played = Played {
+        let played = TalkReplay {
             under_test: &self.under_test,
             talk,
             seen,
         };
         let begins = std::iter::once(&self.last).chain(&self.begins);
         match explain(&played, begins.cloned()) {
-            Explained::By(found) => {
+            SearchOutcome::By(found) => {
                 self.last = found;
                 Judgement::Explained
             }
-            Explained::Not(best) => {
+            SearchOutcome::Not(best) => {
                 let expected = played.expected(&best);
                 let under = B::lines(&self.under_test, &best);
                 let found = first::<B>(&expected, seen).and_then(|place| {
                     B::difference(&self.under_test, place, (&expected, seen), under)
                 });
-                found.map_or(Judgement::Undecided, |own| {
-                    Judgement::Differs(Box::new(own))
+                found.map_or(Judgement::Undecided, |difference| {
+                    Judgement::Differs(Box::new(difference))
                 })
             }
-            Explained::Undecided => Judgement::Undecided,
+            SearchOutcome::Undecided => Judgement::Undecided,
         }
     }
 }
 
 /// A conversation that was played on the drives under test.
-struct Played<'p, B: LineBus> {
+struct TalkReplay<'p, B: LineBus> {
     under_test: &'p B::Setup,
     talk: &'p LineTalk<B>,
     seen: &'p Seen<B>,
 }
 
-impl<B: LineBus> Played<'_, B> {
+impl<B: LineBus> TalkReplay<'_, B> {
     fn expected(&self, values: &[B::Properties]) -> Seen<B> {
         B::play(&B::model(self.under_test, values), self.talk)
     }
 }
 
-impl<B: LineBus> Explains for Played<'_, B> {
+impl<B: LineBus> ModelSpace for TalkReplay<'_, B> {
     type Assumed = Vec<B::Properties>;
     /// Pieces before the first difference, and how like this one is.
     type Agreement = (usize, i64);
@@ -107,8 +107,8 @@ impl<B: LineBus> Explains for Played<'_, B> {
 
     fn neighbours(&self, assumed: &Self::Assumed) -> Vec<Self::Assumed> {
         let mut all = Vec::new();
-        for (place, own) in assumed.iter().enumerate() {
-            for changed in B::neighbours(self.under_test, place, own) {
+        for (place, properties) in assumed.iter().enumerate() {
+            for changed in B::neighbours(self.under_test, place, properties) {
                 let mut next = assumed.clone();
                 next[place] = changed;
                 all.push(next);

@@ -56,9 +56,9 @@ impl LineSetup {
     #[must_use]
     pub fn new<B: LineBus>(header: Vec<String>, more: Vec<PlantedDrive>) -> Self {
         let planted = |line: &String| PlantedDrive::of_line::<B>(line);
-        let (own, others): (Vec<_>, Vec<_>) =
+        let (deviations, others): (Vec<_>, Vec<_>) =
             header.into_iter().partition(|line| planted(line).is_some());
-        let mut deviates: Vec<_> = own.iter().filter_map(planted).collect();
+        let mut deviates: Vec<_> = deviations.iter().filter_map(planted).collect();
         deviates.extend(more);
         Self {
             bus: B::BUS.name().to_owned(),

@@ -10,7 +10,8 @@ use crate::explore::{Differing as _, ExploreError, Finding};
 /// The header has mistakes.
 pub fn text<B: LineBus>(
     finding: &Finding<LineTalk<B>>,
-    (title, source): (&str, Option<&str>),
+    title: &str,
+    source: Option<&str>,
     deviating: bool,
 ) -> Result<String, ExploreError> {
     let difference = &finding.difference;

@@ -18,9 +18,9 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::time::Duration;
 
-struct Found<B: LineBus>(Vec<Finding<LineTalk<B>>>);
+struct Findings<B: LineBus>(Vec<Finding<LineTalk<B>>>);
 
-impl<B: LineBus> Watcher<LineTalk<B>> for Found<B> {
+impl<B: LineBus> Watcher<LineTalk<B>> for Findings<B> {
     fn round(&mut self, _: u64, _: &Swarm<B::Spice>) {}
     fn found(&mut self, finding: &Finding<LineTalk<B>>, _: &str) {
         self.0.push(finding.clone());
@@ -40,7 +40,7 @@ pub struct EngineTrial<B: LineBus> {
 }
 
 /// What was found, why the run ended, and how many cases were not judged.
-pub type Explored<B> = (Vec<Finding<LineTalk<B>>>, RunEnd, u64);
+pub type Exploration<B> = (Vec<Finding<LineTalk<B>>>, RunEnd, u64);
 
 impl<B: LineBus> EngineTrial<B> {
     /// Explores for a number of seconds of bus time, up to a number of findings.
@@ -48,8 +48,10 @@ impl<B: LineBus> EngineTrial<B> {
         &self,
         line: &[String],
         deviates: Option<&str>,
-        (seed, seconds, findings): (u64, u64, usize),
-    ) -> Explored<B> {
+        seed: u64,
+        seconds: u64,
+        findings: usize,
+    ) -> Exploration<B> {
         let deviates = deviates.map(|name| PlantedDrive {
             drive: self.drive,
             name: name.to_owned(),
@@ -59,20 +61,20 @@ impl<B: LineBus> EngineTrial<B> {
         let mut target = OnLine::<B>::new(setup.under_test::<B>().expect("a header"));
         let scope = LineScope::<B> {
             drives: vec![self.station],
-            spices: B::Spice::ALL.iter().map(|(_, own)| *own).collect(),
+            spices: B::Spice::ALL.iter().map(|(_, spice)| *spice).collect(),
         };
         let about = settings::<B>(setup, seed);
         let bounds = bounds(seconds, findings);
-        let mut found = Found(Vec::new());
+        let mut found = Findings(Vec::new());
         let mut run = FuzzRun::new(about, scope);
         let end = run.run(&mut target, None, &bounds, &mut found);
         (found.0, end.expect("no error"), target.undecided())
     }
 
     /// Explores right drives: nothing is found, and every case is judged.
-    pub fn accuses_nobody(&self, line: &[String], (seed, seconds): (u64, u64)) {
-        let (found, end, undecided) = self.explored(line, None, (seed, seconds, 1));
-        let about: Vec<_> = found.iter().map(|own| &own.difference).collect();
+    pub fn accuses_nobody(&self, line: &[String], seed: u64, seconds: u64) {
+        let (found, end, undecided) = self.explored(line, None, seed, seconds, 1);
+        let about: Vec<_> = found.iter().map(|finding| &finding.difference).collect();
         assert_eq!((about, end), (Vec::new(), RunEnd::Wire), "{line:?}");
         assert_eq!(undecided, 0, "{line:?}");
     }
@@ -94,20 +96,20 @@ impl<B: LineBus> EngineTrial<B> {
         };
         let mut session = SessionOf::<B>::open(&rig, &options).expect("drives");
         let drives = B::stations(&rig, Some(&session));
-        let all = B::Spice::ALL.iter().map(|(_, own)| *own);
+        let all = B::Spice::ALL.iter().map(|(_, spice)| *spice);
         let spices = all
-            .filter(|own| B::lacks(&rig, true, *own).is_none())
+            .filter(|spice| B::lacks(&rig, true, *spice).is_none())
             .collect();
         let setup = LineSetup::of_rig::<B>(&rig, &drives, Vec::new());
         let model = setup.under_test::<B>().expect("a header");
         let mut target = OnAdapter::<B>::new(&mut session, model).expect("drives");
         let scope = LineScope { drives, spices };
-        let mut found = Found(Vec::new());
+        let mut found = Findings(Vec::new());
         let about = settings::<B>(setup, 1);
         let mut run = FuzzRun::new(about, scope);
         let bounds = bounds(seconds, 1);
         let end = run.run(&mut target, None, &bounds, &mut found);
-        let about: Vec<_> = found.0.iter().map(|own| &own.difference).collect();
+        let about: Vec<_> = found.0.iter().map(|finding| &finding.difference).collect();
         assert_eq!(
             (about, end.expect("a rig")),
             (Vec::new(), RunEnd::Wire),
@@ -120,7 +122,7 @@ impl<B: LineBus> EngineTrial<B> {
         );
         // What is stored is said, with the command that stores what was there before.
         let mut left = target.restore();
-        left.retain(|own| !own.contains("EEPROM"));
+        left.retain(|sentence| !sentence.contains("EEPROM"));
         assert_eq!(left, [""; 0], "{line:?}");
         drop(target);
         assert!(!session.close(false).is_unsafe(), "{line:?}");
@@ -134,7 +136,7 @@ impl<B: LineBus> EngineTrial<B> {
     {
         let mut missed = Vec::new();
         for name in some {
-            let (found, ..) = self.explored(&[], Some(name), (1, 600, 1));
+            let (found, ..) = self.explored(&[], Some(name), 1, 600, 1);
             let Some(finding) = found.first() else {
                 missed.push(name);
                 continue;
@@ -145,8 +147,9 @@ impl<B: LineBus> EngineTrial<B> {
                 .expect("a header")
                 .finding;
             assert!(small.case.measure() <= finding.case.measure(), "{name}");
-            let (own, kind) = (&small.difference, &finding.difference);
-            assert!(own.is_like(kind), "{name}: {own:?} in place of {kind:?}");
+            let (shown, kind) = (&small.difference, &finding.difference);
+            let is_like = shown.is_like(kind);
+            assert!(is_like, "{name}: {shown:?} in place of {kind:?}");
             let text = LineTalk::<B>::text(&small).expect("a model");
             let (right, why) = verdict::<B>(&text, "", &[]);
             assert_eq!(right, Verdict::Passed, "{name}: {why}\n{text}");
@@ -161,6 +164,7 @@ impl<B: LineBus> EngineTrial<B> {
 }
 
 fn settings<B: LineBus>(setup: LineSetup, seed: u64) -> FuzzSettings<LineTalk<B>> {
+    let spices = B::Spice::ALL.iter().map(|(name, _)| (*name).to_owned());
     FuzzSettings {
         schema: 1,
         rig: "sim".to_owned(),
@@ -171,7 +175,7 @@ fn settings<B: LineBus>(setup: LineSetup, seed: u64) -> FuzzSettings<LineTalk<B>
         confirm: 2,
         of: 3,
         setup,
-        spices: B::Spice::ALL.iter().map(|own| own.0.to_owned()).collect(),
+        spices: spices.collect(),
     }
 }
 
@@ -188,8 +192,8 @@ fn bounds(seconds: u64, findings: usize) -> Bounds {
 fn verdict<L: Language>(text: &str, line: &str, under: &[String]) -> (Verdict, String) {
     let lines = text
         .lines()
-        .filter(|own| under.iter().all(|other| other != own));
-    let text: String = lines.map(|own| format!("{own}\n")).collect();
+        .filter(|line| under.iter().all(|other| other != line));
+    let text: String = lines.map(|line| format!("{line}\n")).collect();
     let text = text.replacen("\n# ", &format!("{line}\n\n# "), 1);
     let source = Source {
         name: "finding".to_owned(),
@@ -200,6 +204,6 @@ fn verdict<L: Language>(text: &str, line: &str, under: &[String]) -> (Verdict, S
     let outcome = plan.play(&mut *plan.simulate(), AtMismatch::Stop);
     (
         outcome.verdict,
-        outcome.finding.map_or(text, |own| own.message),
+        outcome.finding.map_or(text, |finding| finding.message),
     )
 }
