@@ -84,12 +84,7 @@ impl ClassCount {
 pub enum CountsError {
     /// A file cannot be read.
     #[error("failed to read {path}: {error}")]
-    File {
-        /// Which.
-        path: String,
-        /// Why not.
-        error: std::io::Error,
-    },
+    File { path: String, error: std::io::Error },
     /// A file does not hold counts, or two do not belong together; in a sentence.
     #[error("failed to merge: {0}")]
     Wrong(String),
@@ -203,7 +198,8 @@ impl CampaignCounts {
     pub fn pairs(&self) -> Option<PlayedPairs> {
         let facts = self.pairs.as_ref()?;
         let named = self.counts.iter();
-        let named: Vec<_> = named.map(|own| (own.class.as_str(), own.cases)).collect();
+        let named = named.map(|count| (count.class.as_str(), count.cases));
+        let named: Vec<_> = named.collect();
         let (classes, counts) = PlayedPairs::of_named(&named)?;
         Some(PlayedPairs {
             name: self.name.clone(),
@@ -221,7 +217,7 @@ impl CampaignCounts {
     #[must_use]
     pub fn played(&self) -> Option<u64> {
         let mut all = self.counts.iter();
-        all.try_fold(0u64, |sum, own| sum.checked_add(own.cases))
+        all.try_fold(0u64, |sum, count| sum.checked_add(count.cases))
     }
 
     /// The pinned figures that are not met: class, expected, found.
@@ -231,12 +227,12 @@ impl CampaignCounts {
             "cases" => self.played().unwrap_or(u64::MAX),
             class => {
                 let mut all = self.counts.iter();
-                all.find(|own| own.class == class)
-                    .map_or(0, |own| own.cases)
+                all.find(|count| count.class == class)
+                    .map_or(0, |count| count.cases)
             }
         };
         let pinned = self.expect.iter();
-        let compared = pinned.map(|own| (own.class.as_str(), own.cases, found(&own.class)));
+        let compared = pinned.map(|count| (count.class.as_str(), count.cases, found(&count.class)));
         compared
             .filter(|(_, expected, found)| expected != found)
             .collect()
@@ -250,7 +246,7 @@ impl CountsFile {
         Self {
             schema: SCHEMA,
             drivebench: env!("CARGO_PKG_VERSION").to_owned(),
-            partition: part.map(|own| own.to_string()),
+            partition: part.map(|part| part.to_string()),
             campaigns,
         }
     }
@@ -300,24 +296,26 @@ impl CountsFile {
             ("spread".to_owned(), partition.spread.name().to_owned()),
             ("number of parts".to_owned(), partition.of.to_string()),
         ];
-        let names: Vec<_> = self.campaigns.iter().map(|own| own.name.as_str()).collect();
+        let names = self.campaigns.iter().map(|campaign| &campaign.name);
+        let names: Vec<_> = names.collect();
         facts.push(("list of campaigns".to_owned(), format!("{names:?}")));
-        for own in &self.campaigns {
-            let name = &own.name;
-            let counts = |all: &[ClassCount]| {
-                let all = all.iter().map(|own| format!("{} {}", own.class, own.cases));
-                all.collect::<Vec<_>>().join(", ")
-            };
-            let classes: Vec<_> = own.counts.iter().map(|own| own.class.as_str()).collect();
-            let counted = match &own.pairs {
+        for campaign in &self.campaigns {
+            let name = &campaign.name;
+            let expected = campaign.expect.iter();
+            let expected = expected.map(|count| format!("{} {}", count.class, count.cases));
+            let expected = expected.collect::<Vec<_>>().join(", ");
+            let classes = campaign.counts.iter().map(|count| &count.class);
+            let classes: Vec<_> = classes.collect();
+            let counted = match &campaign.pairs {
                 None => "single cases".to_owned(),
                 Some(pairs) => format!("pairs of {} faults", pairs.faults),
             };
             facts.push((format!("count of {name}"), counted));
-            facts.push((format!("sum of {name}"), own.sha256.clone()));
-            facts.push((format!("number of cases of {name}"), own.cases.to_string()));
+            facts.push((format!("sum of {name}"), campaign.sha256.clone()));
+            let cases = campaign.cases.to_string();
+            facts.push((format!("number of cases of {name}"), cases));
             facts.push((format!("list of classes of {name}"), format!("{classes:?}")));
-            facts.push((format!("[expect] of {name}"), counts(&own.expect)));
+            facts.push((format!("[expect] of {name}"), expected));
         }
         facts
     }
@@ -332,18 +330,18 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
     for path in paths {
         let (file, partition) = CountsFile::read(path)?;
         if let Some((first, theirs, of)) = parts.first() {
-            let own = file.fingerprint(partition);
-            let both = theirs.fingerprint(*of).into_iter().zip(own);
-            let differing = both.into_iter().find(|(theirs, own)| theirs != own);
-            if let Some(((what, theirs), (_, own))) = differing {
+            let ours = file.fingerprint(partition);
+            let both = theirs.fingerprint(*of).into_iter().zip(ours);
+            let differing = both.into_iter().find(|(theirs, ours)| theirs != ours);
+            if let Some(((what, theirs), (_, ours))) = differing {
                 return Err(CountsError::Wrong(format!(
-                    "{} and {} are no parts of the same campaigns: the {what} is {theirs} in the first and {own} in the second",
+                    "{} and {} are no parts of the same campaigns: the {what} is {theirs} in the first and {ours} in the second",
                     first.display(),
                     path.display()
                 )));
             }
         }
-        if let Some((other, ..)) = parts.iter().find(|(_, _, own)| *own == partition) {
+        if let Some((other, ..)) = parts.iter().find(|(_, _, known)| *known == partition) {
             return Err(CountsError::Wrong(format!(
                 "{} and {} are both {partition}; name each part once",
                 other.display(),
@@ -355,14 +353,13 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
     let Some((_, first, one)) = parts.first() else {
         return Err(CountsError::Wrong("there is no part".to_owned()));
     };
-    let there: BTreeSet<u32> = parts.iter().map(|(_, _, own)| own.number).collect();
+    let there: BTreeSet<u32> = parts.iter().map(|(_, _, part)| part.number).collect();
     let missing = (1..=one.of).filter(|number| !there.contains(number));
     let missing: Vec<_> = missing.map(|number| Partition { number, ..*one }).collect();
     let mut campaigns = first.campaigns.clone();
     for (place, sum) in campaigns.iter_mut().enumerate() {
         for (path, file, partition) in &parts {
-            let own = &file.campaigns[place];
-            fits(own, *partition)
+            fits(&file.campaigns[place], *partition)
                 .map_err(|why| CountsError::Wrong(format!("{}: {why}", path.display())))?;
         }
         for (class, count) in sum.counts.iter_mut().enumerate() {
@@ -373,10 +370,10 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
             count.cases = all.fold(0, u64::saturating_add);
         }
         if let Some(sum) = &mut sum.pairs {
-            let own = parts
+            let facts = parts
                 .iter()
                 .filter_map(|(_, file, _)| file.campaigns[place].pairs.as_ref());
-            let all = own.map(|own| own.located_closer);
+            let all = facts.map(|facts| facts.located_closer);
             sum.located_closer = all.fold(0, u64::saturating_add);
         }
         let played = sum.played().unwrap_or(u64::MAX);
@@ -397,19 +394,19 @@ pub fn merge(paths: &[PathBuf]) -> Result<MergedCounts, CountsError> {
 
 /// How many pairs a slice has: those of which the second fault is one of its faults.
 fn share_of_pairs(
-    own: &CampaignCounts,
+    campaign: &CampaignCounts,
     facts: &PairFacts,
     partition: Partition,
 ) -> Result<u64, String> {
-    let (faults, name) = (facts.faults, &own.name);
+    let (faults, name) = (facts.faults, &campaign.name);
     let most = MOST_SINGLES as u64;
-    if faults > most || own.cases != faults * faults.saturating_sub(1) / 2 {
+    if faults > most || campaign.cases != faults * faults.saturating_sub(1) / 2 {
         return Err(format!(
             "{name} has {} pairs of {faults} faults, which cannot be",
-            own.cases
+            campaign.cases
         ));
     }
-    let located = own.pairs().map(|own| own.located());
+    let located = campaign.pairs().map(|pairs| pairs.located());
     if located.is_none_or(|located| facts.located_closer > located) {
         return Err(format!("the counts of {name} are not those of pairs"));
     }
@@ -418,22 +415,22 @@ fn share_of_pairs(
 }
 
 /// Whether a part can have these counts.
-fn fits(own: &CampaignCounts, partition: Partition) -> Result<(), String> {
-    let played = own.played().filter(|played| *played <= own.cases);
+fn fits(campaign: &CampaignCounts, partition: Partition) -> Result<(), String> {
+    let played = campaign.played().filter(|played| *played <= campaign.cases);
     let Some(played) = played else {
         return Err(format!(
             "it has more cases of {} than the campaign has, {}",
-            own.name, own.cases
+            campaign.name, campaign.cases
         ));
     };
-    let share = match &own.pairs {
-        None => partition.share(own.cases),
-        Some(facts) => share_of_pairs(own, facts, partition)?,
+    let share = match &campaign.pairs {
+        None => partition.share(campaign.cases),
+        Some(facts) => share_of_pairs(campaign, facts, partition)?,
     };
     match partition.spread {
         Spread::Slice if played != share => Err(format!(
             "it has {played} cases of {}, and {partition} has {share}",
-            own.name
+            campaign.name
         )),
         _ => Ok(()),
     }

@@ -140,7 +140,7 @@ pub trait PlayedCampaign {
 
 /// The place of the class with this name.
 pub fn class_of(played: &dyn PlayedCampaign, name: &str) -> Option<usize> {
-    played.classes().iter().position(|own| own.name == name)
+    played.classes().iter().position(|class| class.name == name)
 }
 
 /// The names of built-in campaigns, in order: `prefix` and the name of the file.

@@ -11,13 +11,13 @@ pub fn page(all: &[Box<dyn PlayedCampaign>]) -> String {
     let numbered: Vec<_> = (1..).zip(all).collect();
     // Campaigns of one bus have the same classes.
     let mut buses: Vec<Vec<(usize, &dyn PlayedCampaign)>> = Vec::new();
-    for (number, own) in &numbered {
+    for (number, campaign) in &numbered {
         let same = buses
             .iter_mut()
-            .find(|bus| bus[0].1.classes() == own.classes());
+            .find(|bus| bus[0].1.classes() == campaign.classes());
         match same {
-            Some(bus) => bus.push((*number, &***own)),
-            None => buses.push(vec![(*number, &***own)]),
+            Some(bus) => bus.push((*number, &***campaign)),
+            None => buses.push(vec![(*number, &***campaign)]),
         }
     }
     front.element("section", &[("aria-labelledby", &"summary")], |html| {
@@ -32,7 +32,8 @@ pub fn page(all: &[Box<dyn PlayedCampaign>]) -> String {
             letters(html, bus[0].1.classes());
         }
     });
-    let sections = numbered.iter().map(|(number, own)| own.section(*number));
+    let sections = numbered.iter();
+    let sections = sections.map(|(number, campaign)| campaign.section(*number));
     let sections: Vec<_> = sections.collect();
     html::page("drivebench: campaigns of faults", &front, &sections)
 }
@@ -47,22 +48,22 @@ fn summary(html: &mut Html, bus: &[(usize, &dyn PlayedCampaign)]) {
         names.extend(["Cases", "Pinned figures"]);
         names.extend(first.classes().iter().map(|class| class.name));
         html.heads(&names);
-        for (number, own) in bus {
+        for (number, campaign) in bus {
             html.element("tr", &[], |html| {
                 html.element("th", &[("scope", &"row")], |html| {
                     let place = format!("#s{number}");
-                    html.line("a", &[("href", &place)], own.name());
+                    html.line("a", &[("href", &place)], campaign.name());
                 });
-                for (_, size) in own.size() {
+                for (_, size) in campaign.size() {
                     html.line("td", &[("class", &"n")], size);
                 }
-                html.line("td", &[("class", &"n")], own.cases());
-                match own.differs().len() {
+                html.line("td", &[("class", &"n")], campaign.cases());
+                match campaign.differs().len() {
                     0 => html.line("td", &[("class", &"good")], "as found"),
                     many => html.line("td", &[("class", &"bad")], format_args!("{many} differ")),
                 }
-                for place in 0..own.classes().len() {
-                    html.line("td", &[("class", &"n")], own.count(place));
+                for place in 0..campaign.classes().len() {
+                    html.line("td", &[("class", &"n")], campaign.count(place));
                 }
             });
         }

@@ -82,11 +82,11 @@ impl PlayedPairs {
     /// The located pairs on two links.
     #[must_use]
     pub fn located(&self) -> u64 {
-        let place = self.classes.iter().position(|own| own == LOCATED);
+        let place = self.classes.iter().position(|class| class == LOCATED);
         let [.., links] = &self.counts;
         place
             .and_then(|place| links.get(place))
-            .map_or(0, |own| *own)
+            .map_or(0, |count| *count)
     }
 
     /// The counts by the names of the class and of where the faults are, in order.
@@ -109,8 +109,8 @@ impl PlayedPairs {
         let classes = first.map(|(name, _)| name.strip_suffix(", one byte").map(str::to_owned));
         let classes: Vec<String> = classes.collect::<Option<_>>()?;
         let of = |apart: usize| -> Option<Vec<u64>> {
-            let own = named.get(apart * most..(apart + 1) * most)?.iter();
-            let both = own.zip(&classes);
+            let part = named.get(apart * most..(apart + 1) * most)?.iter();
+            let both = part.zip(&classes);
             both.map(|((name, count), class)| {
                 (*name == format!("{class}, {}", APART[apart])).then_some(*count)
             })
@@ -148,11 +148,11 @@ impl PlayedPairs {
         text.push('\n');
         for (place, class) in self.classes.iter().enumerate() {
             let _infallible = write!(text, "  {class:18}");
-            let own = || self.counts.iter().map(|counts| counts[place]);
-            for count in own() {
+            let counts = || self.counts.iter().map(|counts| counts[place]);
+            for count in counts() {
                 let _infallible = write!(text, " {count:>11}");
             }
-            let all: u64 = own().sum();
+            let all: u64 = counts().sum();
             let _infallible = write!(text, " {all:>11} {:>9}", share(all, played));
             if self.seed.is_some() {
                 let (low, high) = interval(all, played);

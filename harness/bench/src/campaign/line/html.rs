@@ -68,9 +68,9 @@ fn map(played: &PlayedLine) -> Html {
                 html.line("th", &[("scope", &"row")], row[0].case.place);
                 html.line("td", &[], &row[0].case.disturbed);
                 for fault in &faults {
-                    match row.iter().find(|own| own.case.fault == *fault) {
-                        Some(own) => {
-                            let class = played.of(own);
+                    match row.iter().find(|outcome| outcome.case.fault == *fault) {
+                        Some(outcome) => {
+                            let class = played.of(outcome);
                             html.line("td", &[("class", &class.colour())], class.letter)
                         }
                         None => html.line("td", &[], ""),
@@ -87,12 +87,12 @@ fn worst(played: &PlayedLine) -> Html {
     html.element("table", &[], |html| {
         html.line("caption", &[], "The worst cases");
         html.heads(&["Class", "Case", "Disturbed", "What happened"]);
-        for own in played.serious().into_iter().take(WORST) {
+        for outcome in played.serious().into_iter().take(WORST) {
             html.element("tr", &[], |html| {
-                html.line("th", &[("scope", &"row")], played.of(own).name);
-                html.line("td", &[], own.case.name());
-                html.line("td", &[], &own.case.disturbed);
-                html.line("td", &[], &own.happened);
+                html.line("th", &[("scope", &"row")], played.of(outcome).name);
+                html.line("td", &[], outcome.case.name());
+                html.line("td", &[], &outcome.case.disturbed);
+                html.line("td", &[], &outcome.happened);
             });
         }
     });

@@ -31,9 +31,10 @@ pub(crate) fn table(played: &PlayedLine) -> String {
 /// The cases of a class, one a line.
 #[must_use]
 pub(crate) fn only(played: &PlayedLine, class: usize) -> String {
-    let own = played.outcomes.iter().filter(|own| own.class == class);
-    let line = |own: &LineOutcome| format!("{:10} {}\n", played.of(own).name, line(own));
-    own.map(line).collect()
+    let outcomes = played.outcomes.iter();
+    let outcomes = outcomes.filter(|outcome| outcome.class == class);
+    let lines = outcomes.map(|case| format!("{:10} {}\n", played.of(case).name, line(case)));
+    lines.collect()
 }
 
 /// A case, and what happened.
@@ -58,7 +59,7 @@ pub(crate) fn json(played: &PlayedLine, only: Option<usize>) -> Value {
     let counts = played.table.classes.iter().enumerate();
     let counts =
         counts.map(|(place, class)| json!({ "class": class.name, "cases": played.count(place) }));
-    let wanted = |own: &&LineOutcome| only.is_none_or(|only| own.class == only);
+    let wanted = |outcome: &&LineOutcome| only.is_none_or(|only| outcome.class == only);
     let shown = played.outcomes.iter().filter(wanted);
     let differs = played.differs().into_iter();
     let differs = differs.map(
