@@ -15,12 +15,12 @@ const LINGER: Duration = Duration::from_secs(10);
 /// The events of a page.
 #[derive(Debug, Default)]
 pub(crate) struct Feed {
-    inner: Mutex<Inner>,
+    inner: Mutex<FeedState>,
     more: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct Inner {
+struct FeedState {
     /// The last events; the number of the last one is `count`.
     events: VecDeque<Arc<str>>,
     bytes: usize,
@@ -43,7 +43,7 @@ pub(crate) enum FeedPiece {
     LeftOut(u64),
 }
 
-impl Inner {
+impl FeedState {
     /// The number of the oldest event that is kept, or of the next one.
     fn oldest(&self) -> u64 {
         self.count + 1 - self.events.len() as u64
@@ -51,7 +51,7 @@ impl Inner {
 }
 
 impl Feed {
-    fn inner(&self) -> MutexGuard<'_, Inner> {
+    fn inner(&self) -> MutexGuard<'_, FeedState> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -129,7 +129,7 @@ impl FeedReader {
     pub(crate) fn wait(&mut self, patience: Duration) -> Option<Vec<FeedPiece>> {
         let inner = self.feed.inner();
         let next = self.next;
-        let nothing = |inner: &mut Inner| !inner.ended && inner.count < next;
+        let nothing = |inner: &mut FeedState| !inner.ended && inner.count < next;
         let waited = self.feed.more.wait_timeout_while(inner, patience, nothing);
         let (inner, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if inner.ended {

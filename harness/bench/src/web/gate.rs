@@ -50,7 +50,7 @@ pub(super) fn hosts(local: SocketAddr, name: &str) -> Vec<String> {
 /// [`Refusal`] with the status of HTTP.
 pub(super) fn admit(head: &Head, hosts: &[String], token: &str) -> Result<Route, Refusal> {
     let host = head.header("host").unwrap_or_default();
-    if !hosts.iter().any(|own| own.eq_ignore_ascii_case(host)) {
+    if !hosts.iter().any(|known| known.eq_ignore_ascii_case(host)) {
         return Err(Refusal::new(
             421,
             "this server does not answer for that Host; open the address that drivebench printed",
@@ -156,7 +156,7 @@ mod tests {
             panic!("{lines}");
         };
         let hosts = hosts("127.0.0.1:8090".parse().expect("an address"), "bench:0");
-        admit(&head, &hosts, "abc").map_err(|own| own.status)
+        admit(&head, &hosts, "abc").map_err(|refusal| refusal.status)
     }
 
     #[test]
@@ -193,9 +193,9 @@ mod tests {
 
     #[test]
     fn short_names_of_port_80() {
-        let own = hosts("[::1]:80".parse().expect("an address"), "[::1]:80");
+        let hosts = hosts("[::1]:80".parse().expect("an address"), "[::1]:80");
         for host in ["[::1]:80", "[::1]", "localhost", "localhost:80"] {
-            assert!(own.iter().any(|own| own == host), "{own:?}");
+            assert!(hosts.iter().any(|known| known == host), "{hosts:?}");
         }
     }
 
@@ -278,7 +278,8 @@ mod tests {
             (Path::Fault, b"[[[[[[[["),
             (Path::Fault, b"\xFF"),
         ] {
-            assert_eq!(order(path, body).map_err(|own| own.status), Err(400));
+            let status = order(path, body).map_err(|refusal| refusal.status);
+            assert_eq!(status, Err(400));
         }
     }
 }

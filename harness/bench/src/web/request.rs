@@ -61,8 +61,8 @@ pub(super) enum Read {
 impl Head {
     /// The value of a header, its name in lower case.
     pub(super) fn header(&self, name: &str) -> Option<&str> {
-        let mut own = self.headers.iter();
-        let (_, value) = own.find(|(own, _)| own == name)?;
+        let mut headers = self.headers.iter();
+        let (_, value) = headers.find(|(known, _)| known == name)?;
         Some(value)
     }
 
@@ -125,7 +125,7 @@ fn head(bytes: &[u8]) -> Result<Head, &'static str> {
     if !is_token(method) || !target.starts_with('/') {
         return Err("a method and a path that begins with / expected");
     }
-    let mut own = Head {
+    let mut head = Head {
         method: method.to_owned(),
         target: target.to_owned(),
         headers: Vec::new(),
@@ -137,19 +137,19 @@ fn head(bytes: &[u8]) -> Result<Head, &'static str> {
             return Err("lines that end with CR LF expected");
         }
         let name = name.to_ascii_lowercase();
-        if DECIDE.contains(&name.as_str()) && own.header(&name).is_some() {
+        if DECIDE.contains(&name.as_str()) && head.header(&name).is_some() {
             return Err("a header that decides something stands twice");
         }
-        if own.headers.len() == MAX_HEADERS {
+        if head.headers.len() == MAX_HEADERS {
             return Err("fewer headers expected");
         }
         let value = value.trim_matches([' ', '\t']).to_owned();
-        own.headers.push((name, value));
+        head.headers.push((name, value));
     }
     if first.contains(['\r', '\n', '\t']) {
         return Err("lines that end with CR LF expected");
     }
-    Ok(own)
+    Ok(head)
 }
 
 /// RFC 9110, 5.6.2.
@@ -228,7 +228,8 @@ mod tests {
             let Read::Head(head, _) = read(text.as_bytes()) else {
                 panic!("{line}");
             };
-            assert_eq!(head.length().map_err(|own| own.status), expected, "{line}");
+            let length = head.length().map_err(|refusal| refusal.status);
+            assert_eq!(length, expected, "{line}");
         }
     }
 

@@ -35,12 +35,12 @@ const STACK: usize = 256 << 10;
 
 /// An order of a page, and where its answer goes.
 #[derive(Debug)]
-pub(crate) struct AskedOrder {
+pub(crate) struct PendingOrder {
     pub order: LiveOrder,
     reply: SyncSender<Result<String, String>>,
 }
 
-impl AskedOrder {
+impl PendingOrder {
     /// Answers: what was done, or why not.
     pub(crate) fn answer(self, answer: Result<String, String>) {
         // A client that has gone needs no answer.
@@ -49,20 +49,20 @@ impl AskedOrder {
 }
 
 /// What the threads of connections share.
-struct Shared {
+struct PageState {
     name: String,
     token: String,
     scene: String,
     read_only: Option<String>,
     feed: Arc<Feed>,
-    orders: SyncSender<AskedOrder>,
+    orders: SyncSender<PendingOrder>,
     wake: UnixStream,
     connections: AtomicUsize,
     /// How long a request may take to come, and how long a client may take nothing.
     patience: Duration,
 }
 
-impl Shared {
+impl PageState {
     /// Wakes the bench: a page has come, or has an order.
     fn wake(&self) {
         // A bench that has not read the last byte is awake.
@@ -76,7 +76,7 @@ pub(crate) struct LivePage {
     address: SocketAddr,
     token: String,
     feed: Arc<Feed>,
-    orders: Receiver<AskedOrder>,
+    orders: Receiver<PendingOrder>,
     wake: UnixStream,
     /// Its end ends the thread that accepts.
     stop: Option<UnixStream>,
@@ -113,7 +113,7 @@ impl LivePage {
         let (stop, stopped) = pair().map_err(failed)?;
         let (orders, taken) = sync_channel(MAX_ORDERS);
         let feed = Arc::new(Feed::default());
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(PageState {
             name: place.to_owned(),
             token: token.clone(),
             scene: serde_json::to_string(scene).unwrap_or_default(),
@@ -156,7 +156,7 @@ impl LivePage {
     }
 
     /// The orders of pages since the last call.
-    pub(crate) fn orders(&mut self) -> Vec<AskedOrder> {
+    pub(crate) fn orders(&mut self) -> Vec<PendingOrder> {
         let mut bytes = [0; 64];
         while matches!(self.wake.read(&mut bytes), Ok(1..)) {}
         self.orders.try_iter().collect()
@@ -194,7 +194,7 @@ fn token() -> io::Result<String> {
 }
 
 /// Accepts connections until `stop` ends.
-fn accept(listener: &TcpListener, stop: &UnixStream, shared: &Arc<Shared>) {
+fn accept(listener: &TcpListener, stop: &UnixStream, shared: &Arc<PageState>) {
     loop {
         let mut fds = [
             PollFd::new(listener, PollFlags::IN),
@@ -215,7 +215,7 @@ fn accept(listener: &TcpListener, stop: &UnixStream, shared: &Arc<Shared>) {
 }
 
 /// Serves a connection on a thread of its own, or refuses one too many.
-fn take(stream: TcpStream, shared: &Arc<Shared>) {
+fn take(stream: TcpStream, shared: &Arc<PageState>) {
     // A stream that cannot be set up is closed.
     let set = stream
         .set_nonblocking(false)
@@ -235,13 +235,13 @@ fn take(stream: TcpStream, shared: &Arc<Shared>) {
         let _gone = stream.shutdown(Shutdown::Write);
         return;
     }
-    let own = Arc::clone(shared);
+    let counted = Arc::clone(shared);
     let thread = std::thread::Builder::new()
         .stack_size(STACK)
         .spawn(move || {
-            let _counted = Counted(&own.connections);
+            let _counted = ConnectionSlot(&counted.connections);
             // A client that has gone, or takes nothing, has its connection closed.
-            let _gone = answer(&stream, &own);
+            let _gone = answer(&stream, &counted);
         });
     if thread.is_err() {
         shared.connections.fetch_sub(1, Ordering::Relaxed);
@@ -249,16 +249,16 @@ fn take(stream: TcpStream, shared: &Arc<Shared>) {
 }
 
 /// Gives a connection's place back.
-struct Counted<'c>(&'c AtomicUsize);
+struct ConnectionSlot<'c>(&'c AtomicUsize);
 
-impl Drop for Counted<'_> {
+impl Drop for ConnectionSlot<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 /// Answers the one request of a connection.
-fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
+fn answer(stream: &TcpStream, shared: &PageState) -> io::Result<()> {
     let end = Instant::now() + shared.patience;
     match routed(stream, shared, end) {
         Ok(Reply::Page) => {
@@ -284,7 +284,7 @@ enum Reply {
 }
 
 /// Reads a request and does what it asks for. `None` for a connection that ends without one.
-fn routed(stream: &TcpStream, shared: &Shared, end: Instant) -> Result<Reply, Option<Refusal>> {
+fn routed(stream: &TcpStream, shared: &PageState, end: Instant) -> Result<Reply, Option<Refusal>> {
     let mut bytes = Vec::new();
     let (head, used) = loop {
         match read(&bytes) {
@@ -306,7 +306,7 @@ fn routed(stream: &TcpStream, shared: &Shared, end: Instant) -> Result<Reply, Op
     let body = body(stream, &head, bytes.split_off(used), end)?;
     let order = order(path, &body)?;
     let (reply, answer) = sync_channel(1);
-    let asked = AskedOrder { order, reply };
+    let asked = PendingOrder { order, reply };
     shared.orders.try_send(asked).map_err(|error| {
         Refusal::new(
             503,
@@ -378,7 +378,7 @@ fn more(
 }
 
 /// Streams the scene and the events until the client leaves.
-fn events(stream: &TcpStream, shared: &Shared, after: Option<u64>) -> io::Result<()> {
+fn events(stream: &TcpStream, shared: &PageState, after: Option<u64>) -> io::Result<()> {
     let mut reader = shared.feed.watch(after);
     shared.wake();
     let mut text = head(200, "text/event-stream", "");

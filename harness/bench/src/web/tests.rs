@@ -38,7 +38,7 @@ fn answer_of(mut stream: TcpStream) -> (u16, String) {
 }
 
 /// A request of the page itself, with lines of headers more.
-fn own(page: &LivePage, line: &str, more: &str, body: &str) -> String {
+fn request(page: &LivePage, line: &str, more: &str, body: &str) -> String {
     let (address, token, length) = (page.address, &page.token, body.len());
     format!(
         "{line} HTTP/1.1\r\nHost: {address}\r\nOrigin: http://{address}\r\nDrivebench-Token: {token}\r\n\
@@ -70,7 +70,7 @@ fn an_order_reaches_the_bench_and_its_answer_the_page() {
     ] {
         let mut stream = connect(&page);
         let body = r#"{"place":1,"fault":2}"#;
-        let text = own(&page, "POST /fault", "", body);
+        let text = request(&page, "POST /fault", "", body);
         stream.write_all(text.as_bytes()).expect("sent");
         // The wake-up comes with the order.
         poll(&mut [page.poll()], None).expect("a wake-up");
@@ -89,7 +89,8 @@ fn an_order_reaches_the_bench_and_its_answer_the_page() {
 #[test]
 fn requests_of_others_are_refused() {
     let page = page(false, LONG);
-    let good = own(&page, "POST /fault", "", r#"{"place":0,"fault":0}"#);
+    let good = request(&page, "POST /fault", "", r#"{"place":0,"fault":0}"#);
+    let events = |more: &str| request(&page, "GET /events", more, "");
     let (address, token) = (page.address.to_string(), page.token.clone());
     for (status, bad) in [
         (
@@ -113,8 +114,8 @@ fn requests_of_others_are_refused() {
             good.replace("Content-Length: 21", "Content-Length: 99999"),
         ),
         (431, format!("GET / HTTP/1.1\r\nA: {}", "a".repeat(9000))),
-        (403, own(&page, "GET /events", "", "").replace(&token, "")),
-        (400, own(&page, "GET /events", "Last-Event-ID: -1\r\n", "")),
+        (403, events("").replace(&token, "")),
+        (400, events("Last-Event-ID: -1\r\n")),
     ] {
         let (given, why) = asked(&page, bad.as_bytes());
         assert_eq!(given, status, "{bad}\n{why}");
@@ -125,7 +126,7 @@ fn requests_of_others_are_refused() {
 #[test]
 fn a_page_that_only_looks_on_takes_no_order() {
     let page = page(true, LONG);
-    let text = own(&page, "POST /fault", "", r#"{"place":0,"fault":0}"#);
+    let text = request(&page, "POST /fault", "", r#"{"place":0,"fault":0}"#);
     let refused = (403, "only for looking on\n".to_owned());
     assert_eq!(asked(&page, text.as_bytes()), refused);
 }
@@ -138,7 +139,7 @@ fn a_slow_client_is_not_waited_for() {
         assert_eq!(asked(&page, half.as_bytes()).0, 408, "{half}");
     }
     let text =
-        own(&page, "POST /fault", "", "{}").replace("Content-Length: 2", "Content-Length: 9");
+        request(&page, "POST /fault", "", "{}").replace("Content-Length: 2", "Content-Length: 9");
     assert_eq!(asked(&page, text.as_bytes()).0, 408);
 }
 
@@ -167,7 +168,7 @@ fn two_hundred_clients_are_bounded_and_the_next_one_is_served() {
 fn a_client_that_reads_nothing_is_let_go() {
     let page = page(false, Duration::from_millis(100));
     let mut stream = connect(&page);
-    let text = own(&page, "GET /events", "", "");
+    let text = request(&page, "GET /events", "", "");
     stream.write_all(text.as_bytes()).expect("sent");
     let mut first = [0; 8];
     stream.read_exact(&mut first).expect("an answer");
@@ -182,7 +183,7 @@ fn a_client_that_reads_nothing_is_let_go() {
 fn events(page: &LivePage, after: Option<u64>, last: u64) -> Vec<String> {
     let mut stream = connect(page);
     let more = after.map_or(String::new(), |after| format!("Last-Event-ID: {after}\r\n"));
-    let text = own(page, "GET /events", &more, "");
+    let text = request(page, "GET /events", &more, "");
     stream.write_all(text.as_bytes()).expect("sent");
     let mut seen = Vec::new();
     let mut kind = String::new();
@@ -194,8 +195,8 @@ fn events(page: &LivePage, after: Option<u64>, last: u64) -> Vec<String> {
                 return seen;
             }
         }
-        if let Some(own) = line.strip_prefix("event: ") {
-            own.clone_into(&mut kind);
+        if let Some(name) = line.strip_prefix("event: ") {
+            name.clone_into(&mut kind);
         }
         if let Some(data) = line.strip_prefix("data: ").filter(|_| kind != "news") {
             seen.push(format!("{kind} {data}"));

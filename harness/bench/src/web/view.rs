@@ -91,13 +91,13 @@ pub struct LiveRow {
 impl LiveRow {
     /// The column of the station that sends, in a row of a shared line.
     pub fn sender(&self) -> Option<usize> {
-        let sender = self.cells.iter().find(|own| own.2 == ARROWS[0].0);
-        sender.map(|own| own.0)
+        let sender = self.cells.iter().find(|cell| cell.2 == ARROWS[0].0);
+        sender.map(|cell| cell.0)
     }
 
     /// Whether no receiver has what a row of a shared line shows, or not as it was sent.
     pub fn is_damaged(&self) -> bool {
-        self.cells.iter().any(|own| own.2 == ARROWS[2].0)
+        self.cells.iter().any(|cell| cell.2 == ARROWS[2].0)
     }
 
     /// A row of a shared line: what one station sends goes to another, or to all where `to` is `None`. There are `columns` stations.
