@@ -52,7 +52,7 @@ impl Delay {
 }
 
 /// What is passed on: when, what, and since when it could be.
-type Waiting = (Instant, Outgoing, time::Instant);
+type HeldByte = (Instant, Outgoing, time::Instant);
 
 /// An inner link that the bench has a port at.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ pub struct InnerLink {
     pub place: usize,
     ports: InnerPorts,
     pub tamper: Tamper,
-    queue: VecDeque<Waiting>,
+    queue: VecDeque<HeldByte>,
     free: Instant,
     last_arrival: Instant,
     pub log: Vec<LineByte>,

@@ -208,11 +208,7 @@ impl<A: Accounting> PortEnd<A> {
     }
 
     /// Takes what has come.
-    pub fn collect(
-        &mut self,
-        (told, now): (Instant, Instant),
-        byte_time: Span,
-    ) -> Result<(), Trouble> {
+    pub fn collect(&mut self, told: Instant, now: Instant, byte_time: Span) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
         let mut result = self.wire.receive(&mut bytes);
         if let Some(echo) = &mut self.echo

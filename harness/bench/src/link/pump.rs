@@ -397,9 +397,7 @@ impl<A: Accounting> Pump<A> {
         let told = self.told.get();
         for port in &mut self.ports {
             if self.trouble.is_none() {
-                let times = (told, now);
-                let done = port.collect(times, self.octet_time);
-                self.trouble = done.err();
+                self.trouble = port.collect(told, now, self.octet_time).err();
             }
         }
         // Interposers forward bytes even if the conversation has ended with trouble.

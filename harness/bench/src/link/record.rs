@@ -87,11 +87,11 @@ pub struct Recording<'l, L: ?Sized> {
     /// Trouble that has been recorded.
     trouble: Option<Trouble>,
     /// What the caller knows; `None` where time is virtual, as nothing changes between two calls there.
-    known: Option<Known>,
+    known: Option<CallerView>,
 }
 
 /// What the caller knows of a link in real time.
-struct Known {
+struct CallerView {
     now: Instant,
     busy: bool,
     lead: Lead,
@@ -100,7 +100,7 @@ struct Known {
     came: [VecDeque<(Instant, Heard)>; PORTS],
 }
 
-impl Known {
+impl CallerView {
     fn new() -> Self {
         Self {
             now: Instant::START,
@@ -133,7 +133,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             tapped: BTreeMap::new(),
             scenario: Vec::new(),
             trouble: None,
-            known: real.then(Known::new),
+            known: real.then(CallerView::new),
         }
     }
 

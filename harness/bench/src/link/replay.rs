@@ -44,12 +44,12 @@ pub struct Replay {
     /// Waits since the last event that was taken, or since time has passed.
     idle: (u32, usize),
     /// The state as of the last look; `None` where the record has no looks.
-    known: Option<Known>,
+    known: Option<ReplayState>,
 }
 
 /// What the caller knows of a link in real time.
 #[derive(Clone, Debug)]
-struct Known {
+struct ReplayState {
     busy: bool,
     lead: Lead,
     pause: Option<Instant>,
@@ -62,7 +62,7 @@ struct Known {
     silence: Span,
 }
 
-impl Default for Known {
+impl Default for ReplayState {
     fn default() -> Self {
         Self {
             busy: false,
@@ -116,7 +116,7 @@ impl Replay {
             trouble: None,
             strayed: None,
             idle: (0, 0),
-            known: looks.then(Known::default),
+            known: looks.then(ReplayState::default),
         }
     }
 
@@ -460,9 +460,9 @@ impl Link for Replay {
                 self.now = Instant::START;
                 if let Some(known) = &mut self.known {
                     let lead = known.lead;
-                    *known = Known {
+                    *known = ReplayState {
                         lead,
-                        ..Known::default()
+                        ..ReplayState::default()
                     };
                     self.look(None);
                 }

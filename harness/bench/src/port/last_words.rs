@@ -27,8 +27,7 @@ pub struct LastWords {
 /// They could not be sent.
 #[derive(Debug, thiserror::Error)]
 #[error("{name}: {error}")]
-pub struct Unsaid {
-    /// The wire.
+pub struct LastWordsError {
     name: String,
     error: std::io::Error,
 }
@@ -60,10 +59,10 @@ impl LastWords {
     ///
     /// # Errors
     /// The port does not take them.
-    pub fn say(&self, pieces: &Pieces) -> Result<(), Unsaid> {
+    pub fn say(&self, pieces: &Pieces) -> Result<(), LastWordsError> {
         let parts = (self.parts)(pieces);
         let said = parts.iter().try_for_each(|part| self.write(part));
-        said.map_err(|error| Unsaid {
+        said.map_err(|error| LastWordsError {
             name: self.name.clone(),
             error,
         })

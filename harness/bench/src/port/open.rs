@@ -104,12 +104,7 @@ pub enum OpenError {
     },
     /// No host, or it refuses.
     #[error("failed to connect to {address}: {error}. {}", unconnected(error))]
-    Connect {
-        /// Where to.
-        address: String,
-        /// Why not.
-        error: io::Error,
-    },
+    Connect { address: String, error: io::Error },
     /// The other end is no RFC 2217 server, or cannot do 8O1.
     #[error("{address}: {error}")]
     Negotiation {
@@ -119,11 +114,7 @@ pub enum OpenError {
     },
     /// Anything else.
     #[error("failed to open {port}: {error}")]
-    Other {
-        port: String,
-        /// Why not.
-        error: io::Error,
-    },
+    Other { port: String, error: io::Error },
 }
 
 fn by(holder: Option<&OtherProgram>) -> String {

@@ -335,7 +335,8 @@ impl Serial {
             &mut fd.as_fd(),
             byte,
             self.odd,
-            (self.byte_time, &mut self.hasty),
+            self.byte_time,
+            &mut self.hasty,
         )?;
         self.switches.note(idle, Instant::now());
         Ok(())
@@ -370,7 +371,8 @@ fn send_wrong_parity(
     port: &mut impl ParityPort,
     byte: u8,
     odd: bool,
-    (byte_time, hasty): (Duration, &mut bool),
+    byte_time: Duration,
+    hasty: &mut bool,
 ) -> io::Result<Duration> {
     port.drain()?;
     let start = Instant::now();

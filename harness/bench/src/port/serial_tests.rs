@@ -8,12 +8,12 @@ use std::os::unix::ffi::OsStrExt;
 
 /// A port that writes down what is done to it, and fails at one of the steps.
 #[derive(Default)]
-struct Noted {
+struct PortLog {
     done: Vec<String>,
     fails_at: Option<&'static str>,
 }
 
-impl Noted {
+impl PortLog {
     fn note(&mut self, step: String) -> io::Result<()> {
         let fails = self.fails_at == Some(step.as_str());
         self.done.push(step);
@@ -24,7 +24,7 @@ impl Noted {
     }
 }
 
-impl ParityPort for Noted {
+impl ParityPort for PortLog {
     fn drain(&mut self) -> io::Result<()> {
         std::thread::sleep(Duration::from_millis(2));
         self.note("drain".to_owned())
@@ -41,14 +41,9 @@ impl ParityPort for Noted {
 
 #[test]
 fn the_parity_is_switched_between_drained_bytes() {
-    let mut port = Noted::default();
-    let gap = send_wrong_parity(
-        &mut port,
-        0x13,
-        true,
-        (Duration::from_millis(5), &mut false),
-    )
-    .expect("sent");
+    let mut port = PortLog::default();
+    let gap = send_wrong_parity(&mut port, 0x13, true, Duration::from_millis(5), &mut false)
+        .expect("sent");
     assert_eq!(port.done, ["drain", "even", "13", "drain", "odd"]);
     // The second drain ends before the byte can have left: some drivers do so.
     assert!(gap >= Duration::from_millis(5), "{gap:?}");
@@ -94,11 +89,11 @@ fn the_parity_is_right_again_after_every_failure() {
         ("13", &["drain", "even", "13", "odd"]),
         ("odd", &["drain", "even", "13", "drain", "odd"]),
     ] {
-        let mut port = Noted {
+        let mut port = PortLog {
             fails_at: Some(fails_at),
-            ..Noted::default()
+            ..PortLog::default()
         };
-        let error = send_wrong_parity(&mut port, 0x13, true, (Duration::ZERO, &mut false))
+        let error = send_wrong_parity(&mut port, 0x13, true, Duration::ZERO, &mut false)
             .expect_err(fails_at);
         assert_eq!(error.kind(), io::ErrorKind::BrokenPipe, "{fails_at}");
         assert_eq!(port.done, done, "{fails_at}");
@@ -127,13 +122,13 @@ fn is_odd(master: &OwnedFd) -> bool {
 }
 
 /// The port of a pseudo terminal, looked at from its other end at each byte.
-struct Watched<'a> {
+struct WatchedPort<'a> {
     master: &'a OwnedFd,
     slave: BorrowedFd<'a>,
     odd_at_byte: Vec<bool>,
 }
 
-impl ParityPort for Watched<'_> {
+impl ParityPort for WatchedPort<'_> {
     fn drain(&mut self) -> io::Result<()> {
         self.slave.drain()
     }
@@ -157,13 +152,13 @@ fn a_pty_shows_even_parity_at_the_byte_and_odd_around_it() {
     let (master, slave, _) = terminal();
     switch_parity(&slave, true).expect("kept");
     assert!(is_odd(&master));
-    let mut port = Watched {
+    let mut port = WatchedPort {
         master: &master,
         slave: slave.as_fd(),
         odd_at_byte: Vec::new(),
     };
     port.put(0x12).expect("a good byte");
-    send_wrong_parity(&mut port, 0x13, true, (Duration::ZERO, &mut false)).expect("a bad byte");
+    send_wrong_parity(&mut port, 0x13, true, Duration::ZERO, &mut false).expect("a bad byte");
     port.put(0x14).expect("a good byte");
     assert_eq!(port.odd_at_byte, [true, false, true]);
     assert!(is_odd(&master));

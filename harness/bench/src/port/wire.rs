@@ -64,7 +64,7 @@ pub struct Wire {
     fd: OwnedFd,
     name: String,
     coding: Coding,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<WirePiece>,
     /// Bytes in `waiting`.
     bytes_waiting: usize,
     /// Line errors of which it is not known at which byte they were.
@@ -80,7 +80,7 @@ pub struct Wire {
 }
 
 #[derive(Debug)]
-enum Waiting {
+enum WirePiece {
     /// Coded bytes.
     Bytes(VecDeque<u8>),
     WrongParity(u8),
@@ -224,8 +224,8 @@ impl Wire {
             )));
         }
         let waiting = match (&mut self.coding, outgoing) {
-            (Coding::Serial(..), Outgoing::WrongParity(byte)) => Waiting::WrongParity(byte),
-            (Coding::Serial(..), Outgoing::Break(span)) => Waiting::Break(span),
+            (Coding::Serial(..), Outgoing::WrongParity(byte)) => WirePiece::WrongParity(byte),
+            (Coding::Serial(..), Outgoing::Break(span)) => WirePiece::Break(span),
             (Coding::Marked(_), Outgoing::WrongParity(byte)) => {
                 return self.queue(mark(Received::bad(byte, LineError::Parity)).as_bytes());
             }
@@ -252,11 +252,11 @@ impl Wire {
 
     fn queue(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
         self.bytes_waiting += bytes.len();
-        if let Some(Waiting::Bytes(queue)) = self.waiting.back_mut() {
+        if let Some(WirePiece::Bytes(queue)) = self.waiting.back_mut() {
             queue.extend(bytes);
         } else {
             let queue = bytes.iter().copied().collect();
-            self.waiting.push_back(Waiting::Bytes(queue));
+            self.waiting.push_back(WirePiece::Bytes(queue));
         }
         Ok(())
     }
@@ -268,7 +268,7 @@ impl Wire {
     pub fn flush(&mut self) -> Result<(), Trouble> {
         while let Some(first) = self.waiting.front_mut() {
             match first {
-                Waiting::Bytes(queue) => match rustix::io::write(&self.fd, queue.as_slices().0) {
+                WirePiece::Bytes(queue) => match rustix::io::write(&self.fd, queue.as_slices().0) {
                     Ok(taken) => {
                         if let Coding::Serial(_, serial) = &mut self.coding {
                             serial.wrote(taken);
@@ -283,12 +283,12 @@ impl Wire {
                     Err(Errno::INTR) => continue,
                     Err(error) => return Err(self.lost(error)),
                 },
-                Waiting::WrongParity(byte) => {
+                WirePiece::WrongParity(byte) => {
                     let byte = *byte;
                     self.send_wrong_parity(byte)?;
                     self.bytes_waiting -= 1;
                 }
-                Waiting::Break(span) => {
+                WirePiece::Break(span) => {
                     let span = *span;
                     let sent = match &mut self.coding {
                         Coding::Serial(_, serial) => serial.send_break(&self.fd, span),

@@ -125,7 +125,7 @@ pub fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
 pub struct Problems {
     source: NamedSource<Arc<str>>,
     problems: Vec<Problem>,
-    shown: Vec<Shown>,
+    shown: Vec<ProblemReport>,
 }
 
 impl Problems {
@@ -136,7 +136,7 @@ impl Problems {
         let shown = problems
             .iter()
             .take(MAX_SHOWN)
-            .map(|problem| Shown {
+            .map(|problem| ProblemReport {
                 source: source.clone(),
                 problem: problem.clone(),
             })
@@ -195,20 +195,20 @@ impl fmt::Display for Problems {
 impl std::error::Error for Problems {}
 
 #[derive(Debug)]
-struct Shown {
+struct ProblemReport {
     source: NamedSource<Arc<str>>,
     problem: Problem,
 }
 
-impl fmt::Display for Shown {
+impl fmt::Display for ProblemReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.problem.message)
     }
 }
 
-impl std::error::Error for Shown {}
+impl std::error::Error for ProblemReport {}
 
-impl Diagnostic for Shown {
+impl Diagnostic for ProblemReport {
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         let help = self.problem.help.as_ref()?;
         Some(Box::new(help))

@@ -24,28 +24,18 @@ pub struct Source {
 pub enum SourceError {
     /// It cannot be read.
     #[error("failed to read {name}: {error}")]
-    Unreadable {
-        /// The file.
-        name: String,
-        /// The operating system's error.
-        error: std::io::Error,
-    },
+    Unreadable { name: String, error: std::io::Error },
     /// It is a folder, a device, a FIFO or the like.
     #[error(
         "{name} is not a regular file; a text file or the pipe of a shell substitution is expected"
     )]
-    NotAFile {
-        name: String,
-    },
+    NotAFile { name: String },
     /// It is too large.
     #[error("{name} has more than {} KiB; a short text is expected", MAX_SIZE >> 10)]
-    TooLarge {
-        name: String,
-    },
+    TooLarge { name: String },
     /// A line is too long to be shown.
     #[error("{name}:{line}: the line has more than {MAX_LINE} characters; split it")]
     LongLine {
-        /// The file.
         name: String,
         /// Which line, counted from 1.
         line: usize,
@@ -53,7 +43,6 @@ pub enum SourceError {
     /// It is not text.
     #[error("{name} is not a text: byte {offset} is {byte:02X}; a text file in UTF-8 is expected")]
     NotText {
-        /// The file.
         name: String,
         offset: usize,
         /// What stands there.

@@ -15,11 +15,11 @@ pub(super) struct AdapterClock {
     period: Option<Span>,
     /// The resolution of stamps.
     tick: Span,
-    last: Option<Last>,
+    last: Option<LastStamp>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastStamp {
     /// When it was read.
     read: Instant,
     /// The adapter's time, with whole periods.
@@ -55,7 +55,7 @@ impl AdapterClock {
             }
             None => seen,
         };
-        self.last = Some(Last { read, stamp, zero });
+        self.last = Some(LastStamp { read, stamp, zero });
         let at = (units(stamp) + zero + units(self.tick)).clamp(0, read_units);
         Instant::START + Span::from_units(u64::try_from(at).unwrap_or_default())
     }

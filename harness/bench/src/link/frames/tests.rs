@@ -14,17 +14,17 @@ type Dialect = fn(&str) -> &'static str;
 const LONG: Span = Span::from_millis(60_000);
 
 /// What a client has said so far.
-type Said = Arc<Mutex<Vec<String>>>;
+type Transcript = Arc<Mutex<Vec<String>>>;
 
 /// A server that answers each piece of a client's stream, up to one of these characters, with what `answer` gives.
 fn server(
     greeting: &'static str,
     ends: &'static [u8],
     answer: impl Fn(&str) -> &'static str + Send + 'static,
-) -> (String, Said) {
+) -> (String, Transcript) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
-    let said = Said::default();
+    let said = Transcript::default();
     let list = Arc::clone(&said);
     std::thread::spawn(move || {
         let (mut stream, _) = listener.accept().expect("a client");
@@ -47,7 +47,7 @@ fn server(
     (address, said)
 }
 
-fn slcan(answer: impl Fn(&str) -> &'static str + Send + 'static) -> (String, Said) {
+fn slcan(answer: impl Fn(&str) -> &'static str + Send + 'static) -> (String, Transcript) {
     server("", b"\r", answer)
 }
 
@@ -216,7 +216,7 @@ fn canable_2(command: &str) -> &'static str {
     }
 }
 
-fn opening(said: &Said, last: &str) -> String {
+fn opening(said: &Transcript, last: &str) -> String {
     let said = said.lock().expect("a list").concat().replace('\r', " ");
     let end = said.find(last).expect("said") + last.len();
     said[..end].to_owned()

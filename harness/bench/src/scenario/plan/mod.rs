@@ -184,7 +184,7 @@ fn steps<L: Language>(
                 let (to_send, to_receive) = action.pieces();
                 sent += to_send;
                 expected += to_receive;
-                if let Some(problem) = too_long((sent, room), expected, step.span) {
+                if let Some(problem) = too_long(sent, room, expected, step.span) {
                     found.push(problem);
                     break;
                 }
@@ -206,7 +206,7 @@ fn steps<L: Language>(
     steps
 }
 
-fn too_long((sent, room): (usize, usize), expected: usize, span: TextSpan) -> Option<Problem> {
+fn too_long(sent: usize, room: usize, expected: usize, span: TextSpan) -> Option<Problem> {
     let (what, remedy) = if expected > MAX_BYTES {
         let what = format!("more than {MAX_BYTES} bytes expected in one scenario");
         (what, "fewer bytes, in several scenarios")
