@@ -11,14 +11,14 @@ use std::time::Duration;
 use thiserror::Error as Derived;
 
 /// Drives, or why there are none.
-type Lent = Result<Box<dyn AxisDrives>, Error>;
+type OpenedDrives = Result<Box<dyn AxisDrives>, Error>;
 
 /// What a bus lends to other programs.
 pub struct Embedding {
     /// A simulated ring of this many drives with these header lines; empty for drives that are released and started by their inputs.
-    pub simulated: fn(u8, &str) -> Lent,
+    pub simulated: fn(u8, &str) -> OpenedDrives,
     /// The drives of a rig, locked for other programs; whether motion is allowed.
-    pub open: fn(&Rig, bool) -> Lent,
+    pub open: fn(&Rig, bool) -> OpenedDrives,
     /// A simulated ring of this many drives with these header lines, served at this address.
     pub served: fn(u8, &str, &str) -> Result<ServedThread, Error>,
 }

@@ -97,7 +97,7 @@ impl FromStr for Partition {
         };
         let (spread, numbers) = text.split_once(':').ok_or_else(wrong)?;
         let all = [Spread::Slice, Spread::Hash];
-        let spread = all.into_iter().find(|own| own.name() == spread);
+        let spread = all.into_iter().find(|known| known.name() == spread);
         let (number, of) = numbers.split_once('/').ok_or_else(wrong)?;
         let digits = |text: &str| {
             let plain = text.bytes().all(|byte| byte.is_ascii_digit());
@@ -158,17 +158,17 @@ mod tests {
             for of in [1, 2, 3, 7, 60] {
                 for (place, name) in names.iter().enumerate() {
                     let parts = (1..=of).map(|m| part(&format!("{spread}:{m}/{of}")));
-                    let owners = parts.filter(|own| own.has(place, name));
+                    let owners = parts.filter(|part| part.has(place, name));
                     assert_eq!(owners.count(), 1, "{spread} {of} {name}");
                 }
             }
         }
         let slice = part("slice:2/3");
-        let own = (0..8).filter(|place| slice.has(*place, names[*place]));
-        assert_eq!(own.collect::<Vec<_>>(), [1, 4, 7]);
+        let places = (0..8).filter(|place| slice.has(*place, names[*place]));
+        assert_eq!(places.collect::<Vec<_>>(), [1, 4, 7]);
         // A name stays in its part wherever it stands.
-        let own = part("hash:1/3");
-        assert!((0..9).all(|place| own.has(place, "a") == own.has(0, "a")));
+        let hash = part("hash:1/3");
+        assert!((0..9).all(|place| hash.has(place, "a") == hash.has(0, "a")));
     }
 
     #[test]

@@ -125,7 +125,7 @@ pub fn has_run(path: &Path, record: &str) -> Result<(), String> {
 }
 
 fn folder_of(path: &Path) -> &Path {
-    let folder = path.parent().filter(|own| *own != Path::new(""));
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
     folder.unwrap_or(Path::new("."))
 }
 
@@ -133,15 +133,16 @@ fn folder_of(path: &Path) -> &Path {
 pub(crate) fn near_in_folder(path: &Path) -> Option<String> {
     let wanted = path.file_name()?.to_string_lossy().to_lowercase();
     let names = std::fs::read_dir(folder_of(path)).ok()?.flatten();
-    let names = names.map(|own| own.file_name().to_string_lossy().into_owned());
-    let names = names.take(MOST_NAMES).map(|own| {
+    let names = names.map(|file| file.file_name().to_string_lossy().into_owned());
+    let names = names.take(MOST_NAMES).map(|name| {
         (
-            strsim::damerau_levenshtein(&wanted, &own.to_lowercase()),
-            own,
+            strsim::damerau_levenshtein(&wanted, &name.to_lowercase()),
+            name,
         )
     });
     let far = wanted.chars().count().max(3) / 3;
-    names.filter(|own| own.0 <= far).min().map(|own| own.1)
+    let nearest = names.filter(|(distance, _)| *distance <= far).min();
+    nearest.map(|(_, name)| name)
 }
 
 /// Opens a regular file, or the pipe of a shell substitution `<(...)`, which this process has open already.
@@ -149,7 +150,7 @@ pub(crate) fn near_in_folder(path: &Path) -> Option<String> {
 /// # Errors
 /// As of [`open`].
 pub fn open_input(path: &Path) -> io::Result<File> {
-    let pipe = |path: &Path| std::fs::metadata(path).is_ok_and(|own| own.file_type().is_fifo());
+    let pipe = |path: &Path| std::fs::metadata(path).is_ok_and(|file| file.file_type().is_fifo());
     match is_descriptor(path) && pipe(path) {
         true => File::open(path),
         false => open(path, Links::Follow),
@@ -160,7 +161,8 @@ pub fn open_input(path: &Path) -> io::Result<File> {
 fn is_descriptor(path: &Path) -> bool {
     let folders = ["/dev/fd", "/proc/self/fd"].map(Path::new);
     let streams = ["/dev/stdin", "/dev/stdout", "/dev/stderr"].map(Path::new);
-    path.parent().is_some_and(|own| folders.contains(&own)) || streams.contains(&path)
+    let folder = path.parent();
+    folder.is_some_and(|folder| folders.contains(&folder)) || streams.contains(&path)
 }
 
 /// Reads a regular file of at most this many bytes.
@@ -192,7 +194,7 @@ pub fn write(
     path: &Path,
     write: impl FnOnce(BufWriter<&File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let kind = std::fs::metadata(path).map(|own| own.file_type()).ok();
+    let kind = std::fs::metadata(path).map(|file| file.file_type()).ok();
     if kind.is_some_and(|kind| kind.is_char_device() || kind.is_fifo() && is_descriptor(path)) {
         let flags = OFlags::NOCTTY.bits().cast_signed();
         let file = OpenOptions::new()

@@ -45,7 +45,7 @@ pub(crate) fn interrupt() -> std::io::Result<()> {
 
 /// The same without SIGINT: Ctrl-C ends what is under way, and not the program.
 pub fn interrupt_flag_without_ctrl_c() -> Arc<AtomicBool> {
-    flag(ending().filter(|own| *own != SIGINT).chain([SIGTSTP]))
+    flag(ending().filter(|signal| *signal != SIGINT).chain([SIGTSTP]))
 }
 
 /// Does something at each SIGINT (Ctrl-C) from now on, in a thread of its own.

@@ -12,11 +12,7 @@ pub enum EvidenceError {
     #[error("{0} is not empty; name a new or empty folder for the evidence")]
     NotEmpty(String),
     #[error("failed to use {path}: {error}")]
-    File {
-        path: String,
-        /// Why not.
-        error: io::Error,
-    },
+    File { path: String, error: io::Error },
     /// The record is damaged.
     #[error("{RECORD}: {0}")]
     Record(#[from] RecordError),

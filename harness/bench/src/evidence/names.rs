@@ -11,12 +11,9 @@ pub struct Names {
 }
 
 impl Names {
-    /// Of a part of a run: these names come first, in this order, and no other scenario has a name of `all`.
-    pub fn planned(planned: VecDeque<String>, all: BTreeSet<String>) -> Self {
-        Self {
-            planned: planned,
-            given: all,
-        }
+    /// Of a part of a run: these names come first, in this order, and no other scenario has a name of `given`.
+    pub fn planned(planned: VecDeque<String>, given: BTreeSet<String>) -> Self {
+        Self { planned, given }
     }
 
     /// The name of the next scenario, whose file has this name.

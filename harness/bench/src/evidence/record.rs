@@ -360,7 +360,8 @@ impl RecordLine {
     /// The line for a scenario with this title on rings of these sizes.
     pub fn of_case(
         name: &str,
-        (title, drives): (&str, &str),
+        title: &str,
+        drives: &str,
         sha256: Option<String>,
         outcome: &Outcome,
     ) -> Self {

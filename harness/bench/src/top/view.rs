@@ -25,14 +25,14 @@ const FEW_KEYS: &str = "  q quit  ? help";
 
 /// What a line looks like.
 #[derive(Clone, Copy)]
-enum Look {
+enum Face {
     Plain,
     Bold,
     Reverse,
     Error,
 }
 
-impl Look {
+impl Face {
     /// No colours but red: they are the terminal's own, and what is red says in words why.
     fn style(self, colour: bool) -> Style {
         match self {
@@ -65,7 +65,7 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
     top.resize(room);
     let head = head.into_iter().enumerate();
     let stays = head.filter(|(line, _)| *line == 0 && head_room > 0 || *line > left_out);
-    let mut lines: Vec<(String, Look)> = stays.map(|(_, line)| line).collect();
+    let mut lines: Vec<(String, Face)> = stays.map(|(_, line)| line).collect();
     if matches!(top.entry, KeyTarget::Help) {
         lines.extend(help());
         lines.truncate(height.saturating_sub(1));
@@ -73,13 +73,13 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
         lines.extend(body(top, width, room));
         let below = height.saturating_sub(foot_room);
         lines.truncate(below);
-        lines.resize(below, (String::new(), Look::Plain));
+        lines.resize(below, (String::new(), Face::Plain));
         lines.extend(foot(top, width, height));
     }
     for (y, (text, look)) in (area.y..area.bottom()).zip(&lines) {
         let style = look.style(colour);
         buffer.set_stringn(area.x, y, cut(text.clone(), width), width, style);
-        if matches!(look, Look::Reverse) {
+        if matches!(look, Face::Reverse) {
             buffer.set_style(Rect::new(area.x, y, area.width, 1), style);
         }
     }
@@ -121,7 +121,7 @@ fn clock(at: Span) -> String {
     format!("{hours:02}:{minutes:02}:{:02}", seconds % 60)
 }
 
-fn head(top: &Top) -> Vec<(String, Look)> {
+fn head(top: &Top) -> Vec<(String, Face)> {
     let reading = &top.reading;
     let mut first = format!(
         "drivebench top  rig {}  {}",
@@ -131,17 +131,17 @@ fn head(top: &Top) -> Vec<(String, Look)> {
     if top.is_paused() {
         first.push_str("  paused");
     }
-    let mut lines = vec![(first, Look::Bold)];
+    let mut lines = vec![(first, Face::Bold)];
     for part in 0..top.heading.parts.len().max(reading.parts.len()) {
         let what = top.heading.parts.get(part);
-        lines.extend(what.map(|what| (what.clone(), Look::Plain)));
+        lines.extend(what.map(|what| (what.clone(), Face::Plain)));
         let read = reading.parts.get(part).into_iter().flatten();
         lines.extend(read.map(|HeadLine { text, is_error }| {
-            let look = if *is_error { Look::Error } else { Look::Plain };
+            let look = if *is_error { Face::Error } else { Face::Plain };
             (text.clone(), look)
         }));
     }
-    lines.push((counts(top), Look::Plain));
+    lines.push((counts(top), Face::Plain));
     lines
 }
 
@@ -154,7 +154,7 @@ fn counts(top: &Top) -> String {
     format!("{drives}: {}", words.join(", "))
 }
 
-fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
+fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Face)> {
     let rows = top.rows();
     let form = top.heading.form;
     // The last column takes what is left.
@@ -181,7 +181,7 @@ fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
     let mut heading = line(&form.heads());
     let length = heading.chars().count();
     heading.extend(std::iter::repeat_n(' ', width.saturating_sub(length)));
-    let mut lines = vec![(heading, Look::Reverse)];
+    let mut lines = vec![(heading, Face::Reverse)];
     let shown = rows.iter().skip(top.first).take(room);
     lines.extend(shown.map(|row| {
         let cells: Vec<_> = (0..form.columns.len())
@@ -198,7 +198,7 @@ fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Look)> {
             (false, true, filter) => format!("no {drive} in error has `{filter}` in its row"),
             (false, false, filter) => format!("no {drive} has `{filter}` in its row"),
         };
-        lines.push((why, Look::Plain));
+        lines.push((why, Face::Plain));
     }
     lines
 }
@@ -229,20 +229,20 @@ fn cut(text: String, width: usize) -> String {
     kept + "..."
 }
 
-fn look(row: &TopRow) -> Look {
+fn look(row: &TopRow) -> Face {
     if row.in_error {
-        Look::Error
+        Face::Error
     } else {
-        Look::Plain
+        Face::Plain
     }
 }
 
-fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
+fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Face)> {
     let mut all: Vec<_> = top.events().collect();
     let room = EVENTS.min(height / LINES_EACH);
     // The latest first.
     all.sort_by_key(|one| std::cmp::Reverse(one.last));
-    let mut lines: Vec<(String, Look)> = all
+    let mut lines: Vec<(String, Face)> = all
         .iter()
         .take(room)
         .map(|one| {
@@ -257,18 +257,18 @@ fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Look)> {
                 _ => text,
             };
             let look = if one.is_error {
-                Look::Error
+                Face::Error
             } else {
-                Look::Plain
+                Face::Plain
             };
             (text, look)
         })
         .collect();
     let hidden = all.iter().skip(room).map(|one| one.count).sum::<u64>() + top.reading.others;
     if hidden > 0 {
-        lines.push((format!("and {hidden} other messages"), Look::Error));
+        lines.push((format!("and {hidden} other messages"), Face::Error));
     }
-    lines.push((status_line(top, width), Look::Reverse));
+    lines.push((status_line(top, width), Face::Reverse));
     lines
 }
 
@@ -302,10 +302,10 @@ fn status_line(top: &Top, width: usize) -> String {
     text + keys
 }
 
-fn help() -> Vec<(String, Look)> {
-    let mut lines = vec![(String::new(), Look::Plain)];
+fn help() -> Vec<(String, Face)> {
+    let mut lines = vec![(String::new(), Face::Plain)];
     for (keys, what) in HELP {
-        lines.push((format!("  {keys:20}  {what}"), Look::Plain));
+        lines.push((format!("  {keys:20}  {what}"), Face::Plain));
     }
     lines
 }

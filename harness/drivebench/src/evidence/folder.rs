@@ -182,7 +182,7 @@ impl Folder {
 
     /// Counts a scenario, all its attempts done.
     pub fn done(&mut self, name: &str, drives: &str, title: &str, outcome: &Outcome) {
-        let case = RecordLine::of_case(name, (title, drives), self.text.clone(), outcome);
+        let case = RecordLine::of_case(name, title, drives, self.text.clone(), outcome);
         self.writer.line(&case);
         self.cases.extend(Settled::of(&case));
     }

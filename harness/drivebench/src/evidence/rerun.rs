@@ -93,7 +93,8 @@ fn scenario(
     let title = entry.scenario.title.as_str();
     tape.lines.push(RecordLine::of_case(
         name,
-        (title, &entry.drives()),
+        title,
+        &entry.drives(),
         sha256.clone(),
         &outcome,
     ));

@@ -42,7 +42,9 @@ impl Protocol {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Act {
     /// To be a station of the bus.
-    Join { listen_only: bool },
+    Join {
+        listen_only: bool,
+    },
     /// To be none any more, once its frames are sent.
     Leave,
     Send(Frame),
