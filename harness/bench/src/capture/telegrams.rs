@@ -1,9 +1,10 @@
 //! Captures of a line of octets that all stations share: who sent which octet.
 
 use super::{Capture, CaptureError, line_byte};
+use crate::report::pcapng::error_named;
 use crate::report::pcapng_frames::MASTER;
 use crate::report::pcapng_telegrams::PacketOctet;
-use harness_proto::line::{LineError, Rate};
+use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::{Channel, LineByte, Trace};
 use serde::Deserialize;
@@ -64,12 +65,6 @@ struct OctetObject {
 
 impl OctetObject {
     fn read(&self) -> Result<(Option<u8>, PacketOctet), String> {
-        const ERRORS: [LineError; 4] = [
-            LineError::Parity,
-            LineError::Framing,
-            LineError::Break,
-            LineError::Overrun,
-        ];
         if self.t_ns > LATEST {
             return Err("its time is too late for any clock".to_owned());
         }
@@ -84,12 +79,10 @@ impl OctetObject {
         };
         let error = match (self.received, self.error.as_deref()) {
             (None, Some("dropped")) | (Some(_), None) => None,
-            (Some(_), Some(name)) => Some(
-                ERRORS
-                    .into_iter()
-                    .find(|error| error.name() == name)
-                    .ok_or_else(|| format!("`{name}` is no error of a line"))?,
-            ),
+            (Some(_), Some(name)) => {
+                let error = error_named(name);
+                Some(error.ok_or_else(|| format!("`{name}` is no error of a line"))?)
+            }
             (None, _) => return Err("nothing was received, so it was dropped".to_owned()),
         };
         let octet = PacketOctet {

@@ -3,43 +3,23 @@
 use super::record::RecordLine;
 use crate::link::{Lead, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble};
 use crate::medium::{Heard, Pieces};
+use crate::report::pcapng::error_named;
+use crate::scenario::run::record::{from_hex, hex};
 use harness_proto::can::{self, CanError, Frame};
-use harness_proto::line::{LineError, Received};
+use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
 
 /// The byte that a probe sends where its line does not name the bytes.
 const PROBED: u8 = 0x80;
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
-}
-
-fn unhex(text: &str) -> Option<Vec<u8>> {
-    let digits = text.as_bytes();
-    if !digits.len().is_multiple_of(2) || !digits.iter().all(u8::is_ascii_hexdigit) {
-        return None;
-    }
-    let pairs = digits.chunks(2);
-    pairs
-        .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok())
-        .collect()
-}
-
-const ERRORS: [LineError; 4] = [
-    LineError::Parity,
-    LineError::Framing,
-    LineError::Break,
-    LineError::Overrun,
-];
-
 fn received(byte: &str, error: Option<&str>) -> Option<Received> {
-    let [byte] = unhex(byte)?[..] else {
+    let [byte] = from_hex(byte)?[..] else {
         return None;
     };
     let error = match error {
         None => None,
-        Some(name) => Some(ERRORS.into_iter().find(|error| error.name() == name)?),
+        Some(name) => Some(error_named(name)?),
     };
     Some(Received { byte, error })
 }
@@ -218,7 +198,7 @@ impl RecordLine {
             Self::Begin { t } => LinkEvent::Begin(instant(t)),
             Self::Step { place } => LinkEvent::Step(*place),
             Self::Sent { ring, t, bytes } => {
-                LinkEvent::Sent(index(ring)?, instant(t), Pieces::Octets(unhex(bytes)?))
+                LinkEvent::Sent(index(ring)?, instant(t), Pieces::Octets(from_hex(bytes)?))
             }
             Self::SentFrames { ring, t, frames } => {
                 let frames: Option<_> = frames.iter().map(|frame| frame.parse().ok()).collect();
@@ -300,7 +280,7 @@ impl RecordLine {
                 bytes,
             } => {
                 let sent = match sent {
-                    Some(sent) => unhex(sent).filter(|sent| sent.len() == *count)?,
+                    Some(sent) => from_hex(sent).filter(|sent| sent.len() == *count)?,
                     None => vec![PROBED; *count],
                 };
                 LinkEvent::Probe(index(ring)?, instant(t), sent, all_received(bytes)?)

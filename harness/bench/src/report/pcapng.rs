@@ -54,6 +54,24 @@ pub const ERRORS: [(LineError, u8); 4] = [
     (LineError::Overrun, 0x0A),
 ];
 
+/// The event of bytes that arrived with this error.
+pub(super) fn event_of(error: LineError) -> u8 {
+    let row = ERRORS.iter().find(|(known, _)| *known == error);
+    row.map_or(RECEIVED, |(_, event)| *event)
+}
+
+/// The error that an event stands for.
+pub(crate) fn error_of(event: u8) -> Option<LineError> {
+    let row = ERRORS.iter().find(|(_, known)| *known == event);
+    row.map(|(error, _)| *error)
+}
+
+/// The error with this [name](LineError::name).
+pub(crate) fn error_named(name: &str) -> Option<LineError> {
+    let mut errors = ERRORS.iter().map(|(error, _)| *error);
+    errors.find(|error| error.name() == name)
+}
+
 /// Writes one or two rings of a run.
 ///
 /// # Errors
@@ -85,10 +103,9 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
 
 /// The packet of a byte of the link with this number.
 pub(crate) fn packet(block: &mut Block, link: usize, byte: &LineByte) {
-    let error = |(kind, event): &(LineError, u8)| (byte.error == Some(*kind)).then_some(*event);
     let event = match byte.received {
         None => LOST,
-        Some(_) => ERRORS.iter().find_map(error).unwrap_or(RECEIVED),
+        Some(_) => byte.error.map_or(RECEIVED, event_of),
     };
     block.begin(PACKET);
     block.put(&u32::try_from(link).unwrap_or(u32::MAX).to_le_bytes());

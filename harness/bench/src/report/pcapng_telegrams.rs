@@ -12,7 +12,9 @@
 //! `byte 3 sent nothing`, `byte 3 lost` for an octet that did not arrive, and `byte 3 after 50000 ns` for the time from the end of the octet before it.
 //! So nothing of the octets of a trace is lost, and [`crate::capture`] reads them back.
 
-use super::pcapng::{Block, COMMENT, END, ERRORS, LINK_TYPE, LOST, PACKET, header};
+use super::pcapng::{
+    Block, COMMENT, END, LINK_TYPE, LOST, PACKET, error_named, error_of, event_of, header,
+};
 use harness_proto::line::{BITS_PER_BYTE, LineError};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
@@ -100,12 +102,6 @@ pub(crate) fn packet(
     }
 }
 
-fn event_of(error: LineError) -> u8 {
-    let mut events = ERRORS.iter();
-    let row = events.find(|(known, _)| *known == error);
-    row.map_or(RECEIVED, |(_, event)| *event)
-}
-
 /// What differs from octets that arrived as they were sent, one after the other.
 fn comment(octets: &[LineByte], octet: Option<Span>) -> String {
     let mut text = String::new();
@@ -176,9 +172,7 @@ fn remarks(comment: &str) -> BTreeMap<usize, Remarks> {
             ["sent", byte] => remarks.sent = u8::from_str_radix(byte, 16).ok().map(Some),
             ["after", nanos, "ns"] => remarks.after = nanos.parse().ok().map(Span::from_nanos),
             [error] => {
-                let mut known = ERRORS.iter().map(|(error, _)| *error);
-                let known = known.find(|known| known.name() == *error);
-                remarks.error = known.or(remarks.error);
+                remarks.error = error_named(error).or(remarks.error);
             }
             _ => {}
         }
@@ -198,8 +192,7 @@ pub struct PacketOctet {
 /// Whether the time of a packet with this event is that of its first octet; `None` where the event says nothing of it. Programs of others
 /// write any event in front of good octets.
 pub fn time_of(event: u8) -> Option<bool> {
-    let damaged = ERRORS.iter().any(|(_, code)| *code == event);
-    (!damaged && event != LOST).then_some(![SENT, RECEIVED].contains(&event))
+    (error_of(event).is_none() && event != LOST).then_some(![SENT, RECEIVED].contains(&event))
 }
 
 /// The octets of a packet: of its event, its time and whether that is the time of its first octet, the octets that arrived, and its comment.
@@ -212,14 +205,14 @@ pub fn octets(
     comment: &str,
     octet: Span,
 ) -> Vec<PacketOctet> {
-    let of_event = ERRORS.iter().find(|(_, code)| *code == event);
+    let of_event = error_of(event);
     let remarks = remarks(comment);
     let mut found = pieces(arrived, &remarks);
     // A capture of others names the error in its event alone.
-    if let (Some((error, _)), true) = (of_event, found.iter().all(|octet| octet.error.is_none()))
+    if let (Some(error), true) = (of_event, found.iter().all(|octet| octet.error.is_none()))
         && let Some(first) = found.iter_mut().find(|octet| octet.received.is_some())
     {
-        first.error = Some(*error);
+        first.error = Some(error);
     }
     let distance = |place: usize| {
         let after = remarks.get(&place).and_then(|remarks| remarks.after);

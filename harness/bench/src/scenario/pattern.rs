@@ -2,6 +2,7 @@
 
 use super::expression::{self, Expression, Located, Scope};
 use super::problem::{Problem, TextSpan};
+use super::run::record::from_hex;
 use super::scanner::Scanner;
 use std::fmt::{self, Display};
 
@@ -99,7 +100,7 @@ impl Pattern {
             span: TextSpan::default(),
         };
         let mut items = Vec::new();
-        for equal in bytes.chunk_by(|one, other| one == other) {
+        for equal in bytes.chunk_by(|byte, next| byte == next) {
             match (equal, i64::try_from(equal.len())) {
                 ([byte, ..], Ok(times)) if equal.len() >= run => {
                     items.push(item(byte, Some(Located::number(times))));
@@ -182,17 +183,17 @@ fn expand(
             ItemKind::Number(number) => bytes.push(Expected::Byte(low_byte(number, scope)?)),
             ItemKind::Group(items) => expand(items, scope, most, bytes)?,
         }
-        let one = bytes.len() - before;
-        if one.saturating_mul(times).saturating_add(before) > most {
+        let length = bytes.len() - before;
+        if length.saturating_mul(times).saturating_add(before) > most {
             return Err(Problem::new(
                 item.span,
                 format!("more than {most} bytes in one line"),
                 "fewer bytes expected here",
             ));
         }
-        let more = if one == 0 { 0 } else { times - 1 };
+        let more = if length == 0 { 0 } else { times - 1 };
         for _ in 0..more {
-            bytes.extend_from_within(before..before + one);
+            bytes.extend_from_within(before..before + length);
         }
     }
     Ok(())
@@ -335,13 +336,6 @@ fn literal(scanner: &mut Scanner<'_>) -> Result<Vec<Expected>, Problem> {
         )
         .help(format!("did you mean `0{text}`?")));
     }
-    let nibble = |b: u8| char::from(b).to_digit(16).unwrap_or(0);
-    Ok(text
-        .as_bytes()
-        .chunks(2)
-        .map(|pair| {
-            let value = nibble(pair[0]) * 16 + nibble(pair[1]);
-            Expected::Byte(u8::try_from(value).unwrap_or(0))
-        })
-        .collect())
+    let bytes = from_hex(text).unwrap_or_default();
+    Ok(bytes.into_iter().map(Expected::Byte).collect())
 }

@@ -7,10 +7,12 @@ use super::super::{Assembly, Capture, CaptureError, ends, line_byte};
 use super::table::{Table, columns, first_line};
 use super::{Imported, ReadSettings};
 use crate::capture::line_formats;
+use crate::report::pcapng::error_named;
 use crate::report::pcapng_frames::{LOST, MASTER};
 use crate::report::pcapng_telegrams::PacketOctet;
+use crate::scenario::run::record::from_hex;
 use harness_proto::can::{CanError, Frame};
-use harness_proto::line::{LineError, Rate};
+use harness_proto::line::Rate;
 use harness_sim::record::FrameEnd;
 
 const BYTES: [&str; 6] = ["t_ns", "link", "n", "sent", "received", "status"];
@@ -53,30 +55,6 @@ fn nanos(table: &Table<'_>, column: usize) -> Result<u64, CaptureError> {
         .ok_or_else(|| table.wrong_field(column, "nanoseconds of at most a year are expected"))
 }
 
-/// Hexadecimal digits in pairs.
-fn octets(text: &str) -> Option<Vec<u8>> {
-    let digit = |character: u8| {
-        char::from(character)
-            .to_digit(16)
-            .and_then(|digit| u8::try_from(digit).ok())
-    };
-    let (pairs, rest) = text.as_bytes().as_chunks::<2>();
-    let pairs = pairs
-        .iter()
-        .map(|[high, low]| Some(digit(*high)? << 4 | digit(*low)?));
-    pairs.collect::<Option<_>>().filter(|_| rest.is_empty())
-}
-
-fn line_error(name: &str) -> Option<LineError> {
-    const ERRORS: [LineError; 4] = [
-        LineError::Parity,
-        LineError::Framing,
-        LineError::Break,
-        LineError::Overrun,
-    ];
-    ERRORS.into_iter().find(|error| error.name() == name)
-}
-
 /// Reads the table of the bytes of a ring.
 ///
 /// # Errors
@@ -90,7 +68,7 @@ pub(super) fn bytes(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, Capture
         let Some((ring, from, to)) = ends(&table.text(link)) else {
             return Err(table.wrong_field(link, "a link such as 98->97 is expected"));
         };
-        let byte = |column: usize| match octets(&table.text(column)).as_deref() {
+        let byte = |column: usize| match from_hex(&table.text(column)).as_deref() {
             Some([]) => Ok(None),
             Some([byte]) => Ok(Some(*byte)),
             _ => Err(table.wrong_field(column, "two hexadecimal digits or nothing are expected")),
@@ -99,7 +77,7 @@ pub(super) fn bytes(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, Capture
         let text = table.text(status);
         let error = match (received, text.as_ref()) {
             (None, "dropped") | (Some(_), "ok") => None,
-            (Some(_), name) if line_error(name).is_some() => line_error(name),
+            (Some(_), name) if error_named(name).is_some() => error_named(name),
             _ => return Err(table.wrong_field(status, "it does not fit what was received")),
         };
         let link = assembly.link(ring, from, to);
@@ -168,13 +146,13 @@ pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Importe
     let mut rows = Vec::new();
     while table.next()? {
         let (end, from) = (nanos(&table, time)?, station(&table, from)?);
-        let Some(octets) = octets(&table.text(data)) else {
+        let Some(octets) = from_hex(&table.text(data)) else {
             return Err(table.wrong_field(data, "pairs of hexadecimal digits are expected"));
         };
         let text = table.text(error);
         let damaged = match text.split_once(' ') {
             None if text.is_empty() => None,
-            Some((name, place)) => line_error(name).zip(place.parse::<usize>().ok()),
+            Some((name, place)) => error_named(name).zip(place.parse::<usize>().ok()),
             None => None,
         };
         if damaged.is_none() && !text.is_empty() {
@@ -194,7 +172,7 @@ pub(super) fn telegrams(bytes: &[u8], settings: &ReadSettings) -> Result<Importe
         rows.windows(2).all(follows)
     };
     let mut times = formats.iter().map(|format| format.octet_time());
-    let fastest = times.clone().last();
+    let fastest = times.clone().next_back();
     let fitting = times.find(|octet| apart(octet.as_nanos()));
     let octet = fitting.or(fastest).unwrap_or_default();
     let mut all = Vec::new();

@@ -6,7 +6,7 @@ use super::values::sent;
 use super::{Byte, CaptureError, OCTET, Reader};
 use crate::capture::frames::{self, FrameRead, Sender};
 use crate::capture::order::Place;
-use crate::report::pcapng::{COMMENT, ERRORS, HEADER, LOST, RECEIVED};
+use crate::report::pcapng::{COMMENT, HEADER, LOST, RECEIVED, error_of};
 use crate::report::pcapng_telegrams::{octets, time_of};
 use harness_proto::line::LineError;
 use harness_proto::time::Span;
@@ -273,10 +273,7 @@ impl Reader<'_> {
         let words = comments
             .last()
             .map(|comment| String::from_utf8_lossy(comment).into_owned());
-        let error = ERRORS
-            .iter()
-            .find(|(_, code)| *code == event)
-            .map(|(error, _)| *error);
+        let error = error_of(event);
         let received: Vec<Option<u8>> = match &self.bytes[arrived] {
             [] if event == LOST => vec![None],
             // A break without its byte is read as 00 (PARMRK, and every UART).

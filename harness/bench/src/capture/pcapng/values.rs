@@ -2,20 +2,14 @@
 
 use crate::capture::recorder::AWAY;
 use crate::report::pcapng::NANOSECONDS;
+use crate::scenario::run::record::from_hex;
 
 /// What the transmitter sent, where a comment says so: `sent 12`, `sent nothing`.
 pub(super) fn sent(comment: &[u8]) -> Option<Option<u8>> {
-    match comment.strip_prefix(b"sent ")? {
-        b"nothing" => Some(None),
-        [high, low] => {
-            let digit = |c: u8| {
-                char::from(c)
-                    .to_digit(16)
-                    .and_then(|d| u8::try_from(d).ok())
-            };
-            Some(Some(digit(*high)? << 4 | digit(*low)?))
-        }
-        _ => None,
+    let stated = std::str::from_utf8(comment.strip_prefix(b"sent ")?).ok()?;
+    match from_hex(stated).as_deref() {
+        Some([byte]) => Some(Some(*byte)),
+        _ => (stated == "nothing").then_some(None),
     }
 }
 

@@ -95,3 +95,12 @@ pub fn physical(scale: Scale, bytes: &[u8], units: units::DriveUnits) -> Option<
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
+
+/// The bytes of hexadecimal digits in pairs; `None` for any other text.
+pub fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digit = |digit: u8| char::from(digit).to_digit(16);
+    let byte = |[high, low]: &[u8; 2]| u8::try_from(digit(*high)? << 4 | digit(*low)?).ok();
+    let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+    let bytes = pairs.iter().map(byte).collect::<Option<_>>();
+    bytes.filter(|_| rest.is_empty())
+}
