@@ -121,14 +121,15 @@ const CUT: Span = Span::from_nanos(SYN_OCTETS + 1);
 /// and where it was idle for at least one octet after a complete telegram.
 pub fn runs(trace: &Trace) -> Vec<TelegramRun> {
     let octets = octets(trace);
-    let one = octet_time(octets.iter().map(|(from, octet)| (*from, octet))).unwrap_or(Span::ZERO);
+    let octet_time =
+        octet_time(octets.iter().map(|(from, octet)| (*from, octet))).unwrap_or(Span::ZERO);
     let mut all: Vec<TelegramRun> = Vec::new();
     for (from, octet) in octets {
         let complete = |run: &TelegramRun| run.said().is_some_and(|said| said.telegram().is_some());
         let parted = |last: &TelegramRun| {
             let distance = octet.at.since(last.at());
-            distance + CUT >= one * (SYN_OCTETS + 1) && distance > CUT
-                || distance >= one * 2 && complete(last)
+            distance + CUT >= octet_time * (SYN_OCTETS + 1) && distance > CUT
+                || distance >= octet_time * 2 && complete(last)
         };
         match all.last_mut() {
             Some(last) if last.from == from && !parted(last) => last.octets.push(octet),

@@ -91,10 +91,12 @@ impl<'a> Walk<'a> {
     fn resolve(&self, schema: &'a Value) -> &'a Value {
         let mut schema = schema;
         for _ in 0..MAX_DEPTH {
-            let reference = schema["$ref"].as_str().and_then(|r| r.strip_prefix('#'));
+            let reference = schema["$ref"]
+                .as_str()
+                .and_then(|path| path.strip_prefix('#'));
             let branch = schema["anyOf"]
                 .as_array()
-                .and_then(|all| all.iter().find(|one| one["type"] != "null"));
+                .and_then(|all| all.iter().find(|branch| branch["type"] != "null"));
             schema = match reference
                 .and_then(|path| self.root.pointer(path))
                 .or(branch)
@@ -284,7 +286,7 @@ impl<'a> Walk<'a> {
 fn wanted(schema: &Value) -> &str {
     let listed = schema["type"]
         .as_array()
-        .and_then(|all| all.iter().find(|one| *one != "null"));
+        .and_then(|all| all.iter().find(|name| *name != "null"));
     listed
         .unwrap_or(&schema["type"])
         .as_str()
@@ -295,9 +297,9 @@ fn wanted(schema: &Value) -> &str {
 fn words(schema: &Value) -> Vec<&str> {
     let listed = schema["enum"].as_array().into_iter().flatten();
     let constants = schema["oneOf"].as_array().into_iter().flatten();
-    let constants = constants.flat_map(|one| {
-        let several = one["enum"].as_array().into_iter().flatten();
-        std::iter::once(&one["const"]).chain(several)
+    let constants = constants.flat_map(|branch| {
+        let several = branch["enum"].as_array().into_iter().flatten();
+        std::iter::once(&branch["const"]).chain(several)
     });
     listed.chain(constants).filter_map(Value::as_str).collect()
 }

@@ -120,7 +120,7 @@ pub fn distil(
         let worth = |(input, new): &(&Vec<u8>, BTreeSet<Feature>)| {
             new.len() * 10_000 / (input.len() + file)
         };
-        let Some((input, wanted)) = left.iter().rev().max_by_key(|one| worth(one)) else {
+        let Some((input, wanted)) = left.iter().rev().max_by_key(|input| worth(input)) else {
             return named(needed(joined(body, pieces, chosen, kept), kept), kept);
         };
         let input = Shrinking::new(body, wanted).shrunk(pieces, input);
@@ -164,13 +164,11 @@ fn joined(
             let (first, reached_first) = &joined[place];
             let both = together(pieces, first, &input)?;
             let reached_both = features(body, &both);
-            let others = joined
-                .iter()
-                .enumerate()
-                .filter(|(other, _)| *other != place);
+            let others = joined.iter().enumerate();
+            let others = others.filter(|(other, _)| *other != place);
+            let others = others.map(|(_, (_, reached))| reached);
             let others: Vec<_> = others
-                .map(|(_, one)| &one.1)
-                .chain(left.iter().map(|one| &one.1))
+                .chain(left.iter().map(|(_, reached)| reached))
                 .collect();
             let safe = |feature: &Feature| {
                 reached_both.contains(feature)
@@ -350,7 +348,7 @@ mod tests {
         let none = BTreeSet::new();
         let inputs = inputs();
         let distilled = distil(detector(), BYTES, &inputs, &none);
-        let chosen: Vec<_> = distilled.iter().map(|one| one.input.clone()).collect();
+        let chosen: Vec<_> = distilled.iter().map(|input| input.input.clone()).collect();
         // Joined, they reach even more; without any one of them a feature is lost.
         assert!(reach(&chosen).is_superset(&reach(&inputs)));
         assert!(chosen.len() < inputs.len(), "{chosen:02X?}");
@@ -378,7 +376,7 @@ mod tests {
             (vec![3], of(&["c", "d"])),
         ];
         let left = named(needed(chosen, &BTreeSet::new()), &BTreeSet::new());
-        let inputs: Vec<_> = left.iter().map(|one| one.input.clone()).collect();
+        let inputs: Vec<_> = left.iter().map(|input| input.input.clone()).collect();
         assert_eq!(inputs, [[2], [3]]);
         assert_eq!(left[0].new, [feature("a"), feature("b")]);
         assert_eq!(left[1].new, [feature("c"), feature("d")]);

@@ -117,9 +117,9 @@ impl Tamper {
             match fault {
                 LinkFault::Flip(more) => {
                     flips = flips.and(more);
-                    whole = whole.map(|b| Received {
-                        byte: b.byte ^ more.data,
-                        ..b
+                    whole = whole.map(|received| Received {
+                        byte: received.byte ^ more.data,
+                        ..received
                     });
                 }
                 LinkFault::Replace(data) => {
@@ -147,9 +147,9 @@ impl Tamper {
             };
         }
         if passed.hold.is_none() {
-            passed.byte = whole.map(|b| Received {
-                error: b.error.or(flips.noticed()),
-                ..b
+            passed.byte = whole.map(|received| Received {
+                error: received.error.or(flips.noticed()),
+                ..received
             });
         }
         passed
@@ -186,7 +186,7 @@ mod tests {
             let passed = tamper.pass(Received::good(*byte), Instant::START);
             passed.bytes().collect::<Vec<_>>()
         });
-        all.map(|b| (b.byte, b.error.is_some())).collect()
+        all.map(|byte| (byte.byte, byte.error.is_some())).collect()
     }
 
     #[test]

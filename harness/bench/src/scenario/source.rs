@@ -90,13 +90,13 @@ impl Source {
     /// # Errors
     /// They are no text.
     pub fn from_bytes(name: String, bytes: Vec<u8>) -> Result<Self, SourceError> {
-        let control = |b: &u8| *b < b' ' && !matches!(b, b'\n' | b'\r' | b'\t');
+        let control = |byte: &u8| *byte < b' ' && !matches!(byte, b'\n' | b'\r' | b'\t');
         if let Some(offset) = bytes.iter().position(control) {
             let byte = bytes[offset];
             return Err(SourceError::NotText { name, offset, byte });
         }
         if let Some(line) = bytes
-            .split(|b| *b == b'\n')
+            .split(|byte| *byte == b'\n')
             .position(|line| line.len() > MAX_LINE)
         {
             let line = line + 1;

@@ -188,8 +188,8 @@ pub fn colour(verdict: Verdict) -> &'static str {
 
 fn counts(html: &mut Html, shown: &[ShownScenario]) {
     let mut took = Span::ZERO;
-    for one in shown {
-        took = took + one.row.took;
+    for scenario in shown {
+        took = took + scenario.row.took;
     }
     let all = [Verdict::Passed, Verdict::Failed]
         .into_iter()
@@ -198,7 +198,7 @@ fn counts(html: &mut Html, shown: &[ShownScenario]) {
         for verdict in all {
             let count = shown
                 .iter()
-                .filter(|one| one.row.verdict == verdict)
+                .filter(|scenario| scenario.row.verdict == verdict)
                 .count();
             if count > 0 || matches!(verdict, Verdict::Passed | Verdict::Failed) {
                 let class = if count > 0 { colour(verdict) } else { "none" };

@@ -133,7 +133,7 @@ impl Top {
     pub fn events(&self) -> impl Iterator<Item = &TopEvent> {
         let forgotten = self.forgotten;
         let all = self.reading.events.iter();
-        all.filter(move |one| forgotten.is_none_or(|until| one.last > until))
+        all.filter(move |event| forgotten.is_none_or(|until| event.last > until))
     }
 
     pub(crate) fn keep_in_sight(&mut self) {

@@ -33,6 +33,13 @@ enum Face {
 }
 
 impl Face {
+    const fn of(is_error: bool) -> Self {
+        match is_error {
+            true => Self::Error,
+            false => Self::Plain,
+        }
+    }
+
     /// No colours but red: they are the terminal's own, and what is red says in words why.
     fn style(self, colour: bool) -> Style {
         match self {
@@ -136,10 +143,7 @@ fn head(top: &Top) -> Vec<(String, Face)> {
         let what = top.heading.parts.get(part);
         lines.extend(what.map(|what| (what.clone(), Face::Plain)));
         let read = reading.parts.get(part).into_iter().flatten();
-        lines.extend(read.map(|HeadLine { text, is_error }| {
-            let look = if *is_error { Face::Error } else { Face::Plain };
-            (text.clone(), look)
-        }));
+        lines.extend(read.map(|HeadLine { text, is_error }| (text.clone(), Face::of(*is_error))));
     }
     lines.push((counts(top), Face::Plain));
     lines
@@ -188,7 +192,7 @@ fn body(top: &Top, width: usize, room: usize) -> Vec<(String, Face)> {
             .map(|place| cell(row, place))
             .collect();
         let text = line(&cells);
-        (cut(text, width), look(row))
+        (cut(text, width), Face::of(row.in_error))
     }));
     if rows.is_empty() {
         let drive = form.drive;
@@ -229,42 +233,31 @@ fn cut(text: String, width: usize) -> String {
     kept + "..."
 }
 
-fn look(row: &TopRow) -> Face {
-    if row.in_error {
-        Face::Error
-    } else {
-        Face::Plain
-    }
-}
-
 fn foot(top: &Top, width: usize, height: usize) -> Vec<(String, Face)> {
     let mut all: Vec<_> = top.events().collect();
     let room = EVENTS.min(height / LINES_EACH);
     // The latest first.
-    all.sort_by_key(|one| std::cmp::Reverse(one.last));
+    all.sort_by_key(|event| std::cmp::Reverse(event.last));
     let mut lines: Vec<(String, Face)> = all
         .iter()
         .take(room)
-        .map(|one| {
-            let times = match one.count {
+        .map(|event| {
+            let times = match event.count {
                 1 => String::new(),
                 n => format!(" {n} times, last"),
             };
-            let text = format!("{}{times} at {}", one.what, clock(one.last));
+            let text = format!("{}{times} at {}", event.what, clock(event.last));
             // How often comes first where not all of it can be read.
-            let text = match one.count {
-                2.. if text.chars().count() > width => format!("{} times: {}", one.count, one.what),
+            let text = match event.count {
+                2.. if text.chars().count() > width => {
+                    format!("{} times: {}", event.count, event.what)
+                }
                 _ => text,
             };
-            let look = if one.is_error {
-                Face::Error
-            } else {
-                Face::Plain
-            };
-            (text, look)
+            (text, Face::of(event.is_error))
         })
         .collect();
-    let hidden = all.iter().skip(room).map(|one| one.count).sum::<u64>() + top.reading.others;
+    let hidden = all.iter().skip(room).map(|event| event.count).sum::<u64>() + top.reading.others;
     if hidden > 0 {
         lines.push((format!("and {hidden} other messages"), Face::Error));
     }
