@@ -58,6 +58,15 @@ struct Byte {
     error: Option<LineError>,
 }
 
+/// An octet of a shared line.
+struct StationOctet {
+    part: usize,
+    from: Option<u8>,
+    /// The time of its packet.
+    nanos: u64,
+    octet: PacketOctet,
+}
+
 /// Reads a file; `links` chooses a part where it has several.
 pub fn read(
     bytes: &[u8],
@@ -114,7 +123,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
             let known = reader.interfaces.get(byte.interface);
             matches!(known, Some(Some(known)) if known.part == part)
         };
-        reader.octets.iter().any(|(number, ..)| *number == part)
+        reader.octets.iter().any(|octet| octet.part == part)
             || reader.frames.iter().any(|(number, _)| *number == part)
             || reader.found.iter().any(of)
     };
@@ -123,7 +132,7 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
     let of_part = || known.iter().flatten().filter(|known| known.part == wanted);
     let octet = of_part().find_map(|known| known.octet).unwrap_or(OCTET);
     let octets = reader.octets.into_iter();
-    let octets = octets.filter(|(number, ..)| *number == wanted);
+    let octets = octets.filter(|octet| octet.part == wanted);
     match &reader.parts[wanted] {
         Part::Ring => {}
         Part::Stations => {
@@ -131,13 +140,13 @@ fn part(reader: Reader<'_>, rate: Option<Rate>) -> Result<Imported, CaptureError
                 Role::Station(station) => Some(station),
                 Role::Link(..) | Role::Frames(_) | Role::Line => None,
             });
-            let octets = octets.map(|(_, from, _, octet)| (from, octet)).collect();
+            let octets = octets.map(|octet| (octet.from, octet.octet)).collect();
             return Ok(telegrams::assemble(senders, octets, octet).into());
         }
         Part::Line(_) => {
-            let mut octets: Vec<_> = octets.map(|(_, _, at, octet)| (at, octet)).collect();
-            octets.sort_by_key(|(at, _)| *at);
-            let octets = in_order(octets.into_iter().map(|(_, octet)| octet), octet);
+            let mut octets: Vec<_> = octets.collect();
+            octets.sort_by_key(|octet| octet.nanos);
+            let octets = in_order(octets.into_iter().map(|octet| octet.octet), octet);
             let read = LineRead::of(&octets, octet, true);
             let unread = unread_octets(&read);
             let capture = telegrams::assemble(std::iter::empty(), read.octets, octet);
@@ -215,8 +224,7 @@ pub(super) struct Reader<'b> {
     speed: Option<Rate>,
     bit_rate: Option<BitRate>,
     found: Vec<Byte>,
-    /// Octets with the number of their part, their station, and the time of their packet.
-    octets: Vec<(usize, Option<u8>, u64, PacketOctet)>,
+    octets: Vec<StationOctet>,
     /// Whether the last good packet had the time of its first octet.
     begun: bool,
     /// Frames after headers of Linux.

@@ -51,8 +51,14 @@ impl Delay {
     }
 }
 
-/// What is passed on: when, what, and since when it could be.
-type HeldByte = (Instant, Outgoing, time::Instant);
+/// A byte to pass on.
+#[derive(Clone, Copy, Debug)]
+struct HeldByte {
+    start: Instant,
+    outgoing: Outgoing,
+    /// Since when it could be passed on.
+    ready: time::Instant,
+}
 
 /// An inner link that the bench has a port at.
 #[derive(Debug)]
@@ -145,7 +151,7 @@ impl InnerLink {
 
     /// When something waits to be passed on.
     pub fn due(&self) -> Option<Instant> {
-        self.queue.front().map(|(start, ..)| *start)
+        self.queue.front().map(|held| held.start)
     }
 
     pub fn busy(&self) -> bool {
@@ -194,18 +200,25 @@ impl InnerLink {
         let mut free = start + passed.delay;
         self.taken += 1;
         self.given += passed.bytes().count() as u64 + u64::from(passed.hold.is_some());
-        let read = read + time::Duration::from_nanos(free.since(at).as_nanos());
+        let ready = read + time::Duration::from_nanos(free.since(at).as_nanos());
+        let mut hold = |start, outgoing| {
+            self.queue.push_back(HeldByte {
+                start,
+                outgoing,
+                ready,
+            });
+        };
         for received in passed.bytes() {
             let outgoing = match received.error {
                 None | Some(LineError::Overrun) => Outgoing::Byte(received.byte),
                 Some(LineError::Break) => Outgoing::Break(byte_time * 2),
                 Some(_) => Outgoing::WrongParity(received.byte),
             };
-            self.queue.push_back((free, outgoing, read));
+            hold(free, outgoing);
             // The next byte is not held back: the line itself takes them one after another.
         }
         if let Some(span) = passed.hold {
-            self.queue.push_back((free, Outgoing::Break(span), read));
+            hold(free, Outgoing::Break(span));
             free += span;
         }
         if passed.delay > Span::ZERO || passed.hold.is_some() {
@@ -220,17 +233,17 @@ impl InnerLink {
             InnerPorts::Interposer(wire) | InnerPorts::TwoPortInterposer(_, wire) => wire,
         };
         let mut gone = Vec::new();
-        while let Some(&(start, outgoing, read)) = self.queue.front() {
-            if start > now {
+        while let Some(held) = self.queue.front().copied() {
+            if held.start > now {
                 break;
             }
             self.queue.pop_front();
-            down.send(outgoing)?;
-            gone.push(read);
+            down.send(held.outgoing)?;
+            gone.push(held.ready);
         }
         down.flush()?;
-        for read in gone {
-            self.delay.note(read.elapsed());
+        for ready in gone {
+            self.delay.note(ready.elapsed());
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::interfaces::{Interface, Packets, Role};
 use super::parts::Part;
 use super::values::sent;
-use super::{Byte, CaptureError, OCTET, Reader};
+use super::{Byte, CaptureError, OCTET, Reader, StationOctet};
 use crate::capture::frames::{self, FrameRead, Sender};
 use crate::capture::order::Place;
 use crate::report::pcapng::{COMMENT, HEADER, LOST, RECEIVED, error_of};
@@ -147,10 +147,13 @@ impl Reader<'_> {
         let begins = timed.unwrap_or(self.begun);
         let found = octets(event, packet.nanos, begins, arrived, &comment, octet);
         self.begun = begins;
-        let found = found
-            .into_iter()
-            .map(|octet| (part, from, packet.nanos, octet));
-        self.octets.extend(found);
+        self.octets
+            .extend(found.into_iter().map(|octet| StationOctet {
+                part,
+                from,
+                nanos: packet.nanos,
+                octet,
+            }));
         Ok(())
     }
 

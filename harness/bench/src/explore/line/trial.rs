@@ -39,8 +39,12 @@ pub struct EngineTrial<B: LineBus> {
     pub station: B::Station,
 }
 
-/// What was found, why the run ended, and how many cases were not judged.
-pub type Exploration<B> = (Vec<Finding<LineTalk<B>>>, RunEnd, u64);
+/// What a run has found.
+pub struct Exploration<B: LineBus> {
+    pub findings: Vec<Finding<LineTalk<B>>>,
+    pub end: RunEnd,
+    pub undecided: u64,
+}
 
 impl<B: LineBus> EngineTrial<B> {
     /// Explores for a number of seconds of bus time, up to a number of findings.
@@ -68,15 +72,20 @@ impl<B: LineBus> EngineTrial<B> {
         let mut found = Findings(Vec::new());
         let mut run = FuzzRun::new(about, scope);
         let end = run.run(&mut target, None, &bounds, &mut found);
-        (found.0, end.expect("no error"), target.undecided())
+        Exploration {
+            findings: found.0,
+            end: end.expect("no error"),
+            undecided: target.undecided(),
+        }
     }
 
     /// Explores right drives: nothing is found, and every case is judged.
     pub fn accuses_nobody(&self, line: &[String], seed: u64, seconds: u64) {
-        let (found, end, undecided) = self.explored(line, None, seed, seconds, 1);
-        let about: Vec<_> = found.iter().map(|finding| &finding.difference).collect();
-        assert_eq!((about, end), (Vec::new(), RunEnd::Wire), "{line:?}");
-        assert_eq!(undecided, 0, "{line:?}");
+        let found = self.explored(line, None, seed, seconds, 1);
+        let findings = found.findings.iter();
+        let about: Vec<_> = findings.map(|finding| &finding.difference).collect();
+        assert_eq!((about, found.end), (Vec::new(), RunEnd::Wire), "{line:?}");
+        assert_eq!(found.undecided, 0, "{line:?}");
     }
 
     /// Explores right drives of a simulated rig with this header line like drives behind an adapter: nothing is found, and something is
@@ -136,7 +145,7 @@ impl<B: LineBus> EngineTrial<B> {
     {
         let mut missed = Vec::new();
         for name in some {
-            let (found, ..) = self.explored(&[], Some(name), 1, 600, 1);
+            let found = self.explored(&[], Some(name), 1, 600, 1).findings;
             let Some(finding) = found.first() else {
                 missed.push(name);
                 continue;
