@@ -52,7 +52,7 @@ impl BenchClock {
         }
     }
 
-    /// Keeps a fault for a time that counts from the begin of the conversation. Returns the fault if that time has come already.
+    /// Keeps a fault for a time since the start of the conversation. Returns the fault if that time has already come.
     pub fn schedule(&mut self, at: Instant, fault: PlacedFault) -> Option<PlacedFault> {
         let at = self.on_bench(at);
         if at <= self.now {

@@ -26,7 +26,7 @@ impl Echo {
         self.owed.len()
     }
 
-    /// Removes from what has come what the adapter gives back: in front of everything else, since stations answer whole telegrams only.
+    /// Removes the adapter's echo from what was received. The echo comes first, since stations answer whole telegrams only.
     ///
     /// # Errors
     /// [`Trouble::Garbled`]: it gives back something else. The octets from there on stay.

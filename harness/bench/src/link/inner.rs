@@ -158,7 +158,7 @@ impl InnerLink {
         !self.queue.is_empty()
     }
 
-    /// Takes what has come and passes on what is due.
+    /// Reads what was received and passes on what is due.
     pub fn pump(
         &mut self,
         now: Instant,

@@ -172,7 +172,7 @@ impl Lead {
 /// A bus as the bench's own station sees it: what its ports carry and the time, and nothing else. A port is a place where the bench
 /// itself speaks, counted from 0.
 pub trait Line: Send {
-    /// What a port carries, and how fast. That of the first port for a port that the line does not have.
+    /// What a port carries, and how fast. For a port that the line does not have: that of the first port.
     fn medium(&self, port: usize) -> Medium;
 
     fn now(&self) -> Instant;
@@ -249,7 +249,7 @@ pub fn wait_keeping(line: &mut dyn Line, until: Instant) -> bool {
     line.wait(again.map_or(until, |again| again.min(until)))
 }
 
-/// A borrowed line: its owner goes on using it afterwards.
+/// A borrowed line: its owner can use it again afterwards.
 impl<L: Line + ?Sized> Line for &mut L {
     fn medium(&self, port: usize) -> Medium {
         (**self).medium(port)
@@ -361,7 +361,7 @@ pub trait PortLink: Link {
 
 /// A bus as a scenario sees it.
 pub trait Link: Line {
-    /// What this link can do beside sending and receiving.
+    /// What this link can do besides sending and receiving.
     fn capabilities(&self) -> &[Capability];
 
     /// Begins a conversation: restarts the time and the byte counts, and drops pending faults and unread input. The drives keep
@@ -417,13 +417,13 @@ pub trait Link: Line {
         Span::ZERO
     }
 
-    /// Since when the bench had not looked at its ports, nor waited for them, when it read what came last: that may have come at any time since.
+    /// When the bench had last looked at or waited for its ports before it read the latest input, which may have come at any time since.
     /// `None` where time is virtual, or where the driver stamps what comes.
     fn unwatched_since(&self) -> Option<Instant> {
         None
     }
 
-    /// Sends octets beside the conversation and returns those received until the answers are back. Where a link can, it leaves no trace of
+    /// Sends octets outside the conversation and returns those received until the answers are back. Where a link can, it leaves no trace of
     /// this.
     fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
         self.send_octets(port, octets);
@@ -436,7 +436,7 @@ pub trait Link: Line {
         came
     }
 
-    /// What stands beside the bus: the simulation itself, which only a bus's own code knows by its type. `None` on a rig and behind a
+    /// Access beside the bus: the simulation itself, which only a bus's own code knows by its type. `None` on a rig and behind a
     /// recording.
     fn beside(&self) -> Option<&dyn Any> {
         None
@@ -454,7 +454,7 @@ pub trait Link: Line {
     /// How many pieces all channels together have carried, as far as they are recorded.
     fn carried(&self) -> u64;
 
-    /// How many stations a port has beside the bench: the drives of a ring.
+    /// Number of stations on a port besides the bench: the drives of a ring.
     fn drives(&self, port: usize) -> u8;
 
     /// Everything seen of a port.

@@ -1,4 +1,4 @@
-//! One port of the bench's own station, over a stream of octets: what waits for the operating system, and what has come.
+//! One port of the bench's own station, over a stream of octets: what waits for the operating system, and what was received.
 
 use super::Trouble;
 use super::echo::Echo;
@@ -38,7 +38,7 @@ pub trait Accounting: fmt::Debug + Send {
     /// An octet leaves.
     fn sent(&mut self, octet: u8);
 
-    /// An octet has come.
+    /// An octet was received.
     fn came(&mut self, octet: Received);
 
     /// How long the line is idle before what is sent together.
@@ -51,10 +51,10 @@ pub trait Accounting: fmt::Debug + Send {
         None
     }
 
-    /// Whether more has left than has come.
+    /// Whether more octets were sent than received.
     fn is_owed(&self) -> bool;
 
-    /// Whether all that is to come has come, where interposers have taken and given these numbers of octets meanwhile.
+    /// Whether every expected octet was received, if interposers have meanwhile taken and given these numbers of octets.
     fn is_even(&self, taken: u64, given: u64) -> bool;
 
     /// How long after an octet its answer comes at the soonest.
@@ -207,7 +207,7 @@ impl<A: Accounting> PortEnd<A> {
         self.wire.flush()
     }
 
-    /// Takes what has come.
+    /// Reads what was received.
     pub fn collect(&mut self, told: Instant, now: Instant, byte_time: Span) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
         let mut result = self.wire.receive(&mut bytes);

@@ -82,7 +82,7 @@ pub struct Pump<A> {
     told: Cell<Instant>,
     /// How late the operating system wakes this thread.
     pub late: Lateness,
-    /// When the ports were last looked at.
+    /// When the ports were last polled.
     looked: Instant,
     /// Until when nothing had come that was not read by then.
     watched: Instant,
@@ -204,7 +204,7 @@ impl<A: Accounting> Pump<A> {
         free
     }
 
-    /// Takes the next octet that has come.
+    /// Takes the next octet that was received.
     pub fn receive(&mut self, port: usize) -> Option<(Instant, Received)> {
         if !self.has_come(self.ports.get(port)?) {
             return None;
@@ -358,7 +358,7 @@ impl<A: Accounting> Pump<A> {
         self.start + time::Duration::from_nanos(at.since_start().as_nanos())
     }
 
-    /// How long a byte may take to come back, with the recent lateness of the computer. A byte counts as lost only after one more poll.
+    /// How long a byte may take to return, including the recent lateness of the computer. A byte counts as lost only after one more poll.
     pub fn round(&self, port: &PortEnd<A>) -> Span {
         port.accounting.latest(self.octet_time) + SLACK.max(self.tolerance) + self.lateness()
     }

@@ -29,7 +29,7 @@ pub struct Look {
     pub lead: Option<Lead>,
     /// When the line wants a pause; `None` where it wants none.
     pub pause: Option<Instant>,
-    /// Since when the bench had not looked, where that was long: what follows came between then and this look.
+    /// The previous look, if it was long ago: what follows came between then and this look.
     pub since: Option<Instant>,
 }
 
@@ -148,7 +148,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         }
     }
 
-    /// The trouble in which the link is stands in the record already.
+    /// Whether the present trouble of the link is recorded.
     pub fn trouble_is_told(&mut self) {
         self.trouble = self.link.trouble().cloned();
     }
@@ -163,7 +163,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         }
     }
 
-    /// Takes what has come from the link.
+    /// Fetches what the link has received.
     fn take_arrived(&mut self) -> Vec<(usize, Instant, Heard)> {
         let mut came = Vec::new();
         for port in 0..PORTS {
@@ -174,7 +174,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         came
     }
 
-    /// Records the state of the link and what has come, where time is real.
+    /// Records the state of the link and what was received, where time is real.
     fn look(&mut self, came: Vec<(usize, Instant, Heard)>) {
         let Some(known) = &mut self.known else {
             return;
@@ -199,7 +199,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         }
     }
 
-    /// The same with what has come by now.
+    /// The same, including what was received by now.
     fn look_now(&mut self) {
         if self.known.is_some() {
             let came = self.take_arrived();
@@ -381,7 +381,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.drives(port)
     }
 
-    /// That of the conversation of the scenario, if there has been one: cells are set back in another one.
+    /// The trace of the conversation of the scenario, if there was one: cells are restored in a later one.
     fn trace(&self, port: usize) -> Trace {
         match self.scenario.get(port) {
             Some(trace) => trace.clone(),

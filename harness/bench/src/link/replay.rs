@@ -20,7 +20,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::{BTreeMap, VecDeque};
 
-/// How many waits in a row may take no event and no time. A caller that fetches what has come, and looks where the record looks, needs a few.
+/// The most waits in a row without an event and without time passing. A caller that fetches its input and looks where the record looks needs a few.
 const IDLE_WAITS: u32 = 16;
 
 #[derive(Clone, Debug)]
@@ -134,7 +134,7 @@ impl Replay {
         self
     }
 
-    /// Lets bytes be looked at on more links than the record shows.
+    /// Allows looking at bytes on more links than the record shows.
     #[must_use]
     pub fn listening(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
         self.listens.extend(links);
@@ -229,7 +229,7 @@ impl Replay {
         })
     }
 
-    /// Takes the look that stands next, with what had come; `until` is when a wait was to end.
+    /// Takes the next look with the input that it reports; `until` is when a wait was to end.
     fn look(&mut self, until: Option<Instant>) {
         if self.strayed.is_some() {
             return;

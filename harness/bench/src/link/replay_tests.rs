@@ -1,4 +1,4 @@
-//! A record that is played back: what it gives, and what it makes of a caller that does something else.
+//! Playing back a record: what it returns, and what happens if the caller does something else.
 
 use super::*;
 use crate::link::Octets;
@@ -54,7 +54,7 @@ fn nobody_sleeps_too_long_where_time_is_virtual() {
     );
 }
 
-/// Where a wait ended without a byte, the caller looked at an inner link: so it does again, at the same times.
+/// Where a wait ended without a byte, the caller looked at an inner link. It does so again, at the same times.
 #[test]
 fn a_wait_ends_at_a_look_at_an_inner_link() {
     let byte = || Received::good(0x80);

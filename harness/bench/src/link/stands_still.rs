@@ -1,10 +1,10 @@
-//! A computer that stands still, for tests.
+//! A computer that stalls, for tests.
 
 use super::{Line, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::time::{Instant, Span};
 
-/// A line behind a computer that stands still for a while, when this many telegrams or frames have left.
+/// A line behind a computer that stalls for a while after this many telegrams or frames were sent.
 pub struct StandsStill<L> {
     pub line: L,
     pub after: usize,

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// What becomes of a byte.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Passed {
-    /// What goes on in front of it.
+    /// Bytes that are passed on before it.
     inserted: Vec<Received>,
     /// The byte itself, unless it is lost.
     byte: Option<Received>,
@@ -26,7 +26,7 @@ pub struct Passed {
 }
 
 impl Passed {
-    /// What goes on, in order.
+    /// The bytes that are passed on, in order.
     pub fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
         let inserted = self.inserted.iter().copied();
         inserted.chain(self.byte).chain(self.again())
@@ -107,7 +107,7 @@ impl Tamper {
         next.is_some_and(|all| all.iter().copied().any(is_wrong_parity))
     }
 
-    /// A byte that goes on at `start`.
+    /// Passes on a byte at `start`.
     pub fn pass(&mut self, byte: Received, start: Instant) -> Passed {
         self.count += 1;
         let mut passed = Passed::default();

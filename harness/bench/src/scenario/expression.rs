@@ -41,7 +41,7 @@ impl Scope {
         self.counters.get(counter.place()).copied().flatten()
     }
 
-    /// The same counters beside a ring of another size.
+    /// The same counters with another ring size.
     #[must_use]
     pub const fn of_ring(self, size: i64) -> Self {
         Self { size, ..self }
@@ -137,7 +137,7 @@ impl Located {
         })
     }
 
-    /// A number that stands nowhere.
+    /// A number without a place in a text.
     #[must_use]
     pub const fn number(value: i64) -> Self {
         Self {

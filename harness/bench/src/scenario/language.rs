@@ -77,7 +77,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// Words with which steps begin: jobs first, then the others.
     fn step_words() -> (Vec<&'static str>, &'static [&'static str]);
 
-    /// Reads a line that begins with `word` as a header line; `None` if it is a step. `begun` says whether a step stands in front of it.
+    /// Reads a line that begins with `word` as a header line; `None` if it is a step. `begun` says whether a step precedes it.
     fn header(
         word: &Spanned<&str>,
         scanner: &mut Scanner<'_>,
@@ -275,7 +275,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// Writes the header lines: each with its word, and after them those about devices.
     fn write_header(header: &Self::Header) -> (Vec<(&'static str, String)>, Vec<String>);
 
-    /// Writes a message as it stands after `>` or `<`.
+    /// Writes a message as it follows `>` or `<`.
     fn write_message(message: &Self::Message) -> String;
 
     /// Writes any other step, with its symbol or its word.
@@ -308,7 +308,7 @@ pub trait Settle<L: Language>: Sized {
     /// It can never come.
     fn receive(&self, port: usize, message: &L::Message) -> Result<Vec<L::Wanted>, Problem>;
 
-    /// Settles another step; what it needs of a rig is added to `needs`.
+    /// Settles another step and adds what it needs of a rig to `needs`.
     ///
     /// # Errors
     /// It cannot be done on this bench.

@@ -34,7 +34,7 @@ impl From<TextSpan> for SourceSpan {
     }
 }
 
-/// A value with the place where it stands.
+/// A value with its place in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spanned<T> {
     pub value: T,

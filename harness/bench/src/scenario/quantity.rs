@@ -8,7 +8,7 @@ use std::fmt;
 /// Digits after the point that are shown of turns: one increment is 0.000015 turns.
 const TURN_DECIMALS: usize = 5;
 
-/// Significant digits that are shown of everything else: a word has no more.
+/// Significant digits shown of all other quantities: a word has no more.
 const DIGITS: usize = 5;
 
 /// Maximum number of digits of a number.
@@ -247,7 +247,7 @@ impl fmt::Display for Tolerance {
     }
 }
 
-/// Whether what stands there can only be a number with a unit: what can be read as bytes is bytes.
+/// Whether the next text can only be a number with a unit. Text that can be read as bytes is bytes.
 pub fn ahead(scanner: &Scanner<'_>) -> bool {
     let mut ahead = scanner.clone();
     let signed = ahead.eat("-") || ahead.eat("+");
@@ -443,7 +443,7 @@ fn ratio(numerator: i128, denominator: i128) -> Option<Ratio> {
     Ratio::new(part(numerator)?, part(denominator)?)
 }
 
-/// Reads a text that is one number with its unit and nothing else, such as `300rpm` or `3 ms`.
+/// Reads a text that is a single number with its unit, such as `300rpm` or `3 ms`.
 ///
 /// # Errors
 /// It is no such text; places count from its start.

@@ -56,7 +56,7 @@ impl<'a> Scanner<'a> {
         self.rest().chars().next()
     }
 
-    /// Where the scanner stands; one character wide, or none at the end.
+    /// The position of the scanner; one character wide, or empty at the end.
     pub fn here(&mut self) -> TextSpan {
         let width = self.peek().map_or(0, char::len_utf8);
         let start = self.offset + self.at;
@@ -66,7 +66,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// From the place `from` to where the scanner stands.
+    /// The span from `from` to the position of the scanner.
     pub fn since(&self, from: TextSpan) -> TextSpan {
         TextSpan {
             start: from.start,
@@ -74,7 +74,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// The same place in a line that ends before the first of these tokens; [`Self::go_on`] comes back.
+    /// A scanner at the same position of a line that ends before the first of these tokens; [`Self::go_on`] returns from it.
     pub fn before(&self, tokens: &[&str]) -> Self {
         let rest = &self.text[self.at..];
         let ends = tokens.iter().filter_map(|token| rest.find(token));
@@ -85,7 +85,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// Goes on where a scanner from [`Self::before`] has come to.
+    /// Continues at the position of a scanner from [`Self::before`].
     pub fn go_on(&mut self, from: &Self) {
         self.at = from.at;
     }
@@ -148,7 +148,7 @@ impl<'a> Scanner<'a> {
         })
     }
 
-    /// A mistake right here: something else is there in place of `expected`.
+    /// A mistake at this position, where `expected` should be.
     pub fn unexpected(&mut self, expected: &str) -> Problem {
         let mut ahead = self.clone();
         let found = ahead.chunk();

@@ -50,7 +50,7 @@ pub enum SourceError {
     },
 }
 
-/// The number of the line in which a byte of a text stands, counted from 1.
+/// The line of a byte of a text, counted from 1.
 pub fn line_number(text: &str, at: usize) -> usize {
     let before = text.bytes().take(at);
     1 + before.filter(|byte| *byte == b'\n').count()

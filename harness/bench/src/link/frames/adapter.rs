@@ -19,7 +19,7 @@ const STATUS_EVERY: Span = Span::from_millis(250);
 /// Unanswered commands of which the last one may still be a frame.
 const MOST_UNANSWERED: usize = 4;
 
-/// What has come of an adapter.
+/// What an adapter reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Event {
     /// Something on the bus, and when.
@@ -159,11 +159,11 @@ pub(super) struct Slcan {
     answers: bool,
     /// Whether it was told to be silent.
     silenced: bool,
-    /// How many lines, one after the other, were none that an adapter sends.
+    /// Number of lines in a row that no adapter sends.
     damaged: usize,
 }
 
-/// A serial line that has lost characters damages a line. From this number on, one after the other, something else than an adapter sends.
+/// A serial line that has lost characters damages a line. After this many in a row, the other end is no adapter.
 const MOST_DAMAGED: usize = 8;
 
 impl Slcan {

@@ -18,7 +18,7 @@ use std::time::{self, Duration};
 /// Frames that wait for the kernel at most.
 const MOST_WAITING: usize = 1_000;
 
-/// How long an interface is waited for that has gone, and how often it is looked for.
+/// How long to wait for a missing interface, and how often to look for it.
 const BACK_WITHIN: Duration = Duration::from_secs(2);
 const AGAIN: Duration = Duration::from_millis(50);
 
@@ -337,7 +337,7 @@ mod tests {
         CanEvent::Frame("181#AA".parse().expect("a frame"))
     }
 
-    /// An interface that is bus-off, gives what was waiting after the error that ends it, and is back when it is looked for.
+    /// An interface that goes bus-off, still delivers what was queued before, and is back when it is next looked for.
     #[derive(Debug)]
     struct Short {
         restarts: bool,

@@ -4,7 +4,7 @@
 //! has none. When a frame of the bench itself was on the bus is not reported by either language: it counts as sent as soon as the bus can
 //! have been free for it.
 //!
-//! Nothing here decides what may be sent: that is the guard's, which stands in front of this link.
+//! Nothing here decides what may be sent: the guard in front of this link does.
 
 pub mod adapter;
 pub mod clock;
@@ -39,10 +39,10 @@ const AHEAD: Span = Span::from_millis(2);
 /// How long after the bench's last frame an answer to it may come through an adapter and a busy computer.
 pub const SLACK: Span = Span::from_millis(30);
 
-/// The longest sleep: a request to end is looked for at least this often.
+/// The longest sleep: a request to end is polled at least this often.
 const NAP: Span = Span::from_millis(50);
 
-/// What an adapter reports beside frames and errors, counted.
+/// Counts of what an adapter reports besides frames and errors.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reports {
     /// Frames lost since the computer read too late.
@@ -195,7 +195,7 @@ impl FrameLink {
         self.trouble.get_or_insert(trouble);
     }
 
-    /// Hands over what is due, and reads what has come.
+    /// Hands over what is due, and reads what was received.
     fn look(&mut self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
         if self.interrupt.load(Ordering::Relaxed) {

@@ -24,7 +24,7 @@ const QUIET: Duration = Duration::from_millis(100);
 /// How long an adapter that answers nothing but `V` may take for it once more.
 const AT_ONCE: Duration = Duration::from_millis(500);
 
-/// The longest sleep: a request to end is looked for at least this often.
+/// The longest sleep: a request to end is polled at least this often.
 const NAP: Duration = Duration::from_millis(50);
 
 /// Characters that are read before the channel is open, at most: a bus without a pause brings fewer.
@@ -47,7 +47,7 @@ pub(super) struct Talk<'a> {
     interrupt: &'a AtomicBool,
     lines: slcan::Lines,
     messages: Messages,
-    /// What has come and was not looked at.
+    /// Characters received and not yet examined.
     come: VecDeque<u8>,
     /// What an SLCAN adapter says that it is; empty if it says nothing.
     name: String,

@@ -13,7 +13,7 @@ type Dialect = fn(&str) -> &'static str;
 /// More than anything here takes.
 const LONG: Span = Span::from_millis(60_000);
 
-/// What a client has said so far.
+/// What a client has sent so far.
 type Transcript = Arc<Mutex<Vec<String>>>;
 
 /// A server that answers each piece of a client's stream, up to one of these characters, with what `answer` gives.
@@ -179,7 +179,7 @@ fn a_listener_sends_nothing() {
     );
 }
 
-/// An adapter without version, time stamps and status is one as well.
+/// An adapter without version, time stamps and status is accepted.
 #[test]
 fn a_poor_adapter_will_do() {
     let (address, _) = slcan(|command| match command {

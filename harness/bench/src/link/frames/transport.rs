@@ -31,11 +31,11 @@ pub(super) trait Transport: fmt::Debug + Send {
     fn attend(&mut self, now: Instant) -> Result<(), Trouble>;
     /// When [`Self::attend`] is to be called again.
     fn due(&self) -> Option<Instant>;
-    /// Reads what has come, into `events`; what came before an error is there too.
+    /// Reads what was received into `events`, including what came before an error.
     fn receive(&mut self, now: Instant, events: &mut Vec<Event>) -> Result<(), Trouble>;
     /// How another thread can send frames.
     fn last_words(&self) -> io::Result<LastWords>;
-    /// Whether it goes on by itself after bus-off.
+    /// Whether it recovers from bus-off by itself.
     fn restarts(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! What stands in lines of several kinds: words of a list, signs.
+//! Elements that lines of several kinds share: words of a list, signs.
 
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;

@@ -42,7 +42,7 @@ impl<'s, L: Language> Unroll<'s, L> {
         }
     }
 
-    /// Whether the last step stands in a loop.
+    /// Whether the last step is inside a loop.
     pub(crate) const fn in_loop(&self) -> bool {
         !self.loops.is_empty()
     }

@@ -44,7 +44,7 @@ pub struct Outcome {
 pub enum Unready {
     /// It gave no right answer. Where time is real, a computer that stood still may be the cause.
     NoAnswer,
-    /// A cell holds something else than was written to it.
+    /// A cell does not hold what was written to it.
     Differs,
 }
 
@@ -70,7 +70,7 @@ impl Outcome {
         Self::not_played(trouble.verdict(), trouble.to_string())
     }
 
-    /// The same where trouble of the link has come after its last step: what was judged before is a remark.
+    /// The outcome with the trouble of the link after its last step: the earlier judgement becomes a remark.
     #[must_use]
     pub fn ended_by(self, trouble: &Trouble) -> Self {
         let before = format!("before that: {}", self.verdict);
@@ -117,7 +117,7 @@ impl Outcome {
         }
     }
 
-    /// A scenario that a drive could not be made ready for, and what of it was wrong.
+    /// A scenario that a drive could not be prepared for, and what was wrong with the drive.
     #[must_use]
     pub fn not_ready(verdict: Verdict, unready: Unready, remark: String) -> Self {
         Self {

@@ -257,7 +257,7 @@ impl<L: Language> Runner<'_, L> {
         }
     }
 
-    /// Lets time pass until everything that was sent has come round (or has been lost).
+    /// Lets time pass until everything that was sent has returned or is lost.
     pub fn settle(&mut self) {
         let end = self.link.now() + L::ROUND;
         while self.link.busy() && self.link.now() < end && self.wait(end) {}

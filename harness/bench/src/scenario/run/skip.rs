@@ -95,7 +95,7 @@ impl Skip {
         }
     }
 
-    /// The same with more that it needs. What needs the simulator needs nothing else.
+    /// Adds further needs. What needs the simulator needs nothing else.
     #[must_use]
     pub fn and(mut self, more: impl IntoIterator<Item = Unlock>) -> Self {
         self.unlocks.extend(more);
@@ -358,7 +358,7 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
     Some(Skip::from(why).and(unlocks.chain(places)))
 }
 
-/// What a plan for rings of other sizes needs beside them. Inner links are named as they are in its own rings.
+/// What a plan for rings of other sizes needs besides them. Inner links have their names of its own rings.
 pub fn lacks_as_well<L: Language>(
     plan: &Plan<L>,
     link: &dyn Link,

@@ -126,7 +126,7 @@ pub enum Action<L: Language> {
     },
     /// `wait`: time passes.
     Wait(Duration),
-    /// `for k in 0..last`: what stands up to its `end` is played for each number, in this order.
+    /// `for k in 0..last`: the steps up to its `end` are played for each number, in this order.
     For(Counter, Located, Located),
     /// `end`: of the loop that began last.
     End,
