@@ -1,4 +1,4 @@
-//! The files of a capture that goes on: a new one by size, by time or on demand, the oldest removed.
+//! The files of a running capture: a new one by size, by time or on demand; the oldest is removed.
 
 use super::recorder::{LiveRecorder, RecordedPlace};
 use std::collections::VecDeque;

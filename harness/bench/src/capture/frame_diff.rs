@@ -6,7 +6,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::record::{FrameEnd, LineFrame};
 use std::fmt::Write as _;
 
-/// How many frames are looked ahead for the next common one.
+/// How many frames to look ahead for the next common one.
 const AHEAD: usize = 256;
 
 /// Differences that are listed; more are counted.
@@ -23,7 +23,7 @@ pub struct FrameSummary {
     pub late: usize,
     /// The largest distance of times.
     pub apart: Span,
-    /// Whether times are not compared: they do not go on somewhere on one side.
+    /// Whether times are not compared, because those of one side are not continuous.
     pub untimed: bool,
 }
 

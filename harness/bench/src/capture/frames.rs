@@ -423,7 +423,7 @@ mod tests {
         }
     }
 
-    /// A frame of the bench that is handed over before a drive's has come, and leaves after it: both keep their times, which `verify` compares
+    /// A frame of the bench that is handed over before a drive's frame arrives and leaves after it: both keep their times, which `verify` compares
     /// with the record.
     #[test]
     fn a_frame_that_leaves_later_keeps_its_time() {

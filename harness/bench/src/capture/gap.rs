@@ -47,7 +47,7 @@ pub fn gaps(pieces: impl IntoIterator<Item = (Instant, Instant)>) -> Vec<Gap> {
         .collect()
 }
 
-/// What is said of gaps, where there are some; `noun` names a piece.
+/// The note about gaps, if there are any; `noun` names a piece.
 pub fn note(gaps: &[Gap], noun: &str) -> Option<String> {
     let named = gaps.iter().take(MOST_NAMED);
     let named = named.map(|gap| format!("of {} at {noun} {}", gap.silence, gap.piece + 1));
@@ -69,7 +69,7 @@ pub fn note(gaps: &[Gap], noun: &str) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// The pieces in front of which there are gaps, where silences last these milliseconds.
+    /// The pieces that follow a gap, where silences last these milliseconds.
     fn places(silences: impl IntoIterator<Item = u64>) -> Vec<usize> {
         let mut at = Instant::START;
         let pieces = std::iter::once(0).chain(silences).map(|silence| {

@@ -1,4 +1,4 @@
-//! Captures in the JSON of `drivebench trace`; keys that are not known are passed over.
+//! Captures in the JSON of `drivebench trace`; unknown keys are ignored.
 
 use crate::capture::{Assembly, Capture, CaptureError, adjacent, end, line_byte};
 use harness_proto::line::{LineError, Rate};

@@ -20,7 +20,7 @@ pub struct JudgeOptions<'o> {
     pub title: &'o str,
     /// A scenario whose header describes the drives. Without one the drives are plain, and a ring's cells hold what they first report.
     pub setup: Option<&'o Source>,
-    /// How far times may be off, where the user says so. On a ring smaller gaps between bytes sent are removed, because real clocks are not
+    /// The tolerance of times that the user gave. On a ring smaller gaps between bytes sent are removed, because real clocks are not
     /// exact.
     pub tolerance: Option<Span>,
     /// The drives or slaves that are judged, of a line that they share; all where it is empty.

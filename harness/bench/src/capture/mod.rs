@@ -49,16 +49,16 @@ pub struct Capture {
     pub rate: Rate,
     /// The rings; of each the links that were captured, in ring order.
     pub traces: Vec<Trace>,
-    /// How long the line was listened to, where the file says so.
+    /// When the capture began and ended, if the file says so.
     pub listened: Option<CaptureSpan>,
     /// Whether the times are those of the line: a log may have none, and then the order alone is known.
     pub timed: bool,
 }
 
-/// When a capture began and ended, beside what was heard.
+/// When a capture began and ended, apart from what was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CaptureSpan {
-    /// Silence in front of the first byte.
+    /// Silence before the first byte.
     pub before: Span,
     /// The end of the capture.
     pub until: Instant,
@@ -90,7 +90,7 @@ pub enum CaptureError {
         offset: usize,
         what: String,
     },
-    /// Something that it says of a link cannot be.
+    /// Something in its data of a link is impossible.
     #[error("{place}: {what}")]
     Link {
         /// Which link, and which byte of it.
@@ -202,7 +202,7 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// The link with these ends, its bytes so far.
+    /// The link with these ends and its bytes so far.
     pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkRead {
         let place = to.map_or(256, |drive| 255 - usize::from(drive));
         let links = &mut self.rings[ring.min(1)];

@@ -16,7 +16,7 @@ const JITTER: i128 = 1_000_000;
 /// Later than any clock, with room for sums.
 const LATEST: u64 = u64::MAX / 8;
 
-/// Where a frame stands in its file.
+/// The place of a frame in its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
     /// Its line, row or packet, counted from 1.
@@ -132,7 +132,7 @@ struct Clock {
 }
 
 impl Clock {
-    /// Goes on to a frame; says what is between it and the one before, where times do not go on.
+    /// Advances to a frame. Returns what separates it from the one before, where times are not continuous.
     fn next(&mut self, frame: &FrameRead, counts: Counts, length: u64) -> Option<SeamKind> {
         let nanos = i128::from(frame.nanos);
         let Some(before) = self.before.replace(frame.place) else {

@@ -26,7 +26,7 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
     kind(bytes).is_some()
 }
 
-/// Reads a file. `links` say what the interface stands for, where it is of octets.
+/// Reads a file. `links` say what the interface is, if it carries octets.
 ///
 /// # Errors
 /// What cannot be, and where.

@@ -1,7 +1,7 @@
 //! Captures in pcapng, link types 250 and 227: those of [`crate::report::pcapng`], [`crate::report::pcapng_telegrams`] and
 //! [`crate::report::pcapng_frames`], and those of others with one interface a link or a station.
 //!
-//! Both orders of bytes, every resolution of time, several sections; blocks and options of other kinds are passed over. A
+//! Both orders of bytes, every resolution of time, several sections; blocks and options of other kinds are ignored. A
 //! packet may hold several bytes: the time is that of the first, the others follow without a gap. Where the first
 //! packet is later than a day, times count from a byte time before it.
 
@@ -41,7 +41,7 @@ use values::{means_loss, noted};
 const IF_TSOFFSET: u16 = 14;
 /// What the name of a shared line begins with.
 const LINE: &str = "bus";
-/// The time of an octet on a line that all stations share, where no interface says its rate: that of 500 kbit/s.
+/// The time of an octet on a shared line whose rate no interface gives: that of 500 kbit/s.
 const OCTET: Span = Span::from_nanos(2_000 * BITS_PER_BYTE);
 /// Blocks of packets that no program writes any more where times matter.
 const SIMPLE: u32 = 3;
@@ -232,7 +232,7 @@ pub(super) struct Reader<'b> {
     /// Frames with the number of their part.
     frames: Vec<(usize, FrameRead)>,
     parts: Vec<Part>,
-    /// What `capture` has noted beside bytes and frames.
+    /// What `capture` has noted besides bytes and frames.
     events: Vec<String>,
     /// What the user says of interfaces.
     links: &'b [NamedLink],
@@ -290,7 +290,7 @@ impl<'b> Reader<'b> {
         Err(CaptureError::At { offset, what })
     }
 
-    /// Reads the block at `offset`; says where the next one begins.
+    /// Reads the block at `offset`. Returns where the next one begins.
     fn block(&mut self, offset: usize) -> Result<usize, CaptureError> {
         let all = self.bytes.len();
         // The type of a section header reads the same in both orders.

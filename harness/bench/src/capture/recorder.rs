@@ -97,7 +97,7 @@ impl<W: Write> LiveRecorder<W> {
     /// Begins a capture of these places.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Writing to `out` fails.
     pub fn start(out: W, places: &[RecordedPlace]) -> io::Result<Self> {
         let mut recorder = Self {
             out,
@@ -169,7 +169,7 @@ impl<W: Write> LiveRecorder<W> {
     /// Writes what waits, in one piece.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Writing to `out` fails.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.write_all(&self.waiting)?;
         self.written += self.waiting.len() as u64;
@@ -177,7 +177,7 @@ impl<W: Write> LiveRecorder<W> {
         self.out.flush()
     }
 
-    /// Bytes of the file so far.
+    /// Bytes written to the file so far.
     pub const fn written(&self) -> u64 {
         self.written
     }

@@ -204,7 +204,7 @@ impl OwedReply {
 pub struct TelegramCutter {
     octet: u64,
     asked: OwedReply,
-    /// What is not cut yet: when it was read, in nanoseconds, and what it is.
+    /// Octets not yet cut, each with the time in nanoseconds at which it was read.
     waiting: Vec<(u64, Received)>,
     /// The end of the last telegram.
     end: u64,
@@ -240,7 +240,7 @@ impl TelegramCutter {
         found
     }
 
-    /// The sender of the first telegram, whether it begins an exchange, and its octets; `None` where it may go on.
+    /// The sender of the first telegram, whether it begins an exchange, and its number of octets; `None` where it may continue.
     fn next(&mut self, now: u64) -> Option<(Option<u8>, bool, usize)> {
         let (last, _) = self.waiting.last()?;
         let (_, first) = self.waiting.first()?;

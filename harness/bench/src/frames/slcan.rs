@@ -96,7 +96,7 @@ impl BitTiming {
     }
 }
 
-/// What a host says to an adapter.
+/// A command of a host to an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SlcanCommand {
     /// Nothing: an empty line, with which hosts clear what was begun.
@@ -194,7 +194,7 @@ impl SlcanCommand {
     }
 }
 
-/// What an adapter says to its host.
+/// An answer or a report of an adapter to its host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Report {
     /// CR: the command was done.
@@ -219,7 +219,7 @@ pub enum Report {
 }
 
 impl Report {
-    /// Reads a line and what ended it, CR or BEL. What stands in front of a BEL is dropped.
+    /// Reads a line and its end, CR or BEL. Text before a BEL is dropped.
     ///
     /// # Errors
     /// [`BadMessage`]: a frame that is not one.

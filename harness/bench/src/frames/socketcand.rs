@@ -30,7 +30,7 @@ pub(crate) struct Stamp {
     pub micros: u32,
 }
 
-/// What a client says.
+/// A message of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum SocketcandRequest {
     /// `open`: the bus with this name.
@@ -88,7 +88,7 @@ impl SocketcandRequest {
     }
 }
 
-/// What the server says.
+/// A message of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum SocketcandAnswer {
     /// `hi`, at the beginning.
@@ -240,7 +240,7 @@ fn stamp(word: &[u8]) -> Option<Stamp> {
     })
 }
 
-/// Cuts a stream into messages. What stands between messages is dropped if it is blank, and is an error if not.
+/// Cuts a stream into messages. Text between messages is dropped if it is blank, and is an error if not.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Messages {
     begun: Vec<u8>,
@@ -252,7 +252,7 @@ impl Messages {
     /// Takes a character; gives the message that it ends, its brackets included.
     ///
     /// # Errors
-    /// The message is longer than [`MAX_MESSAGE`], or something else stands in front of it; it is dropped.
+    /// The message is longer than [`MAX_MESSAGE`], or other text precedes it; it is dropped.
     pub(crate) fn push(&mut self, character: u8) -> Option<Result<Vec<u8>, BadMessage>> {
         if self.begun.is_empty() && character.is_ascii_whitespace() {
             return None;

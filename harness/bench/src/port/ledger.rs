@@ -44,7 +44,7 @@ impl Ledger {
         self.read = self.read.wrapping_add(1);
     }
 
-    /// Whether it is time to ask the driver, where nothing has come.
+    /// Whether it is time to ask the driver if nothing was received.
     pub(super) fn is_due(&self, now: Instant) -> bool {
         now >= self.asked + OFTEN
     }
@@ -66,7 +66,7 @@ impl Ledger {
     }
 }
 
-/// How far a count is ahead of another one that may be ahead of it too.
+/// How far a count is ahead of another; 0 if it is behind.
 fn more(counted: u32, known: u32) -> u32 {
     let ahead = counted.wrapping_sub(known);
     if ahead < 1 << 31 { ahead } else { 0 }

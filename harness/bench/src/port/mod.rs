@@ -36,7 +36,7 @@ pub use wire::{Abilities, Outgoing, Wire};
 use rustix::thread::set_current_timer_slack;
 use std::num::NonZeroU64;
 
-/// What is said of a port that may not make the rate of its line.
+/// The warning about a port that may not make the rate of its line.
 pub const UNPROVEN_RATE: &str = "the driver of the port does not say whether its chip makes this rate: the guide's page on wiring tells which do";
 
 /// Lets the sleeps of this thread and of those that it starts end when they are due. By itself the system lets them take up to 50 us

@@ -85,7 +85,7 @@ pub enum NegotiationError {
     Io(#[from] io::Error),
 }
 
-/// The settings, in the order in which they are asked for: name, command, value, bytes of it.
+/// The settings in the order of the requests: name, command, value, number of bytes of the value.
 fn settings(format: Format) -> [(&'static str, u8, u32, usize); 5] {
     let (parity, code) = match format.parity {
         Parity::None => ("no parity", 1),
@@ -201,7 +201,7 @@ impl Telnet {
         }
     }
 
-    /// The answer to a setting, if it has come.
+    /// The answer to a setting, if it was received.
     fn answer_to(&mut self, command: u8) -> Option<u32> {
         while let Some(answer) = self.answers.pop_front() {
             if answer.get(1) == Some(&(command + ANSWER)) {
@@ -275,7 +275,7 @@ fn notify(telnet: &mut Telnet, mut stream: &TcpStream) -> Result<(), Negotiation
     }
 }
 
-/// Reads until something has come.
+/// Reads until something is received.
 fn converse<T>(
     telnet: &mut Telnet,
     mut stream: &TcpStream,

@@ -28,7 +28,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Bits of a byte on the line with its parity bit.
 const BITS: u32 = 11;
 
-/// What the bytes of a driver that says too early that all have left may be late by: a USB adapter gets them each millisecond.
+/// How late the bytes of a driver may be that reports too early that all were sent: a USB adapter gets them each millisecond.
 const HASTY: Duration = Duration::from_millis(2);
 
 /// How much later than it came a byte may be read: adapters collect bytes for up to 16 ms.
@@ -45,7 +45,7 @@ pub struct Switch {
     pub marked: u64,
 }
 
-/// What belongs to a serial port beside its stream.
+/// The state of a serial port besides its stream.
 #[derive(Debug)]
 pub(super) struct Serial {
     port: TTYPort,

@@ -164,7 +164,7 @@ fn a_pty_shows_even_parity_at_the_byte_and_odd_around_it() {
     assert!(is_odd(&master));
 }
 
-/// What is no serial port says so, each in its own words.
+/// Anything but a serial port is refused, each with its own message.
 #[test]
 fn what_is_no_serial_port() {
     let (_master, _slave, pty) = terminal();

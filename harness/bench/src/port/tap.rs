@@ -158,7 +158,7 @@ impl SilentTap {
         both.map_or(0, |(ledger, counts)| ledger.beside(counts, now).0)
     }
 
-    /// What the driver has counted at this port so far; `None` where it does not count.
+    /// The driver's counts of this port; `None` if it does not count.
     #[must_use]
     pub fn counts(&self) -> Option<Counts> {
         harness_uart::counts(&self.fd)
@@ -240,7 +240,7 @@ fn listens(now: &Termios, wanted: &Termios) -> bool {
         && speed.abs_diff(right) <= right / 50
 }
 
-/// The first flag with which a port answers by itself what it receives.
+/// The first flag by which a port itself answers what it receives.
 fn speaks(mode: &Termios) -> Option<&'static str> {
     let local = |flag| mode.local_modes.contains(flag);
     let input = |flag| mode.input_modes.contains(flag);

@@ -24,7 +24,7 @@ const MOST_CHUNKS: usize = 1_024;
 /// What may wait to be taken by the operating system.
 pub(super) const MOST_WAITING: usize = 65_536;
 
-/// What a wire shows and does beside carrying bytes.
+/// What a wire can do besides carrying bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Abilities {
     /// A line error received is shown at its byte.
@@ -67,7 +67,7 @@ pub struct Wire {
     waiting: VecDeque<WirePiece>,
     /// Bytes in `waiting`.
     bytes_waiting: usize,
-    /// Line errors of which it is not known at which byte they were.
+    /// Line errors whose byte is not known.
     unplaced: u64,
     /// Bytes that were read, as coded.
     read: u64,
@@ -119,7 +119,7 @@ impl Wire {
         }
     }
 
-    /// Where it leads, as the rig's file says it.
+    /// The name of the port in the rig's file.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -360,7 +360,7 @@ impl Wire {
         !self.early.is_empty()
     }
 
-    /// Reads what has come.
+    /// Reads what was received.
     ///
     /// # Errors
     /// [`Trouble::Lost`] where the port is gone or the other end has closed the connection,

@@ -25,7 +25,7 @@ impl Client {
         }
     }
 
-    /// Reads; 0 bytes where the client closed its end. The second value says how long ago the last of the bytes arrived.
+    /// Reads; 0 bytes if the client closed its end. The second value is the age of the last byte.
     ///
     /// # Errors
     /// Nothing is there to read, or the connection failed.
@@ -83,7 +83,7 @@ mod system {
         let _without = setsockopt(listener.as_raw_fd(), ReceiveTimestampns, &true);
     }
 
-    /// Reads, and says how old the stamp of the last byte is, if there is a stamp and it does not lie ahead of the clock.
+    /// Reads. Returns also the age of the stamp of the last byte, if there is one and it is not ahead of the clock.
     pub(super) fn receive(
         stream: &TcpStream,
         buffer: &mut [u8],

@@ -6,7 +6,7 @@ use std::time;
 /// The most that handing over bytes counts for: less than a bit (ND21 8.1).
 const MOST: Span = Span::from_micros(20);
 
-/// How many times the last handing over counts in what it takes.
+/// The weight of the latest handover in the estimate of how long one takes.
 const LAST: u64 = 8;
 
 /// The clock of served rings. A write to a socket takes microseconds, the end of a line takes none. The rings' time is therefore ahead of

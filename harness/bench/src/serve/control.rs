@@ -27,7 +27,7 @@ impl fmt::Display for ControlAnswer {
     }
 }
 
-/// The first mistake in a line, and where it stands: characters counted from 1.
+/// The first mistake in a line, and its column: characters counted from 1.
 pub fn first(line: &str, problems: &Problems) -> String {
     let Some(problem) = problems.all().first() else {
         return problems.to_string();

@@ -15,7 +15,7 @@ const CHUNK: usize = 4096;
 /// Maximum bytes of answers that the client has not read yet; while they are reached, no further line is read.
 const UNREAD: usize = 64 << 10;
 
-/// Where lines of control come from, what of them has come, and what of the answers has not gone.
+/// A source of control lines, with the part of a line received so far and the answers not yet sent.
 pub(super) struct ControlStream {
     source: Source,
     lines: Lines,
@@ -66,7 +66,7 @@ impl ControlStream {
         }
     }
 
-    /// Does the lines that have come, and answers them.
+    /// Executes the lines received and answers them.
     ///
     /// # Errors
     /// An answer cannot be written to standard output.

@@ -5,7 +5,7 @@ use crate::scenario::source::MAX_LINE;
 /// A line without its end, or how many bytes a line has that is too long.
 pub(super) type ReadLine = Result<String, usize>;
 
-/// Bytes of which no line has come yet. A line that is too long is not kept.
+/// The bytes of an unfinished line. A line that is too long is not kept.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     begun: Vec<u8>,

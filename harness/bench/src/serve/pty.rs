@@ -114,7 +114,7 @@ impl Pty {
         polled.is_ok() && !fds[0].revents().contains(PollFlags::HUP)
     }
 
-    /// Notes that a client is there, because bytes have come; returns whether it was not known before.
+    /// Notes that a client is connected, because bytes were received. Returns whether that was unknown before.
     pub(super) fn heard(&mut self) -> bool {
         !std::mem::replace(&mut self.here, true)
     }
@@ -131,7 +131,7 @@ impl Pty {
         Ok(rustix::io::write(&self.master, bytes)?)
     }
 
-    /// The client has gone, and all that it sent has been read: what it did not read is dropped. Returns whether another one is there.
+    /// The client has disconnected and all its input was read: its unread output is dropped. Returns whether another client is connected.
     pub(super) fn gone(&mut self) -> bool {
         // Where it fails, the next client reads it.
         let _unflushed =

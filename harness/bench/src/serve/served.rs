@@ -17,7 +17,7 @@ pub trait ServedBus {
     fn title(&self, seat: usize) -> String;
     /// A client takes a seat.
     fn come(&mut self, seat: usize);
-    /// The client has gone; what it has not fetched is dropped.
+    /// The client has disconnected; its unread output is dropped.
     fn go(&mut self, seat: usize);
     /// How many octets of its client's stream a seat takes now.
     fn room(&self, seat: usize) -> usize;

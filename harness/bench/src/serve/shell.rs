@@ -37,7 +37,7 @@ pub struct ServeOptions<P> {
     pub allow_remote: bool,
     /// Whether the end comes when the clients have gone.
     pub once: bool,
-    /// How long it goes on, if not until a signal comes.
+    /// How long to serve; `None` until a signal arrives.
     pub length: Option<Span>,
 }
 
@@ -450,7 +450,7 @@ impl Shell<'_> {
             .say(&format!("{}: {text}", self.server.name(seat)));
     }
 
-    /// Takes what a client has sent, as far as there is room for it; says whether that was all. What the system has had for a while came
+    /// Reads what a client has sent, as far as there is room. Returns whether that was all. What the system has had for a while came
     /// then, and not now.
     fn hear(&mut self, seat: usize) -> io::Result<bool> {
         let mut buffer = [0; CHUNK];
@@ -487,7 +487,7 @@ impl Shell<'_> {
         }
     }
 
-    /// Gives a client what has come for it, as far as it takes it.
+    /// Sends a client its output, as far as it takes it.
     fn speak(&mut self, seat: usize) -> io::Result<()> {
         if self.server.lost(seat) > 0 && !std::mem::replace(&mut self.losing[seat], true) {
             self.say(seat, "bytes are lost: the client does not read");

@@ -53,7 +53,7 @@ impl Listener {
     }
 }
 
-/// A socket, and the client that has come.
+/// A socket and its present client.
 #[derive(Debug)]
 pub(super) struct Tcp {
     listener: Listener,
@@ -87,7 +87,7 @@ impl Tcp {
         self.client = Some(client);
     }
 
-    /// Reads of the client; 0 bytes where it has gone. The second value says how long ago the last of them arrived.
+    /// Reads from the client; 0 bytes if it has disconnected. The second value is the age of the last byte.
     pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<(usize, Span)> {
         match &mut self.client {
             Some(client) => client.read(buffer),

@@ -70,7 +70,7 @@ impl Drop for ServedThread {
     }
 }
 
-/// Passes the places on: the lines with which a server begins, which end in ` at PLACE`.
+/// Passes on the first lines of a server, which end in ` at PLACE`.
 struct Teller(Sender<String>);
 
 impl ServeHost for Teller {

@@ -18,7 +18,7 @@ use super::super::order::Place;
 use super::logs::{frame, identifier, logged};
 use super::numbers::{Time, seconds};
 
-/// The lines in which a heading is looked for.
+/// The number of lines in which to look for a heading.
 const HEADING: usize = 20;
 
 /// Whether a file is such a log: a line of its heading says the radix.
@@ -37,7 +37,7 @@ struct Reader {
     relative: bool,
     /// The time of the event before.
     before: Time,
-    /// Lines so far, and blocks: a trigger begins and ends each of them.
+    /// The present line and block. A trigger begins and ends a block.
     place: Place,
 }
 

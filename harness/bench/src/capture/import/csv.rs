@@ -1,4 +1,4 @@
-//! The tables that `trace --format csv` writes. Columns that say in words what the others say are passed over.
+//! The tables that `trace --format csv` writes. Columns that repeat others in words are ignored.
 
 use super::super::frames::{FrameRead, Sender, assemble};
 use super::super::order::{Counts, Place};

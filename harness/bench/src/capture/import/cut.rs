@@ -17,7 +17,7 @@ pub(super) enum Parts {
     Objects,
 }
 
-/// The part of a file that is whole, and what is said of the rest.
+/// The complete part of a file, and notes about the rest.
 ///
 /// # Errors
 /// A file of lines in which no line has an end.

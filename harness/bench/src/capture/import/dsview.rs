@@ -46,7 +46,7 @@ fn unit(name: &str) -> Option<&'static str> {
 /// A row of a decoder.
 enum RowItem {
     Octet(u8),
-    /// The octet in front of it is damaged.
+    /// The octet before it is damaged.
     Error(LineError),
     /// A start, parity or stop bit.
     Bit,
@@ -60,7 +60,7 @@ enum Radix {
 }
 
 impl Radix {
-    /// That of all fields of a column; `None` where they may be decimal numbers as well.
+    /// The radix of all fields of a column; `None` if they may be decimal numbers as well.
     fn of<'f>(fields: impl Iterator<Item = &'f str> + Clone) -> Option<Self> {
         let short = |field: &str| field.chars().count() == 1 || field.starts_with('[');
         if fields.clone().any(short) {

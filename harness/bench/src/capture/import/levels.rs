@@ -38,7 +38,7 @@ pub(super) struct Levels {
     pub(super) changes: Vec<Change>,
     /// The time between two samples, where the file says it.
     pub(super) sample: Option<Time>,
-    /// Until when the last level is known to have lasted, where the file says so.
+    /// The end of the last level, if the file says it.
     pub(super) end: Option<Time>,
 }
 

@@ -102,7 +102,7 @@ pub(super) struct ChannelRead {
     pub(super) signal: Signal,
 }
 
-/// A channel of which is known what it is the record of.
+/// A channel whose link or station is known.
 struct LinkChannel {
     target: ChannelTarget,
     channel: ChannelRead,
@@ -141,7 +141,7 @@ fn only_one(name: &String, channels: &[ChannelRead]) -> Result<Option<usize>, Ca
     Err(wrong(format!("two channels are named `{name}`: {remedy}")))
 }
 
-/// The channels that are links, by what the user says and by their names; and what is to be told about the others.
+/// The channels that are links, by what the user says and by their names. Adds notes about the others.
 fn choose(
     mut channels: Vec<ChannelRead>,
     settings: &ReadSettings,
@@ -224,7 +224,7 @@ pub(in crate::capture) fn unread_octets(read: &LineRead) -> Option<String> {
     (read.unread > 0).then(|| about.to_owned())
 }
 
-/// The format of the lines: as it was given, or as it is found.
+/// The format of the lines, as given or as found.
 fn format(
     chosen: &[LinkChannel],
     settings: &ReadSettings,

@@ -15,7 +15,7 @@ use crate::counted::counted;
 use crate::report::pcapng_frames::ERROR;
 use harness_proto::can::{Frame, Id};
 
-/// Where a line of a frame is looked for after headings.
+/// The number of lines in which to look for a frame after headings.
 const HEADING: usize = 4_096;
 
 pub(super) struct Form {
@@ -29,13 +29,13 @@ pub(super) const CANDUMP: Form = Form {
     line: candump,
     wraps: None,
 };
-/// What the lines so far have said.
+/// What is known from the lines so far.
 pub(super) struct State {
     /// A frame has been read.
     begun: bool,
-    /// Lines in front of the first frame that say nothing here.
+    /// Lines before the first frame that are ignored.
     headings: usize,
-    /// The columns, where a heading says them.
+    /// The columns, if a heading names them.
     pub(super) columns: String,
     pub(super) radix: u32,
     /// Each time counts from the frame before.

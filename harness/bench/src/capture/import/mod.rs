@@ -30,7 +30,7 @@ use cut::{Parts, whole_part};
 use harness_proto::line::Rate;
 use links::ChannelRead;
 
-/// What is known of a file beside its bytes.
+/// What is known of a file besides its bytes.
 #[derive(Clone, Debug, Default)]
 pub struct ReadSettings {
     /// The rate of a ring's line, where the file does not say it.
@@ -315,7 +315,7 @@ const FOREIGN: [(&[u8], &str); 13] = [
     ),
 ];
 
-/// Without the mark that some programs write in front of UTF-8.
+/// Without the byte order mark that some programs write before UTF-8.
 fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }

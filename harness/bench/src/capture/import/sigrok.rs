@@ -8,7 +8,7 @@ use super::levels::{Level, Levels, sample_time};
 use super::links::{ChannelRead, Signal};
 use super::numbers::{Time, units};
 
-/// Rows of which no two are equal, from which on equal ones must have been left out.
+/// The number of rows, no two of them equal, from which on equal rows must have been left out.
 const ALL_DIFFER: u64 = 100;
 
 /// Whether a file is a table by sigrok.

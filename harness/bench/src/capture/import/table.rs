@@ -11,7 +11,7 @@ pub(super) struct Table<'b> {
     pub(super) columns: Vec<String>,
     /// The row, from [`Table::next`].
     record: ByteRecord,
-    /// Lines in front of the table.
+    /// Number of lines before the table.
     above: u64,
 }
 

@@ -134,7 +134,7 @@ fn levels_become_octets_at_every_rate_of_a_ring() {
     }
 }
 
-/// The parity is the bus's: a station with another one is damaged and not taken for right.
+/// The parity is that of the bus: octets of a station with another one are damaged.
 #[test]
 fn another_parity_is_not_taken_for_right() {
     let file = digital(&drawn(&many(), Parity::Even, 3), 38_400.0);

@@ -171,7 +171,7 @@ impl Receiver<'_> {
     }
 }
 
-/// The octets of a line that are looked at to find its format.
+/// How many octets of a line are examined to find its format.
 const LOOKED_AT: usize = 20_000;
 
 /// How well a format explains lines.

@@ -39,7 +39,7 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
     first.is_some_and(|(_, token)| FIRST.contains(&token))
 }
 
-/// The length of the line that sigrok-cli 0.7 prints in front of what it converts: `META samplerate: 10000000`.
+/// The length of the line that sigrok-cli 0.7 prints before what it converts: `META samplerate: 10000000`.
 fn said(bytes: &[u8]) -> usize {
     let line = bytes.iter().position(|byte| *byte == b'\n');
     line.filter(|_| bytes.starts_with(b"META ")).unwrap_or(0)

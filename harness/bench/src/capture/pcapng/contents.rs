@@ -28,7 +28,7 @@ pub(in crate::capture) struct Packet {
     pub(in crate::capture) end: usize,
 }
 
-/// A frame after a header of Linux: the length of the header, the number of the part, and the identifier as it stands.
+/// A frame after a header of Linux (SLL): the length of the header, the number of the part, and the identifier as written.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CookedFrame {
     packet: Packet,

@@ -65,7 +65,7 @@ pub(super) struct Interface {
     pub(super) heard: Option<(u64, u64)>,
 }
 
-/// What an interface stands for.
+/// What the data of an interface are.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
     /// A link of a ring: the ring, and the ends of the link.

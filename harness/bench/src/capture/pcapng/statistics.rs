@@ -1,4 +1,4 @@
-//! The statistics of an interface: when a capture began and ended, beside what was heard.
+//! The statistics of an interface: when a capture began and ended.
 
 use super::super::{CaptureError, CaptureSpan};
 use super::{Reader, nanoseconds};

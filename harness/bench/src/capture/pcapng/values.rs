@@ -4,7 +4,7 @@ use crate::capture::recorder::AWAY;
 use crate::report::pcapng::NANOSECONDS;
 use crate::scenario::run::record::from_hex;
 
-/// What the transmitter sent, where a comment says so: `sent 12`, `sent nothing`.
+/// What the transmitter sent, if a comment says it: `sent 12`, `sent nothing`.
 pub(super) fn sent(comment: &[u8]) -> Option<Option<u8>> {
     let stated = std::str::from_utf8(comment.strip_prefix(b"sent ")?).ok()?;
     match from_hex(stated).as_deref() {
@@ -16,7 +16,7 @@ pub(super) fn sent(comment: &[u8]) -> Option<Option<u8>> {
 /// Events of a capture noted at most.
 const NOTED: usize = 10;
 
-/// What a capture says of itself beside bytes and frames, in sentences.
+/// The remarks of a capture besides bytes and frames, in sentences.
 pub(super) fn noted(events: Vec<String>) -> Vec<String> {
     let more = events.len().saturating_sub(NOTED);
     let events = events.into_iter().filter(|event| !event.is_empty());

@@ -22,7 +22,7 @@ pub trait SharedBus {
     /// The bit rate of the bus.
     fn rate(&self) -> BitRate;
 
-    /// What is on the bus beside the clients: `2 drives`.
+    /// The stations of the bus besides the clients: `2 drives`.
     fn about(&self) -> String;
 
     fn now(&self) -> Instant;

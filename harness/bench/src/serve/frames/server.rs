@@ -23,7 +23,7 @@ const CATCH_UP: Span = Span::from_millis(1_000);
 /// The longest wait for something that happens by itself.
 const IDLE: Span = Span::from_millis(1_000);
 
-/// How long the station of a client that has gone may go on to send what waits.
+/// How long the station of a disconnected client may continue to send its queue.
 const AFTERWARDS: Span = Span::from_millis(1_000);
 
 /// A simulated bus and its clients.
@@ -79,7 +79,7 @@ impl<B: SharedBus> FrameServer<B> {
         &mut self.bus
     }
 
-    /// What is on the bus beside the clients.
+    /// The stations of the bus besides the clients.
     #[must_use]
     pub fn about(&self) -> String {
         self.bus.about()
@@ -102,7 +102,7 @@ impl<B: SharedBus> FrameServer<B> {
         Some(number)
     }
 
-    /// The client has gone: what it has not fetched is dropped, and what it has sent goes its way.
+    /// The client has disconnected: its unread output is dropped, and what it has sent is still transmitted.
     pub fn go(&mut self, client: usize) {
         self.leave(client);
         if let Some(seat) = self.seats.get_mut(client) {

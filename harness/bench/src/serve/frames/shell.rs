@@ -319,7 +319,7 @@ impl<B: SharedBus> Shell<'_, B> {
         self.say(seat, &format!("{text}{lost}"));
     }
 
-    /// Takes what a client has sent, as far as there is room for it; says whether that was all. What the system has had for a while came
+    /// Reads what a client has sent, as far as there is room. Returns whether that was all. What the system has had for a while came
     /// then, and not now.
     fn hear(&mut self, seat: usize) -> io::Result<bool> {
         let mut buffer = [0; CHUNK];
@@ -359,7 +359,7 @@ impl<B: SharedBus> Shell<'_, B> {
         }
     }
 
-    /// Gives a client what has come for it, as far as it takes it.
+    /// Sends a client its output, as far as it takes it.
     fn speak(&mut self, seat: usize) -> io::Result<()> {
         let Some(client) = self.seats[seat].client else {
             return Ok(());
