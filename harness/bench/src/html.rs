@@ -164,7 +164,7 @@ impl Html {
     }
 }
 
-/// How a policy of a page names a script or a style that is part of it: `'sha256-...'`.
+/// How the policy of a page names a script or a style in it: `'sha256-...'`.
 pub(crate) fn hash_source(text: &str) -> String {
     format!("'sha256-{}'", base64(&Sha256::digest(text.as_bytes())))
 }

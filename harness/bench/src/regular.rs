@@ -67,7 +67,7 @@ pub fn open(path: &Path, links: Links) -> io::Result<File> {
     }
 }
 
-/// What is said of a file that is not there: the name that was probably meant, if its folder has one.
+/// The remark about a missing file: the name that was probably meant, if its folder has one.
 fn no_such_file(path: &Path) -> String {
     let folder = folder_of(path);
     match near_in_folder(path) {
@@ -189,7 +189,7 @@ pub fn read(path: &Path, links: Links, most: u64) -> io::Result<Vec<u8>> {
 /// shell substitution `>(...)`, is written to and stays.
 ///
 /// # Errors
-/// It cannot be written, or something else than a file stands there.
+/// It cannot be written, or the path is no file.
 pub fn write(
     path: &Path,
     write: impl FnOnce(BufWriter<&File>) -> io::Result<()>,

@@ -8,7 +8,7 @@ pub enum Trouble {
     /// The guard has denied a byte: what the bench does not allow never reaches a wire. The text names the command, the drive,
     /// and what would allow it.
     Denied(String),
-    /// The port is gone, or the other end has closed the connection.
+    /// The port was lost, or the other end has closed the connection.
     Lost(String),
     /// The port's input is not a marked stream: the other end does not mark its bytes, or marks were cut.
     Garbled(String),
@@ -25,7 +25,7 @@ impl Trouble {
         !matches!(self, Self::Denied(_))
     }
 
-    /// Whether the bench itself has failed, or may not go on: neither a denial nor an interruption.
+    /// Whether the bench itself has failed or must not continue: neither a denial nor an interruption.
     #[must_use]
     pub fn is_of_the_bench(&self) -> bool {
         matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interlock(_))

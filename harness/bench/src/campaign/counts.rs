@@ -61,7 +61,7 @@ struct PairFacts {
     located_closer: u64,
 }
 
-/// How many cases a class has; the class `cases` stands for all.
+/// Number of cases of a class; the class `cases` is all of them.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassCount {
@@ -289,7 +289,7 @@ impl CountsFile {
         Ok((file, partition))
     }
 
-    /// What must be the same in all parts: the name of each fact, and what it is here.
+    /// The facts that must be the same in all parts: name and value.
     fn fingerprint(&self, partition: Partition) -> Vec<(String, String)> {
         let mut facts = vec![
             ("version of drivebench".to_owned(), self.drivebench.clone()),

@@ -1,4 +1,4 @@
-//! Campaigns: one conversation, disturbed at every place and in every way, or at a sample of them, and what came of it.
+//! Campaigns: one conversation, disturbed at every place and in every way or at a sample of them, and the outcomes.
 //!
 //! Here is what campaigns of all buses have in common. The folder of a bus says how a case is played and what its outcomes are.
 
@@ -131,7 +131,7 @@ pub trait PlayedCampaign {
     /// The cases of a class, one a line.
     fn lines(&self, class: usize) -> String;
 
-    /// All of it for tools; of its cases those of a class, where that is given.
+    /// The campaign for tools; with `only`, the cases of that class alone.
     fn json(&self, class: Option<usize>) -> serde_json::Value;
 
     /// A section of a page; `number` counts its sections from 1.

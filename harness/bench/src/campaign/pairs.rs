@@ -238,7 +238,7 @@ mod tests {
         close(interval(81, 263), (0.2553, 0.3662));
     }
 
-    /// Counts of a file that are in another order, or of which one is missing, are no pairs: they would be taken for those of other classes.
+    /// Counts in another order, or with one missing, are refused: they would be counted for other classes.
     #[test]
     fn names_of_pairs_are_all_there_in_their_order() {
         let names = ["one byte", "one link", "two links"].map(|apart| {

@@ -78,7 +78,7 @@ fn unfault((kind, number): &(String, u64)) -> Option<LinkFault> {
 }
 
 impl RecordLine {
-    /// An event as a line; `None` for what no rig can be given: drives' power and what stands outside the bus.
+    /// An event as a line; `None` for what no rig can do: drives' power and stimuli outside the bus.
     #[must_use]
     pub fn of(event: &LinkEvent) -> Option<Self> {
         let units = |at: &Instant| at.since_start().units();

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 /// The names that a folder has given.
 #[derive(Debug, Default)]
 pub struct Names {
-    /// Those of a part of a run, which are the names in the folder of the whole run.
+    /// The names of a part of a run: those in the folder of the whole run.
     planned: VecDeque<String>,
     given: BTreeSet<String>,
 }

@@ -1,4 +1,4 @@
-//! A record read back: every line is one, holds what can be, and stands where it can. The first that does not is named with its
+//! A record read back: every line must be valid, possible and in its place. The first that is not is named with its
 //! place.
 
 use super::error::RecordError;
@@ -103,7 +103,7 @@ fn parse(bytes: &[u8]) -> Result<RecordLine, (usize, String)> {
     }
 }
 
-/// What stood in front of a line.
+/// What precedes a line.
 #[derive(Default)]
 struct Order {
     drives: Vec<u8>,
@@ -116,7 +116,7 @@ struct Order {
 }
 
 impl Order {
-    /// Whether a line can stand after those before, and hold what it holds; why not, in a sentence.
+    /// Whether a line can follow those before and have these contents; why not, in a sentence.
     fn take(&mut self, line: &RecordLine) -> Result<(), String> {
         if self.ended {
             return Err("nothing can stand behind the end of the record".to_owned());

@@ -11,7 +11,7 @@ use super::{Differing, Finding, FuzzCase, Pool};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
-/// After how many flaky sightings a difference is no longer looked at.
+/// After how many flaky sightings a difference is ignored.
 const SETTLED: u8 = 3;
 
 /// The bounds of a run.
@@ -39,7 +39,7 @@ pub enum RunEnd {
     Over(String),
 }
 
-/// What a run tells of while it goes on.
+/// Receives the events of a run.
 pub trait Watcher<C: FuzzCase> {
     /// A round begins, with what its cases may have.
     fn round(&mut self, round: u64, swarm: &Swarm<C::Spice>);
@@ -82,7 +82,7 @@ impl<C: FuzzCase> FuzzRun<C> {
         }
     }
 
-    /// A run that goes on: what was kept is kept again, what was found is known.
+    /// A resumed run: its pool and its findings are those of the record.
     ///
     /// # Errors
     /// The model cannot be made.

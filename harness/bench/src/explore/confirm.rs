@@ -24,7 +24,7 @@ pub struct Confirmation<'k> {
 }
 
 impl<'k> Confirmation<'k> {
-    /// That of a finding which is to be seen again `confirm` times in `of` attempts.
+    /// The confirmation of a finding that must be seen again `confirm` times in `of` attempts.
     pub const fn new(confirm: u8, of: u8, known: &'k BTreeMap<String, u8>) -> Self {
         Self {
             confirm,

@@ -1,6 +1,6 @@
 //! Numbers from a seed: the same seed gives the same numbers.
 
-/// A generator of numbers with the questions that are asked of it here.
+/// A generator of random numbers with the methods needed here.
 #[derive(Clone, Debug)]
 pub struct Dice(fastrand::Rng);
 

@@ -21,7 +21,7 @@ pub enum ExploreError {
     /// The request cannot be met; the text says what is possible.
     #[error("{0}")]
     Usage(String),
-    /// The line is gone.
+    /// The line is lost.
     #[error("{0}")]
     Lost(String),
 }

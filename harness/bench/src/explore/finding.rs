@@ -45,7 +45,7 @@ impl<C: FuzzCase> Finding<C> {
     /// The version of the format.
     pub const SCHEMA: u32 = SCHEMA;
 
-    /// The finding of a file: its JSON, or the scenario beside it.
+    /// Reads the finding of a file: its JSON, or the scenario beside it.
     ///
     /// # Errors
     /// There is no finding, or it is damaged.

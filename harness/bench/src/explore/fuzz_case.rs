@@ -1,4 +1,4 @@
-//! What a bus gives so that a run can explore it: the conversation as a value, and what makes, compares and tells of it.
+//! What a bus implements so that a run can explore it: the conversation as a value, and how to make, compare and describe it.
 
 use super::confirm::Confirmation;
 use super::{ExploreError, Finding, FuzzSettings, Pool, Rehearsal, Swarm, Target};
@@ -36,13 +36,13 @@ pub trait Differing: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwn
     fn is_time(&self) -> bool;
 }
 
-/// What came of judging a finding again.
+/// The result of judging a finding again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JudgedAgain {
     Same,
     /// Something else, and what.
     Differs(String),
-    /// The folder does not have what it rests on.
+    /// The folder lacks the files that it needs.
     Unknown,
 }
 
@@ -115,7 +115,7 @@ pub trait FuzzCase:
     /// Tries a finding again until it is confirmed, or is not. `before` is what was sent before its case.
     ///
     /// # Errors
-    /// The rig cannot go on.
+    /// The rig cannot continue.
     fn confirm(
         confirmation: &mut Confirmation<'_>,
         finding: &mut Finding<Self>,

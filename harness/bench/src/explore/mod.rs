@@ -1,4 +1,4 @@
-//! Exploring: generated conversations, tried on drives beside their model.
+//! Exploring: generated conversations, tried on drives and compared with their model.
 //!
 //! A conversation is a value that implements [`FuzzCase`]; each bus has its own. It is made from a seed, within a [`Swarm`]'s subset of
 //! what a conversation can have; a [`Target`] tries it: on simulated drives, or on a rig with ports behind its guard. A [`Pool`] keeps the

@@ -22,7 +22,7 @@ pub struct Naming {
     pub source: Option<String>,
 }
 
-/// What promoting wrote, and what it saw.
+/// The files that promoting wrote, and its result.
 #[derive(Clone, Debug)]
 pub struct Promoted {
     /// The scenario, the input where there is one, and the snapshot.
@@ -32,7 +32,7 @@ pub struct Promoted {
     pub fails_on_deviating: Option<bool>,
 }
 
-/// Plays a scenario with this name and text on simulated drives: what comes of it, why, and its page.
+/// Plays a scenario with this name and text on simulated drives. Returns the verdict, the reason and the page.
 pub(crate) type Plays = fn(&str, &str) -> Result<(Verdict, String, String), ExploreError>;
 
 /// A case whose findings can be kept as scenarios.
@@ -87,7 +87,7 @@ pub fn checkout(from: &Path) -> Result<PathBuf, ExploreError> {
 /// one of the files is there.
 ///
 /// # Errors
-/// A name or a table that cannot be, files that are there, a scenario that does not pass on the model.
+/// The name or the table is invalid, a file exists, or the scenario does not pass on the model.
 pub fn promote<C: Promotes>(
     finding: &Finding<C>,
     naming: &Naming,

@@ -1,6 +1,6 @@
-//! The folder of a run: what happens is written as it happens, line by line, so that a run that was killed goes on where it was.
+//! The folder of a run: events are written as they happen, line by line, so that a killed run resumes where it was.
 //!
-//! `run.jsonl` is the record. After a line of progress everything in front of it is settled; what follows the last one is
+//! `run.jsonl` is the record. Everything before a line of progress is settled; what follows the last one is
 //! done again when a run is resumed.
 
 use super::FuzzCase;
@@ -154,10 +154,10 @@ impl FuzzRecord {
         Ok(record)
     }
 
-    /// The record of a run that goes on, and what it holds. What follows the last line of progress is cut off.
+    /// Opens the record of a run that is resumed, and reads it. What follows the last line of progress is cut off.
     ///
     /// # Errors
-    /// There is none, or a line of it is damaged; half a line at its end is not.
+    /// There is no record, or a line of it is damaged. Half a line at its end is no damage.
     pub fn resume<C: FuzzCase>(folder: &Path) -> Result<(Self, KeptRun<C>), ExploreError> {
         let path = folder.join(RECORD);
         let (kept, length) = read_as(folder)?;

@@ -17,7 +17,7 @@ pub trait Acts: FuzzCase {
     fn measure(&self) -> (usize, u64, u64);
 }
 
-/// What came of making a finding small.
+/// The result of shrinking a finding.
 #[derive(Clone, Debug)]
 pub(crate) struct Smaller<C: FuzzCase> {
     pub finding: Finding<C>,
@@ -28,7 +28,7 @@ pub(crate) struct Smaller<C: FuzzCase> {
 /// Makes a finding small, in at most `most` runs on `target`.
 ///
 /// # Errors
-/// Those of the target.
+/// The target fails.
 pub(crate) fn smaller<C: Acts>(
     finding: &Finding<C>,
     target: &mut dyn Target<C>,

@@ -55,7 +55,7 @@ impl<C: FuzzCase> Default for Tried<C> {
     }
 }
 
-/// What cases are tried on, beside its model.
+/// What cases are tried on, with its model.
 pub trait Target<C: FuzzCase> {
     /// Plays a case on the model.
     ///
@@ -66,7 +66,7 @@ pub trait Target<C: FuzzCase> {
     /// Tries a case that the model has been through.
     ///
     /// # Errors
-    /// The rig cannot go on.
+    /// The rig cannot continue.
     fn attempt(&mut self, case: &C, rehearsal: &Rehearsal<C>) -> Result<Tried<C>, ExploreError>;
 
     /// The last attempt, with all that its difference rests on; `None` where playing it again shows the same.

@@ -6,7 +6,7 @@ use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// How deep a schema is followed; ours has a quarter of it.
+/// Maximum depth of a schema; ours has a quarter of it.
 const MAX_DEPTH: usize = 32;
 
 /// A place of a TOML value.

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// How many bytes a line of a file holds, where an input has no records.
 const BYTES_A_LINE: usize = 16;
 
-/// How many features a file names; what it reaches is no secret, but a list of a hundred is not read.
+/// Maximum number of features that a file names: nobody reads a list of a hundred.
 const NAMED: usize = 8;
 
 /// The cost of a file in addition to its bytes, in bytes: a few inputs with many features are better than many inputs with one feature.
@@ -382,7 +382,7 @@ mod tests {
         assert_eq!(left[1].new, [feature("c"), feature("d")]);
     }
 
-    /// The head is that of the first, and a line stands once.
+    /// The head is that of the first, and no line is repeated.
     #[test]
     fn what_is_put_together() {
         assert_eq!(together(BYTES, &[1, 2], &[3, 4]), Some(vec![1, 2, 4]));

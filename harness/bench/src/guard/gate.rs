@@ -19,7 +19,7 @@ pub struct Denied {
     pub settings: Vec<LimitSetting>,
 }
 
-/// The rules of one port: decides piece by piece what may be sent, by what a drive would read out of it.
+/// The rules of one port. Decides piece by piece what may be sent, by how a drive would read it.
 ///
 /// Times are those of the guard, which are never set back.
 pub trait Gate: Any + Send + fmt::Debug {
@@ -55,7 +55,7 @@ pub trait Gate: Any + Send + fmt::Debug {
     /// Begins a conversation: numbers of pieces count from here.
     fn begin(&mut self);
 
-    /// Whether no drive is in the middle of anything, as far as what was sent tells.
+    /// Whether, by what was sent, no drive is in the middle of a message.
     fn at_rest(&self) -> bool;
 
     /// Whether drives can be asked something now so that nothing is changed by it; only called [at rest](Self::at_rest).

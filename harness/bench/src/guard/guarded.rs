@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How far ahead a [kept](Line::keep) line is filled. A computer that stands still for half of this time leaves no gap.
+/// How far ahead a [kept](Line::keep) line is filled. A computer that stalls for half of this time leaves no gap.
 const KEPT: Span = Span::from_millis(40);
 
 /// Why a conversation on simulated drives ends that is recorded.
@@ -45,9 +45,9 @@ pub struct Guarded<L> {
     origin: Instant,
     refused: usize,
     watch: Option<Box<dyn Watch>>,
-    /// What came on port 0 while the watch looked, and is for the conversation.
+    /// Input of port 0 that arrived while the watch looked and belongs to the conversation.
     unasked: VecDeque<(Instant, Heard)>,
-    /// Set when the program is to end; only looked at where the link behind the guard does not look itself.
+    /// Set when the program is to end; only read if the link behind the guard does not read it itself.
     interrupt: Arc<AtomicBool>,
     /// A fault has been put on a link in the present conversation.
     faulty: bool,
@@ -104,7 +104,7 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Whether no drive is in the middle of anything, as far as what was sent tells.
+    /// Whether, by what was sent, no drive is in the middle of a message.
     #[must_use]
     pub fn at_rest(&self) -> bool {
         self.trouble().is_none() && self.gates.iter().all(|gate| gate.at_rest())
@@ -136,7 +136,7 @@ impl<L: Line> Guarded<L> {
         self.deadline = deadline;
     }
 
-    /// Ends the work if its deadline is over. A denial, after which work may go on, weighs less.
+    /// Ends the work if its deadline has passed. A denial, after which work may continue, is replaced.
     pub fn end_if_overdue(&mut self) {
         let over = self
             .deadline
@@ -224,7 +224,7 @@ impl<L: Line> Guarded<L> {
         result
     }
 
-    /// Lets the watch look at everything, due or not. The link is in [trouble](Self::trouble) afterwards where something must not go on.
+    /// Lets the watch check everything, due or not. Afterwards the link is in [trouble](Self::trouble) if the work must not continue.
     pub fn look_at_all(&mut self) {
         if let Some(mut watch) = self.watch.take() {
             self.look(watch.as_mut(), |watch, line| watch.look_at_all(line));
@@ -232,7 +232,7 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// Looks now, and puts the link in trouble where something must not go on.
+    /// Checks now, and puts the link in trouble if the work must not continue.
     fn look(
         &mut self,
         watch: &mut dyn Watch,
@@ -253,7 +253,7 @@ impl<L: Line> Guarded<L> {
         self.address_again(before);
     }
 
-    /// Asks drives something that no conversation knows of: a short address goes on after it as before it.
+    /// Queries drives outside any conversation. A short address has the same meaning afterwards as before.
     pub fn aside<T>(&mut self, ask: impl FnOnce(&mut Self) -> T) -> T {
         let before = self.addressed();
         let result = ask(self);

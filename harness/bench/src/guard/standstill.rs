@@ -1,11 +1,11 @@
-//! How drives of any bus are brought to stand.
+//! How drives of any bus are brought to a standstill.
 
 use harness_proto::time::Span;
 
-/// A step by which all drives of a bus are brought to stand.
+/// A step that brings all drives of a bus to a standstill.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StandstillStep {
-    /// Stop on the ramp and stand.
+    /// Stop on the ramp.
     Stop,
     /// Block: no torque, with a nominal speed of 0.
     Block,
@@ -18,7 +18,7 @@ pub struct Standstill {
     pub order: Vec<StandstillStep>,
     /// The speed below which a motor counts as standing, in rpm.
     pub rpm: f64,
-    /// How long a drive may take to stand.
+    /// How long a drive may take to stop.
     pub within: Span,
 }
 

@@ -13,13 +13,13 @@ pub trait Watch: Send + fmt::Debug {
     /// Looks at the drives. It sends whole telegrams only, and returns when it has received their answers.
     ///
     /// # Errors
-    /// Why the conversation must not go on, in a sentence.
+    /// Why the conversation must not continue, in a sentence.
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String>;
 
     /// Looks at everything, due or not; every drive must answer. Nothing is under way.
     ///
     /// # Errors
-    /// [`Trouble::Interlock`] where something must not go on, [`Trouble::Lost`] where the bench cannot find out.
+    /// [`Trouble::Interlock`] where the work must not continue, [`Trouble::Lost`] where the bench cannot find out.
     fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), Trouble>;
 
     /// Takes notice of what the conversation sends.
@@ -30,7 +30,7 @@ pub trait Watch: Send + fmt::Debug {
     /// Takes notice of a piece that came for the conversation.
     ///
     /// # Errors
-    /// Why the conversation must not go on, in a sentence.
+    /// Why the conversation must not continue, in a sentence.
     fn hear(&mut self, heard: &Heard) -> Result<(), String> {
         let _of_no_interest = heard;
         Ok(())

@@ -75,7 +75,7 @@ pub(crate) fn error_named(name: &str) -> Option<LineError> {
 /// Writes one or two rings of a run.
 ///
 /// # Errors
-/// What the writer says.
+/// Writing fails.
 pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Result<()> {
     let mut block = Block::default();
     block.section(&mut out)?;

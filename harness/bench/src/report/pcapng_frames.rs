@@ -40,7 +40,7 @@ const fn class_of(error: CanError) -> u32 {
 /// Writes the frames of a run.
 ///
 /// # Errors
-/// What the writer says.
+/// Writing fails.
 pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let mut block = Block::default();
     block.section(&mut out)?;

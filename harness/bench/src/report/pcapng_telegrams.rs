@@ -45,7 +45,7 @@ pub fn octet_time(bits_per_second: u64) -> Option<Span> {
 /// Writes what stations sent; `bits_per_second` is the rate, where it is known.
 ///
 /// # Errors
-/// What the writer says.
+/// Writing fails.
 pub fn write(
     telegrams: &[Sent<'_>],
     bits_per_second: Option<u64>,
@@ -153,7 +153,7 @@ struct Remarks {
     after: Option<Span>,
 }
 
-/// Reads a comment. Words that are not those of [`comment`] are passed over: people write comments too.
+/// Reads a comment. Words that are not those of [`comment`] are ignored: people write comments too.
 fn remarks(comment: &str) -> BTreeMap<usize, Remarks> {
     let mut all: BTreeMap<usize, Remarks> = BTreeMap::new();
     for item in comment.split(", ") {

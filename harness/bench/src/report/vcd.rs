@@ -64,7 +64,7 @@ pub struct DrawnLine<'t> {
 /// Writes lines.
 ///
 /// # Errors
-/// What the writer says.
+/// Writing fails.
 pub fn write<'t>(
     wires: impl IntoIterator<Item = DrawnLine<'t>>,
     drawing: Drawing,

@@ -69,7 +69,7 @@ pub enum RowPlacing {
 pub struct TablePart {
     /// The rows, counted from 0; all where `None`.
     pub rows: Option<Range<usize>>,
-    /// A row that is pointed at, counted from 0; what the master received there stands in brackets.
+    /// The row to point at, counted from 0; what the master received there is shown in brackets.
     pub pointed: Option<usize>,
     /// Rows shown at most; of a longer table the middle is left out.
     pub at_most: Option<usize>,
@@ -103,7 +103,7 @@ pub struct TraceView<'s> {
     pub differs: Option<usize>,
 }
 
-/// Rows in front of the one that differs, at most.
+/// Maximum number of rows before the one that differs.
 const BEFORE: usize = 12;
 
 /// Rows of a table on a page, at most.
@@ -203,7 +203,7 @@ pub trait SegmentReport: Debug + Sync {
     /// Writes what was carried.
     ///
     /// # Errors
-    /// Those of `out`, and [`ErrorKind::Unsupported`] for a form that the bus does not have.
+    /// Writing to `out` fails, or [`ErrorKind::Unsupported`] for a form that the bus does not have.
     fn write(&self, run: &ShownRun<'_>, form: FileForm, out: &mut dyn Write) -> Result<(), Error> {
         let _not_written = (run, out);
         Err(no_form(self.carries(), &form))

@@ -31,7 +31,7 @@ pub struct ScenarioView<'p> {
     pub drives: &'p str,
     /// Its text; empty where it is not known.
     pub text: &'p str,
-    /// What came of it.
+    /// Its outcome.
     pub outcome: &'p Outcome,
     /// What the links carried, ring by ring.
     pub traces: &'p [Trace],
@@ -43,7 +43,7 @@ pub struct ScenarioView<'p> {
     pub again: &'p str,
 }
 
-/// Its section; `number` tells it from the others of a page.
+/// Its section; `number` makes it unique on a page.
 #[must_use]
 pub fn section(number: usize, played: &ScenarioView<'_>) -> ShownScenario {
     let id = format!("s{number}");

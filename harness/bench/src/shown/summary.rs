@@ -16,7 +16,7 @@ pub struct Head<'h> {
     pub title: &'h str,
     /// Names and values: the rig, when it began. Nothing that differs between two runs that are the same.
     pub facts: Vec<(&'h str, String)>,
-    /// What the run found as a whole, each text with its heading: it stands in front of the scenarios.
+    /// What the run found as a whole, each text with its heading; shown before the scenarios.
     pub found: Vec<(&'h str, String)>,
 }
 

@@ -29,13 +29,13 @@ pub enum Key {
 /// What becomes of the view, and what the user orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Press {
-    /// It goes on.
+    /// The view continues.
     Stay,
     /// It was asked for its end.
     Quit,
     /// It was interrupted, as by a signal.
     Interrupt,
-    /// It goes on, and a drive is to be stopped, by its place on the bench; or all of them.
+    /// The view continues, and a drive is to be stopped, by its place on the bench; or all of them.
     Stop(Option<usize>),
 }
 

@@ -45,7 +45,7 @@ pub struct Heading {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HeadLine {
     pub text: String,
-    /// Whether it tells of an error.
+    /// Whether it is about an error.
     pub is_error: bool,
 }
 
@@ -60,7 +60,7 @@ pub struct TopRow {
     pub speed: Option<f64>,
     /// The code of its error, if it shows one.
     pub error: Option<u32>,
-    /// What stands in the columns.
+    /// The texts of the columns.
     pub cells: Vec<String>,
 }
 
@@ -128,7 +128,7 @@ impl TopColumn {
 }
 
 impl HeadLine {
-    /// A line that tells of no error.
+    /// A line about no error.
     #[must_use]
     pub const fn plain(text: String) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The terminal: taken for the view, and left as it was on every way out, a panic among them.
+//! The terminal: taken for the view, and restored on every way out, including a panic.
 //!
 //! There is one screen a process, as there is one terminal.
 
@@ -33,7 +33,7 @@ pub struct Screen {
     colour: bool,
 }
 
-/// What came from the terminal.
+/// Input of the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScreenInput {
     Key(Key),

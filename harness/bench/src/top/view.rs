@@ -19,7 +19,7 @@ const LINES_EACH: usize = 5;
 /// Rows of drives that the head makes room for.
 const LEAST_ROWS: usize = 4;
 
-/// The keys in the last line, and what stands there where they have no room.
+/// The keys in the last line, and a shorter text for narrow terminals.
 const KEYS: &str = "  q quit  x stop  / filter  s sort  p pause  ? help";
 const FEW_KEYS: &str = "  q quit  ? help";
 
@@ -106,7 +106,7 @@ pub fn page(top: &mut Top, width: u16) -> String {
     page[..end.map_or(0, |end| end + 1)].to_owned()
 }
 
-/// What stands in a buffer, without blanks at the end of its lines.
+/// The text of a buffer, without blanks at the ends of its lines.
 #[must_use]
 pub fn text(buffer: &Buffer) -> String {
     let area = buffer.area;

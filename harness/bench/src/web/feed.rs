@@ -9,7 +9,7 @@ const MAX_EVENTS: usize = 512;
 /// Their bytes, at most.
 const MAX_BYTES: usize = 1 << 20;
 
-/// How long recording goes on for a reader that may come back.
+/// How long recording continues for a reader that may return.
 const LINGER: Duration = Duration::from_secs(10);
 
 /// The events of a page.
@@ -125,7 +125,7 @@ pub(crate) struct FeedReader {
 }
 
 impl FeedReader {
-    /// What has come since the last call; waits for it at most `patience`. `None` if the stream has ended.
+    /// The events since the last call; waits for them at most `patience`. `None` if the stream has ended.
     pub(crate) fn wait(&mut self, patience: Duration) -> Option<Vec<FeedPiece>> {
         let inner = self.feed.inner();
         let next = self.next;

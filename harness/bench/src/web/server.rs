@@ -63,7 +63,7 @@ struct PageState {
 }
 
 impl PageState {
-    /// Wakes the bench: a page has come, or has an order.
+    /// Wakes the bench: a page was opened or has sent an order.
     fn wake(&self) {
         // A bench that has not read the last byte is awake.
         let _awake = (&self.wake).write(&[0]);
@@ -149,7 +149,7 @@ impl LivePage {
         &self.feed
     }
 
-    /// What to wait for: it is readable when a page has come or has an order.
+    /// What to wait for: readable when a page was opened or has sent an order.
     #[must_use]
     pub(crate) fn poll(&self) -> PollFd<'_> {
         PollFd::new(&self.wake, PollFlags::IN)
@@ -283,7 +283,7 @@ enum Reply {
     Done(String),
 }
 
-/// Reads a request and does what it asks for. `None` for a connection that ends without one.
+/// Reads a request and serves it. `None` for a connection that ends without one.
 fn routed(stream: &TcpStream, shared: &PageState, end: Instant) -> Result<Reply, Option<Refusal>> {
     let mut bytes = Vec::new();
     let (head, used) = loop {
@@ -324,7 +324,7 @@ fn routed(stream: &TcpStream, shared: &PageState, end: Instant) -> Result<Reply,
     }
 }
 
-/// Reads the body after a head, of which `bytes` have come.
+/// Reads the body after a head; `bytes` of it were received.
 fn body(
     stream: &TcpStream,
     head: &Head,

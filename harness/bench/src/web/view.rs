@@ -80,7 +80,7 @@ pub struct LiveNews {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LiveRow {
     pub at: String,
-    /// What stands in columns.
+    /// The cells of its columns.
     pub cells: Vec<LiveCell>,
     /// What it means; may be empty.
     pub words: String,
@@ -136,7 +136,7 @@ impl LiveRow {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LiveCell(pub usize, pub String, pub char);
 
-/// What a page asks for, by numbers of the scene.
+/// An order of a page, by numbers of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 pub enum LiveOrder {
@@ -161,7 +161,7 @@ pub trait LiveView {
     /// What has happened since the last call.
     fn news(&mut self) -> LiveNews;
 
-    /// Does what a page asks for; says what was done, in a sentence.
+    /// Executes an order of a page. Returns what was done, in a sentence.
     ///
     /// # Errors
     /// It cannot be done now, in a sentence with the remedy.

@@ -1,4 +1,4 @@
-//! Plays a campaign on a shared line: reads its file, plans its cases and classifies what came of each.
+//! Plays a campaign on a shared line: reads its file, plans its cases and classifies their outcomes.
 
 use super::{LineCase, LineOutcome, PlayedLine};
 use crate::bus_name::BusName;
@@ -36,7 +36,7 @@ pub struct LineTable {
 pub trait DisturbedLine: Debug + Sized + 'static {
     /// A fault and its place on the line.
     type Fault: Copy + Debug;
-    /// What a step brought. The text stands in tables.
+    /// The result of a step. Tables show its text.
     type End: Debug + Display + PartialEq;
     /// What the drive holds.
     type State: Debug + PartialEq;
@@ -95,7 +95,7 @@ pub struct Conversation<L: DisturbedLine> {
     pub troubles: Vec<String>,
     /// How often the master started the drive again.
     pub starts: u64,
-    /// How much the master sent, or how much of it again: more than without the fault means that it repeated a request.
+    /// How much the master sent, or repeated: more than without the fault means that it repeated a request.
     pub requests: u64,
     /// What the line carried, in order.
     pub carried: Vec<L::Carried>,

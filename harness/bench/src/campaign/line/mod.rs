@@ -17,7 +17,7 @@ pub use disturbed::{
 use super::{OutcomeClass, PlayedCampaign};
 use crate::report::html::Section;
 
-/// From this gravity on a case stands among the worst.
+/// The lowest gravity of the worst cases.
 const SERIOUS: u8 = 4;
 
 /// A fault at a frame or telegram, in words.

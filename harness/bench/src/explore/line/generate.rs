@@ -3,7 +3,7 @@
 use super::{LineAct, LineBus, LineTalk};
 use crate::explore::{Dice, Spiced, Swarm};
 
-/// Acts that are left free for what asks for the state at the end.
+/// Acts reserved for queries of the state at the end.
 const ROOM: usize = 8;
 
 /// What conversations may have, and with which drives.

@@ -1,4 +1,4 @@
-//! Whether drives do what their manual says, with any value of what it leaves open.
+//! Whether drives do what their manual says, with any values of its open points.
 //!
 //! What the drives sent is compared with what the model sends. Where it differs, the model is played again with other values of the open
 //! points (`explore::search`). Only what no such model explains is a difference.
@@ -44,7 +44,7 @@ impl<B: LineBus> Oracle<B> {
         &self.under_test
     }
 
-    /// The drives as the manual has them, with the most likely values of what it leaves open.
+    /// The drives as the manual has them, with the most likely values of its open points.
     pub(crate) fn model(&self) -> B::Setup {
         B::model(&self.under_test, &self.last)
     }

@@ -78,7 +78,7 @@ impl<W> LineAct<W> {
         Span::from_micros(self.wait_us)
     }
 
-    /// The time after it, as often as it happens, in microseconds.
+    /// The time after all its repetitions together, in microseconds.
     const fn lasts(&self) -> u64 {
         self.wait_us.saturating_mul(self.times as u64)
     }
@@ -113,7 +113,7 @@ impl<B: LineBus> LineTalk<B> {
         while !self.is_bounded() && self.acts.pop().is_some() {}
     }
 
-    /// What makes a conversation small: acts as often as they happen, then what they hold, then time.
+    /// The size of a conversation: acts with their repetitions, then their contents, then time.
     #[must_use]
     pub fn measure(&self) -> (usize, u64, u64) {
         let acts = self.acts.iter().map(|act| usize::from(act.times));
@@ -128,7 +128,7 @@ impl<B: LineBus> LineTalk<B> {
 pub struct LineSeen<S, D> {
     /// What the drives sent, in order.
     pub said: Vec<S>,
-    /// Each act as often as it happened.
+    /// Each act, repeated as often as it happened.
     pub done: Vec<D>,
     /// How long the conversation took.
     pub took: Span,

@@ -79,7 +79,7 @@ fn whole(value: f64) -> u64 {
     value as u64
 }
 
-/// What stands along a chart.
+/// What the horizontal axis of a chart shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Along {
     /// Times in milliseconds, shown in seconds where they are long.

@@ -11,7 +11,7 @@ const GAP: f64 = 2.5;
 /// Part of the usual distance by which another one may differ where samples are called equidistant.
 const EQUAL: f64 = 0.01;
 
-/// Where each sample stands along, and its value; `None` where it has none.
+/// The position of each sample on the axis, and its value; `None` where it has none.
 pub type Points = Vec<(f64, Option<f64>)>;
 
 /// Values against time.

@@ -17,7 +17,7 @@ const SCRIPT: &str = include_str!("script.js");
 #[derive(Clone, Debug)]
 pub struct FoldedPart {
     pub heading: String,
-    /// What stands below it.
+    /// The contents below it.
     pub html: Html,
     /// What shows the same, in a sentence, where it is left out.
     pub instead: String,

@@ -79,7 +79,7 @@ pub fn sequence(
     true
 }
 
-/// Where the line of a drive stands; that of the master is in front of them.
+/// The horizontal position of the line of a drive; the line of the master precedes them.
 fn place(drives: &[u8], drive: Option<u8>) -> usize {
     let place = drive.and_then(|drive| drives.iter().position(|known| *known == drive));
     COLUMN * place.map_or(1, |place| place + 2)
