@@ -199,32 +199,37 @@ fn in_words(sizes: &[(u8, u8)]) -> String {
 /// What is needed together, in words.
 #[must_use]
 pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
-    let setting = |unlock: &Unlock| match unlock {
-        Unlock::Limit(setting) => Some(*setting),
-        _ => None,
-    };
-    let settings: Vec<_> = unlocks.iter().filter_map(setting).collect();
+    let (mut settings, mut port_limits, mut port) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut taps, mut interposers, mut others) = (Vec::new(), Vec::new(), Vec::new());
+    for unlock in unlocks {
+        match unlock {
+            Unlock::Limit(setting) => settings.push(*setting),
+            Unlock::PortLimit(setting) => port_limits.push((*setting).to_owned()),
+            Unlock::Port(setting) => port.push(setting.clone()),
+            Unlock::Tap(place) => taps.push(place.as_str()),
+            Unlock::Interposer(place) => interposers.push(place.as_str()),
+            other => others.push(other.to_string()),
+        }
+    }
     let everything = |all: &[LimitSetting]| all.iter().all(|setting| settings.contains(setting));
     let mut limits = match everything(&LimitSetting::PERMISSIONS) {
         true => vec!["every permission".to_owned()],
         false => settings.iter().map(LimitSetting::to_string).collect(),
     };
-    limits.extend(unlocks.iter().filter_map(Unlock::port_limit));
+    limits.extend(port_limits);
     let limits = within("limits", &limits);
-    let port: Vec<_> = unlocks.iter().filter_map(Unlock::port).collect();
     let port = within("port.1", &port);
     let motion = settings.contains(&LimitSetting::Motion);
     let option = motion.then(|| "--allow-motion".to_owned());
-    let taps = at_places("tap", unlocks.iter().filter_map(Unlock::tap));
-    let interposers = at_places("interposer", unlocks.iter().filter_map(Unlock::interposer));
-    let others = unlocks.iter().filter(|unlock| !unlock.is_grouped());
+    let taps = at_places("tap", &taps);
+    let interposers = at_places("interposer", &interposers);
     let all = limits
         .into_iter()
         .chain(option)
         .chain(port)
         .chain(taps)
         .chain(interposers)
-        .chain(others.map(Unlock::to_string));
+        .chain(others);
     all.collect::<Vec<_>>().join(" and ")
 }
 
@@ -238,56 +243,13 @@ fn within(table: &str, settings: &[String]) -> Option<String> {
 const NAMED_LINKS: usize = 3;
 
 /// `a tap at 1->0`, `taps at 1->0 and 2->1`, `taps at 99 links`.
-fn at_places<'a>(what: &str, places: impl Iterator<Item = &'a str>) -> Option<String> {
-    let places: Vec<_> = places.collect();
+fn at_places(what: &str, places: &[&str]) -> Option<String> {
     let article = if what.starts_with('i') { "an" } else { "a" };
-    match places.as_slice() {
+    match places {
         [] => None,
         [place] => Some(format!("{article} {what} at {place}")),
         few if few.len() <= NAMED_LINKS => Some(format!("{what}s at {}", few.join(" and "))),
         many => Some(format!("{what}s at {} links", many.len())),
-    }
-}
-
-impl Unlock {
-    /// Whether [`together`] names it with others of its kind.
-    const fn is_grouped(&self) -> bool {
-        matches!(
-            self,
-            Self::Limit(_)
-                | Self::PortLimit(_)
-                | Self::Port(_)
-                | Self::Tap(_)
-                | Self::Interposer(_)
-        )
-    }
-
-    fn port_limit(&self) -> Option<String> {
-        match self {
-            Self::PortLimit(setting) => Some((*setting).to_owned()),
-            _ => None,
-        }
-    }
-
-    fn port(&self) -> Option<String> {
-        match self {
-            Self::Port(setting) => Some(setting.clone()),
-            _ => None,
-        }
-    }
-
-    fn tap(&self) -> Option<&str> {
-        match self {
-            Self::Tap(place) => Some(place),
-            _ => None,
-        }
-    }
-
-    fn interposer(&self) -> Option<&str> {
-        match self {
-            Self::Interposer(place) => Some(place),
-            _ => None,
-        }
     }
 }
 
