@@ -92,9 +92,9 @@ pub(super) fn packet(
             data.len()
         )
     })?;
-    let id = u32::from_be_bytes([header[0], header[1], header[2], header[3]]);
+    let word = u32::from_be_bytes([header[0], header[1], header[2], header[3]]);
     let len = usize::from(header[4]);
-    if id & ERROR != 0 {
+    if word & ERROR != 0 {
         let ended = comment.and_then(|text| {
             let (error, frame) = text.split_once(' ')?;
             let error = CanError::from_name(error)?;
@@ -102,13 +102,13 @@ pub(super) fn packet(
         });
         return Ok(ended);
     }
-    let number = id & Id::MAX_EXTENDED;
-    let known = match id & EXTENDED != 0 {
+    let number = word & Id::MAX_EXTENDED;
+    let known = match word & EXTENDED != 0 {
         true => Id::extended(number),
         false => u16::try_from(number).ok().and_then(Id::base),
     };
     let id = known.ok_or_else(|| format!("identifier {number:X} does not fit into 11 bits"))?;
-    let frame = match id_is_remote(header) {
+    let frame = match word & REMOTE != 0 {
         true => Frame::remote(id, len),
         false => {
             let data = data.get(..len).ok_or_else(|| {
@@ -123,10 +123,6 @@ pub(super) fn packet(
         _ => FrameEnd::Good,
     };
     Ok(Some((frame, ended)))
-}
-
-fn id_is_remote(header: &[u8]) -> bool {
-    u32::from_be_bytes([header[0], header[1], header[2], header[3]]) & REMOTE != 0
 }
 
 /// What a line of a log has.
