@@ -121,7 +121,7 @@ fn output(case: &JunitCase) -> String {
         .collect::<String>()
 }
 
-/// The printable part of a name, or `otherwise` if nothing of it is printable.
+/// The printable part of a name, or the other text if nothing of it is printable.
 fn named(name: &str, otherwise: &str) -> String {
     match printable(name) {
         empty if empty.trim().is_empty() => otherwise.to_owned(),

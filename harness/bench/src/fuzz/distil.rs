@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// How many bytes a line of a file holds, where an input has no records.
 const BYTES_A_LINE: usize = 16;
 
-/// Maximum number of features that a file names: nobody reads a list of a hundred.
+/// Maximum number of features that a file names: a list of a hundred is not read.
 const NAMED: usize = 8;
 
 /// The cost of a file in addition to its bytes, in bytes: a few inputs with many features are better than many inputs with one feature.
