@@ -41,7 +41,7 @@ pub(crate) fn scenario(
             }
         }
         None => {
-            let rate = frames.iter().find_map(|own| rate_of(own));
+            let rate = frames.iter().find_map(|frame| rate_of(frame));
             if let Some(rate) = rate.filter(|rate| *rate != BitRate::K500) {
                 let _infallible = writeln!(text, "rate {}", rate.bits_per_second() / 1000);
             }
@@ -54,9 +54,9 @@ pub(crate) fn scenario(
     let (mut number, mut steps) = (0_u64, String::new());
     // The frame that an error has ended, at its first attempt.
     let mut attempt: Option<&LineFrame> = None;
-    for own in frames {
+    for sent in frames {
         // A frame that an error ended is repeated, which is no frame of its own.
-        let fault = match own.ended {
+        let fault = match sent.ended {
             FrameEnd::Good => None,
             FrameEnd::Lost => Some("lost"),
             FrameEnd::Error(CanError::ErrorFrame) => Some("corrupt"),
@@ -69,14 +69,14 @@ pub(crate) fn scenario(
                 text.push_str(&line);
             }
         }
-        if matches!(own.ended, FrameEnd::Error(_)) {
-            attempt.get_or_insert(own);
+        if matches!(sent.ended, FrameEnd::Error(_)) {
+            attempt.get_or_insert(sent);
             continue;
         }
         number += 1;
-        let same = |first: &&LineFrame| (first.from, first.frame) == (own.from, own.frame);
+        let same = |first: &&LineFrame| (first.from, first.frame) == (sent.from, sent.frame);
         let first = attempt.take_if(|first| same(&&**first));
-        step(own, first.unwrap_or(own).start, &mut steps);
+        step(sent, first.unwrap_or(sent).start, &mut steps);
     }
     Ok(text + &steps)
 }
@@ -93,52 +93,53 @@ pub(crate) fn judged(
 ) -> Result<JudgedFrames, String> {
     let channels = traces.iter().flat_map(|trace| &trace.channels);
     let frames: Vec<LineFrame> = channels
-        .flat_map(|own| own.frames().iter().copied())
+        .flat_map(|channel| channel.frames().iter().copied())
         .collect();
     let heard = HeardFrames {
         frames: &frames,
         seams: traces.first().map_or(&[], |trace| &trace.seams),
         tolerance,
     };
-    let wanted = |own: &u8| named.is_empty() || named.contains(own);
+    let wanted = |drive: &u8| named.is_empty() || named.contains(drive);
     let mut remarks = Vec::new();
-    let mut note = |own: u8| {
-        if !wanted(&own) {
+    let mut note = |drive: u8| {
+        if !wanted(&drive) {
             remarks.push(format!(
-                "drive {own} is not judged: `--judge` does not name it"
+                "drive {drive} is not judged: `--judge` does not name it"
             ));
         }
-        wanted(&own)
+        wanted(&drive)
     };
     let judged = match setup {
         Some(setup) => {
             let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
             let drives = plan.setup.drives.iter();
-            let drives = drives.map(|own| (own.node, own.identifiers));
-            let drives = drives.filter(|own| note(own.0));
+            let drives = drives.map(|drive| (drive.node, drive.identifiers));
+            let drives = drives.filter(|drive| note(drive.0));
             judge(heard, &drives.collect::<Vec<_>>())
         }
         None => {
             let all: Vec<&LineFrame> = frames.iter().collect();
-            let own = |node: u16| {
+            let numbered = |node: u16| {
                 let number = u8::try_from(node).unwrap_or(u8::MAX);
                 (number, (DEFAULT_RX - 1 + node, DEFAULT_TX - 1 + node))
             };
             let nodes = nodes(&all)?;
-            let drives = nodes.into_iter().map(own).filter(|own| note(own.0));
+            let drives = nodes.into_iter().map(numbered);
+            let drives = drives.filter(|drive| note(drive.0));
             judge_guessed(heard, &drives.collect::<Vec<_>>())
         }
     };
-    let difference = |own: &Breach| {
+    let difference = |breach: &Breach| {
         format!(
             "frame {}, drive {} (UNITEK {}): {}",
-            own.frame, own.drive, own.section, own.about
+            breach.frame, breach.drive, breach.section, breach.about
         )
     };
     remarks.extend(judged.remarks);
-    let missing = named.iter().filter(|own| !judged.heard.contains(own));
+    let missing = named.iter().filter(|drive| !judged.heard.contains(drive));
     let missing: Vec<_> = missing
-        .map(|own| format!("drive {own}: no frame of it was compared"))
+        .map(|drive| format!("drive {drive}: no frame of it was compared"))
         .collect();
     let in_doubt =
         !judged.doubts.is_empty() || !missing.is_empty() || judged.compared < judged.replies;
@@ -147,7 +148,7 @@ pub(crate) fn judged(
     let only_times = judged
         .breaches
         .iter()
-        .all(|own| own.what == FrameSymptom::Time);
+        .all(|breach| breach.what == FrameSymptom::Time);
     if !judged.breaches.is_empty() && only_times && tolerance == Span::ZERO {
         remarks.push(
             "only times differ: where a computer stamps what an adapter gives it, --tolerance says how far they may be off, such as 16ms"
@@ -172,10 +173,10 @@ pub(crate) fn judged(
 }
 
 /// A frame that began to be sent at `start`: what an error has ended its sender repeats.
-fn step(own: &LineFrame, start: Instant, steps: &mut String) {
-    let frame = &own.frame;
+fn step(line_frame: &LineFrame, start: Instant, steps: &mut String) {
+    let frame = &line_frame.frame;
     let nanos = start.since_start().as_nanos();
-    let _infallible = match own.from {
+    let _infallible = match line_frame.from {
         None => writeln!(
             steps,
             "@{}.{:06}ms > {}",
@@ -183,7 +184,7 @@ fn step(own: &LineFrame, start: Instant, steps: &mut String) {
             nanos % 1_000_000,
             written(frame)
         ),
-        Some(_) if own.ended == FrameEnd::Lost => Ok(()),
+        Some(_) if line_frame.ended == FrameEnd::Lost => Ok(()),
         Some(_) => writeln!(steps, "< {}", expected(frame)),
     };
 }
@@ -200,26 +201,26 @@ fn expected(frame: &Frame) -> String {
 
 /// Whether a frame shows that its node is a drive, and no other device with an identifier of that range: a drive sends 4 or 6 bytes, and
 /// hosts send it 3 or 5 (UNITEK 4.5).
-fn is_telling(own: &LineFrame) -> bool {
-    let lengths = if own.from.is_some() { [4, 6] } else { [3, 5] };
-    !own.frame.is_remote() && lengths.contains(&own.frame.dlc())
+fn is_telling(frame: &LineFrame) -> bool {
+    let lengths = if frame.from.is_some() { [4, 6] } else { [3, 5] };
+    !frame.frame.is_remote() && lengths.contains(&frame.frame.dlc())
 }
 
 /// The numbers of the drives, by the identifiers on which they send and receive.
 fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
     let mut nodes = BTreeSet::new();
-    for own in frames {
-        let id = own.frame.id();
-        let first = own.from.map_or(DEFAULT_RX, |_| DEFAULT_TX);
+    for frame in frames {
+        let id = frame.frame.id();
+        let first = frame.from.map_or(DEFAULT_RX, |_| DEFAULT_TX);
         let base = u16::try_from(id.number())
             .ok()
             .filter(|_| !id.is_extended());
-        let node = base.and_then(|own| own.checked_sub(first - 1));
+        let node = base.and_then(|number| number.checked_sub(first - 1));
         // Where the capture numbers its drives, the number must be that of the identifier.
-        let fits = |node: &u16| own.from.is_none_or(|drive| u16::from(drive) == *node);
+        let fits = |node: &u16| frame.from.is_none_or(|drive| u16::from(drive) == *node);
         let node = node.filter(|node| (1..=MOST_NODES).contains(node) && fits(node));
-        match (node, own.from) {
-            (Some(node), _) if is_telling(own) => drop(nodes.insert(node)),
+        match (node, frame.from) {
+            (Some(node), _) if is_telling(frame) => drop(nodes.insert(node)),
             (Some(_), _) => {}
             // A host may speak to others.
             (None, None) => {}

@@ -73,7 +73,6 @@ impl Signal {
     }
 }
 
-/// One message of a drive.
 struct Message {
     id: u16,
     name: String,
@@ -170,10 +169,9 @@ fn read_request() -> Vec<Signal> {
     ]
 }
 
-/// The signals of a register.
 fn of_register(register: &Register) -> Vec<Signal> {
     let (factor, unit) = scale(register.unit);
-    let own = Signal {
+    let signal = Signal {
         factor,
         unit,
         bits: match register.width {
@@ -185,16 +183,16 @@ fn of_register(register: &Register) -> Vec<Signal> {
         ..Signal::plain(&name(register), Selected::By(register.number), 8, 16)
     };
     match register.unit {
-        Unit::Ramp => ramp(&own),
-        Unit::Status => of_bits(&own, words::STATUS),
-        Unit::Errors => of_bits(&own, words::ERRORS),
-        Unit::Io => of_bits(&own, words::IO),
-        Unit::Mode => of_bits(&own, words::MODE),
+        Unit::Ramp => ramp(&signal),
+        Unit::Status => of_bits(&signal, words::STATUS),
+        Unit::Errors => of_bits(&signal, words::ERRORS),
+        Unit::Io => of_bits(&signal, words::IO),
+        Unit::Mode => of_bits(&signal, words::MODE),
         Unit::Flag => vec![Signal {
             values: yes_or_no(),
-            ..own
+            ..signal
         }],
-        _ => vec![own],
+        _ => vec![signal],
     }
 }
 
@@ -256,22 +254,22 @@ fn joined(register: &str, part: &str) -> String {
 /// The name of a register as an identifier: that of the dump. The number stands behind it where it would be the name of several registers,
 /// unless the dump prints it so for this one alone; and alone where the name has no letters.
 fn name(register: &Register) -> String {
-    let own = identifier(register.name);
+    let plain = identifier(register.name);
     let alike = || {
         REGISTERS
             .iter()
-            .filter(|other| identifier(other.name).eq_ignore_ascii_case(&own))
+            .filter(|other| identifier(other.name).eq_ignore_ascii_case(&plain))
     };
-    let printed = |name: &str| name.eq_ignore_ascii_case(&own);
+    let printed = |name: &str| name.eq_ignore_ascii_case(&plain);
     let alone = printed(register.name) && alike().filter(|other| printed(other.name)).count() == 1;
     match (
-        own.starts_with(|c: char| c.is_ascii_alphabetic()),
+        plain.starts_with(|c: char| c.is_ascii_alphabetic()),
         alike().count(),
     ) {
         (false, _) => format!("REG_{:02X}", register.number),
-        (true, 1) => own,
-        (true, _) if alone => own,
-        (true, _) => format!("{own}_{:02X}", register.number),
+        (true, 1) => plain,
+        (true, _) if alone => plain,
+        (true, _) => format!("{plain}_{:02X}", register.number),
     }
 }
 
@@ -340,14 +338,16 @@ fn comments(text: &mut String, message: &Message) {
         text,
         format_args!("CM_ BO_ {id} \"{}\";\n", message.comment),
     );
-    for signal in message.signals.iter().filter(|own| !own.comment.is_empty()) {
+    let commented = |signal: &&Signal| !signal.comment.is_empty();
+    for signal in message.signals.iter().filter(commented) {
         let (name, comment) = (&signal.name, &signal.comment);
         put(text, format_args!("CM_ SG_ {id} {name} \"{comment}\";\n"));
     }
 }
 
 fn value_names(text: &mut String, message: &Message) {
-    for signal in message.signals.iter().filter(|own| !own.values.is_empty()) {
+    let named = |signal: &&Signal| !signal.values.is_empty();
+    for signal in message.signals.iter().filter(named) {
         put(text, format_args!("VAL_ {} {}", message.id, signal.name));
         for (value, name) in &signal.values {
             put(text, format_args!(" {value} \"{name}\""));

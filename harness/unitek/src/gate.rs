@@ -186,8 +186,8 @@ pub(crate) fn guarded<L: Link>(
         Capability::Eeprom => limits.eeprom,
         _ => true,
     };
-    let own = inner.capabilities().iter().copied();
-    let capabilities = own.filter(has).collect();
+    let available = inner.capabilities().iter().copied();
+    let capabilities = available.filter(has).collect();
     let gate = SegmentGate::new(limits, rate, drives, listen_only);
     Guarded::behind(inner, vec![Box::new(gate)], capabilities)
 }
@@ -319,10 +319,10 @@ mod tests {
                     line.wait(until);
                 }
             }
-            for sent in line.inner().trace(0).channels[0].frames().iter().filter(|own| own.from.is_none()) {
+            for sent in line.inner().trace(0).channels[0].frames().iter().filter(|frame| frame.from.is_none()) {
                 let frame = sent.frame;
                 let rx = u16::try_from(frame.id().number()).expect("11 bits");
-                prop_assert!(DRIVES.iter().any(|(own, _)| *own == rx), "{frame}");
+                prop_assert!(DRIVES.iter().any(|(receives, _)| *receives == rx), "{frame}");
                 let Ok(Request::Write { register, .. }) = Request::decode(&frame, rx, Dlc4::As3) else { continue };
                 let harmless = [0x10, 0x12, 0x13, 0x14, 0x15, 0x16, 0x17, 0x18, 0x31, 0x51, 0x52, 0x90];
                 prop_assert!(harmless.contains(&register), "{frame}");

@@ -69,12 +69,12 @@ pub(super) fn picture(masters: &str, drives: impl Iterator<Item = String>) -> Li
 pub(super) fn at_port(frame: &LineFrame, drives: &[Axis]) -> LiveRow {
     let number = frame.frame.id().number();
     let place = |id: fn(&Axis) -> u16| {
-        let own = drives.iter().position(|own| u32::from(id(own)) == number);
-        own.map(|place| place + 1)
+        let found = drives.iter().position(|axis| u32::from(id(axis)) == number);
+        found.map(|place| place + 1)
     };
-    let ends = match place(|own| own.tx) {
+    let ends = match place(|axis| axis.tx) {
         Some(from) => (from, Some(0)),
-        None => (0, place(|own| own.rx)),
+        None => (0, place(|axis| axis.rx)),
     };
     arrow(frame, drives.len() + 1, ends)
 }
@@ -99,7 +99,7 @@ fn arrow(frame: &LineFrame, columns: usize, (from, to): (usize, Option<usize>)) 
 impl SharedDrives {
     /// The column of a drive, counted behind that of all clients.
     fn column(&self, node: u8) -> Option<usize> {
-        let place = self.bench.nodes.iter().position(|own| *own == node)?;
+        let place = self.bench.nodes.iter().position(|other| *other == node)?;
         Some(place + 1)
     }
 
@@ -149,9 +149,8 @@ impl SharedDrives {
         };
         let signed = |number: u8| i64::from(register(number).cast_signed());
         let short = |number: u8| {
-            let own = Register::of(number);
-            own.extend(u16::try_from(register(number) & 0xFFFF).unwrap_or(0))
-                .cast_signed()
+            let low = u16::try_from(register(number) & 0xFFFF).unwrap_or(0);
+            Register::of(number).extend(low).cast_signed()
         };
         vec![
             node.to_string(),

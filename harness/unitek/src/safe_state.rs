@@ -64,10 +64,11 @@ pub(crate) fn safe_state<L: Line>(
     way_back: Option<&str>,
 ) -> Safe {
     let gate = line.segment();
-    let cycles: Vec<_> = gate.map_or_else(Vec::new, |own| own.cycles().collect());
-    let places: Vec<_> = gate.map_or_else(Vec::new, |own| own.places().collect());
+    let cycles: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.cycles().collect());
+    let places: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.places().collect());
     let mut report = |axis: &Axis, tolerance| {
-        let places = places.iter().find(|own| own.first == (axis.rx, axis.tx));
+        let mut places = places.iter();
+        let places = places.find(|place| place.first == (axis.rx, axis.tx));
         let mut place = Place {
             line,
             first: *axis,
@@ -77,9 +78,9 @@ pub(crate) fn safe_state<L: Line>(
         let at = place.find();
         let driver = Driver::new(Box::new(&mut *place.line), &[at], patience);
         let mut driver = driver.outlasting(tolerance);
-        let own = cycles.iter().filter(|(rx, _)| *rx == axis.rx);
-        let own: Vec<_> = own.map(|(_, register)| *register).collect();
-        let made = make_safe(&mut driver, at, &own, standing);
+        let running = cycles.iter().filter(|(rx, _)| *rx == axis.rx);
+        let running: Vec<_> = running.map(|(_, register)| *register).collect();
+        let made = make_safe(&mut driver, at, &running, standing);
         drop(driver);
         let report = match made {
             Ok(report) => report,
@@ -109,13 +110,13 @@ pub(crate) fn safe_state<L: Line>(
     };
     let mut reports: Vec<_> = axes.iter().map(|axis| report(axis, Span::ZERO)).collect();
     // An adapter may have stood still. All other drives are safe before one is waited for.
-    for (axis, own) in axes.iter().zip(&mut reports) {
-        if matches!(own.end, End::Silent | End::Elsewhere) {
-            *own = report(axis, REAL);
+    for (axis, first_report) in axes.iter().zip(&mut reports) {
+        if matches!(first_report.end, End::Silent | End::Elsewhere) {
+            *first_report = report(axis, REAL);
         }
     }
-    let safe = (reports.iter()).all(|own| matches!(own.end, End::Safe | End::Elsewhere));
-    let back = reports.iter().all(|own| own.end != End::Elsewhere);
+    let safe = (reports.iter()).all(|report| matches!(report.end, End::Safe | End::Elsewhere));
+    let back = reports.iter().all(|report| report.end != End::Elsewhere);
     let words = match (safe, back) {
         (true, true) => "safe state: every drive is locked and stands, with commands 0",
         (true, false) => {
@@ -125,8 +126,8 @@ pub(crate) fn safe_state<L: Line>(
     };
     Safe {
         confirmed: safe && back,
-        words: (axes.iter().zip(&reports)).fold(words.to_owned(), |words, (axis, own)| {
-            format!("{words}\n  drive {}: {}", axis.node, own.words)
+        words: (axes.iter().zip(&reports)).fold(words.to_owned(), |words, (axis, report)| {
+            format!("{words}\n  drive {}: {}", axis.node, report.words)
         }),
     }
 }
@@ -185,7 +186,7 @@ impl<L: Line> Place<'_, L> {
     /// Whether identifiers were written to any drive: another one may have taken them.
     fn may_have_moved(&self) -> bool {
         let given = self.line.segment().map(Gate::given);
-        given.is_some_and(|given| given.iter().any(|own| !own.is_empty()))
+        given.is_some_and(|given| given.iter().any(|ids| !ids.is_empty()))
     }
 
     /// The drive where it answers; where the rig's file says if it was not moved, or is not found.
@@ -195,7 +196,7 @@ impl<L: Line> Place<'_, L> {
         let found = self
             .search()
             .filter(|_| moved)
-            .and_then(|mut own| own.find());
+            .and_then(|mut search| search.find());
         found.map_or(first, |(rx, tx)| Axis { rx, tx, ..first })
     }
 
@@ -223,20 +224,20 @@ impl<L: Line> Place<'_, L> {
     fn lost(&self, way_back: Option<&str>) -> String {
         let mut words = String::new();
         if let Some(places) = self.places.filter(|_| self.may_have_moved()) {
-            let ids: Vec<_> = places.rx.iter().map(|own| format!("{own:03X}")).collect();
+            let ids: Vec<_> = places.rx.iter().map(|id| format!("{id:03X}")).collect();
             words = format!("; it was looked for on {}", ids.join(", "));
         }
-        let Medium::Frames(own) = self.line.medium(0) else {
+        let Medium::Frames(now) = self.line.medium(0) else {
             return words;
         };
         let timing = self.places.and_then(|places| places.timing).map(Nbt);
-        if let Some(nbt) = timing.filter(|nbt| nbt.rate() != Some(own)) {
+        if let Some(nbt) = timing.filter(|nbt| nbt.rate() != Some(now)) {
             let rate = nbt.rate().map_or_else(
                 || "another bit rate".to_owned(),
                 |rate| format!("{} kbit/s", rate.bits_per_second() / 1000),
             );
             let rx = self.first.rx;
-            let [low, high] = Nbt::for_rate(own).unwrap_or(Nbt::DEFAULT).0.to_le_bytes();
+            let [low, high] = Nbt::for_rate(now).unwrap_or(Nbt::DEFAULT).0.to_le_bytes();
             words += &format!(
                 "; it may be at {rate}, since register 73 (CAN_BTR) was set to {:04X}: there, {rx:03X}#73{low:02X}{high:02X} sets it back",
                 nbt.0
@@ -283,7 +284,7 @@ fn make_safe(
     if standing.order.contains(&StandstillStep::Block) {
         let locked = insist(driver, axis, MODE, MODE_LOCK);
         let zero = |driver: &mut _, command| insist(driver, axis, command, 0);
-        note(locked.and_then(|()| COMMANDS.iter().try_for_each(|own| zero(driver, *own))));
+        note(locked.and_then(|()| COMMANDS.iter().try_for_each(|number| zero(driver, *number))));
     }
     for register in cycles {
         note(driver.stop_every(axis, *register));

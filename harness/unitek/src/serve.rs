@@ -46,11 +46,11 @@ pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<
     let mut scenario: Scenario<Unitek> = read(header, Part::Header)?;
     scenario.steps.clear();
     let mut plan = settle(&scenario, header, None)?;
-    let own = &mut plan.setup;
-    let least = u8::from(own.drives.is_empty());
+    let setup = &mut plan.setup;
+    let least = u8::from(setup.drives.is_empty());
     for node in 1..=drives.unwrap_or(least) {
-        if !own.drives.iter().any(|drive| drive.node == node) {
-            own.drives.push(DriveSetup::new(node));
+        if !setup.drives.iter().any(|drive| drive.node == node) {
+            setup.drives.push(DriveSetup::new(node));
         }
     }
     Ok(plan)

@@ -80,7 +80,7 @@ fn frames_are_held_back_behind_the_answer_to_rawmode() {
     let times: Vec<_> = held
         .split("< frame 181 ")
         .skip(1)
-        .map(|own| &own[..9])
+        .map(|line| &line[..9])
         .collect();
     assert_eq!(times.len(), 10, "{held}");
     assert_eq!((times[0], times[9]), ("1000.5101", "1000.6001"), "{held}");
@@ -368,9 +368,9 @@ fn a_header_describes_the_drives() {
     };
     let nodes = |drives, text: &str| {
         let plan = bench(drives, Some(&source(text))).expect("a header");
-        let own = plan.setup.drives.iter();
-        own.map(|own| (own.node, own.identifiers.0))
-            .collect::<Vec<_>>()
+        let drives = plan.setup.drives.iter();
+        let nodes = drives.map(|drive| (drive.node, drive.identifiers.0));
+        nodes.collect::<Vec<_>>()
     };
     assert_eq!(nodes(None, "rate 250\n"), [(1, 0x201)]);
     assert_eq!(nodes(None, "drive 3 rx 210 tx 190\n"), [(3, 0x210)]);

@@ -26,9 +26,7 @@ pub(crate) struct DriveSetup {
     pub(crate) node: u8,
     /// On which it receives (68) and sends (69).
     pub(crate) identifiers: (u16, u16),
-    /// What the manual leaves open.
     pub(crate) properties: Properties,
-    /// What is connected to it.
     pub(crate) inputs: Inputs,
     /// Registers that differ from the dump, and their contents.
     pub(crate) registers: Vec<(u8, u32)>,
@@ -38,7 +36,6 @@ pub(crate) struct DriveSetup {
     pub(crate) released: bool,
     /// Whether it has the error of a time-out of the bus (D0).
     pub(crate) timed_out: bool,
-    /// How it breaks the manual.
     pub(crate) deviation: Option<&'static Deviation>,
 }
 
@@ -114,7 +111,7 @@ impl Setup {
     pub(crate) fn segment(&self, guests: usize) -> Segment<Station> {
         let host = || Member::Host(Host::default());
         let drive =
-            |own: &DriveSetup| Member::Drive(Box::new(own.drive(self.rate, Instant::START)));
+            |setup: &DriveSetup| Member::Drive(Box::new(setup.drive(self.rate, Instant::START)));
         let drives = self.drives.iter().map(drive);
         let guests = (0..guests).map(|_| host());
         let stations = std::iter::once(host()).chain(drives).chain(guests);
@@ -155,7 +152,7 @@ impl Bench {
     pub(crate) fn with_guests(setup: &Setup, guests: usize) -> Self {
         Self {
             segment: setup.segment(guests),
-            nodes: setup.drives.iter().map(|own| own.node).collect(),
+            nodes: setup.drives.iter().map(|drive| drive.node).collect(),
             clock: BenchClock::default(),
         }
     }
@@ -173,7 +170,7 @@ impl Bench {
     }
 
     fn place(&self, node: u8) -> Option<usize> {
-        let place = self.nodes.iter().position(|own| *own == node)?;
+        let place = self.nodes.iter().position(|other| *other == node)?;
         Some(place + 1)
     }
 
@@ -258,8 +255,8 @@ impl Bench {
     /// Whether a drive still has to answer a request.
     fn owes(&self, place: usize) -> bool {
         let drive = self.segment.station(place).drive();
-        let waiting = drive.and_then(|own| own.drive().wants());
-        !self.segment.is_off(place) && waiting.is_some_and(|own| own.cause == Cause::Asked)
+        let waiting = drive.and_then(|drive| drive.drive().wants());
+        !self.segment.is_off(place) && waiting.is_some_and(|wish| wish.cause == Cause::Asked)
     }
 
     pub(super) fn run_to(&mut self, at: Instant) {
@@ -368,7 +365,7 @@ impl Link for Bench {
 
     fn unused_faults(&self) -> Vec<String> {
         let placed = self.segment.unused_faults().iter();
-        let placed = placed.map(|own| format!("frame {}: {}", own.frame, own.fault));
+        let placed = placed.map(|placed| format!("frame {}: {}", placed.frame, placed.fault));
         let scheduled = self.clock.left_over().map(|(at, fault)| match fault {
             PlacedFault::Frame(fault) => format!("the next frame at {at}: {fault}"),
             PlacedFault::Drive(node, fault) => format!("drive {node} at {at}: {fault}"),
@@ -393,12 +390,12 @@ impl Link for Bench {
     }
 
     fn trace(&self, port: usize) -> Trace {
-        let named = |own: &LineFrame| {
-            let place = own.from.map_or(BENCH, usize::from);
-            let from = place.checked_sub(1).and_then(|own| self.nodes.get(own));
+        let named = |frame: &LineFrame| {
+            let place = frame.from.map_or(BENCH, usize::from);
+            let from = place.checked_sub(1).and_then(|place| self.nodes.get(place));
             LineFrame {
                 from: from.copied(),
-                ..*own
+                ..*frame
             }
         };
         let mut trace = Trace {
@@ -475,8 +472,8 @@ mod tests {
         let mut bench = Bench::new(&setup);
         assert_eq!(frames(&ask(&mut bench, "210#3D3100")), ["190#31000000"]);
         assert_eq!(frames(&ask(&mut bench, "201#310010")), Vec::<&str>::new());
-        assert_eq!(bench.drive(1).map(|own| own.register(0x31)), Some(0x1000));
-        assert_eq!(bench.drive(2).map(|own| own.register(0x31)), Some(0));
+        let commands = [1, 2].map(|node| Some(bench.drive(node)?.register(0x31)));
+        assert_eq!(commands, [Some(0x1000), Some(0)]);
     }
 
     /// Inputs at a time, and what the drive sends for them in its next scan (ex 10-1).

@@ -40,7 +40,7 @@ pub(crate) fn registers(texts: &[String]) -> Result<Vec<&'static Register>, Stri
             name => vec![register(name)?],
         };
         for register in named {
-            if !found.iter().any(|own| own.number == register.number) {
+            if !found.iter().any(|other| other.number == register.number) {
                 found.push(register);
             }
         }
@@ -192,8 +192,8 @@ mod tests {
     use super::*;
 
     fn raw(text: &str) -> Result<Data, String> {
-        let own = assignment(text)?;
-        own.value.data(own.register, Scaling::default())
+        let Assignment { register, value } = assignment(text)?;
+        value.data(register, Scaling::default())
     }
 
     /// Numbers of the manual (App 5, App 6), in units and as digits.
@@ -229,7 +229,7 @@ mod tests {
             let error = raw(text).expect_err(text);
             assert!(error.contains(part), "{text}: {error}");
         }
-        assert_eq!(registers(&["all".to_owned()]).map(|own| own.len()), Ok(256));
+        assert_eq!(registers(&["all".to_owned()]).map(|all| all.len()), Ok(256));
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl<L: Line> Search<'_, L> {
                 };
                 let reply = |tx: &u16| Some((*tx, Reply::decode(&frame, *tx).ok()?));
                 let mut replies = tx.iter().filter_map(reply);
-                if let Some((tx, reply)) = replies.find(|own| own.1.register == register) {
+                if let Some((tx, reply)) = replies.find(|answer| answer.1.register == register) {
                     return Some((tx, (reply.data.bits() & 0xFFFF) as u16));
                 }
             }
@@ -62,8 +62,8 @@ impl<L: Line> Search<'_, L> {
         let gate = self.line.segment();
         let started = gate
             .into_iter()
-            .flat_map(|own| own.started(self.places.first.0));
-        let cyclic: Vec<_> = started.map(|own| own.0).collect();
+            .flat_map(|gate| gate.started(self.places.first.0));
+        let cyclic: Vec<_> = started.map(|cycle| cycle.0).collect();
         let single = |register: &u8| !cyclic.contains(register);
         let mut asked = ASKED.into_iter().filter(single);
         let (one, other) = (asked.next()?, asked.next()?);
@@ -74,7 +74,7 @@ impl<L: Line> Search<'_, L> {
     /// What a register of a drive that answers holds, asked again where a frame was lost.
     fn reads(&mut self, (rx, tx): (u16, u16), register: u8) -> Option<u16> {
         let mut tries = 0..ROUNDS;
-        tries.find_map(|_| self.asks(rx, &[tx], register).map(|own| own.1))
+        tries.find_map(|_| self.asks(rx, &[tx], register).map(|answer| answer.1))
     }
 
     /// The identifiers on which it answers: those of the rig's file, others that were given to it, or any that was given to a drive, which
@@ -84,22 +84,22 @@ impl<L: Line> Search<'_, L> {
         let (rx, tx) = (self.places.rx.clone(), self.places.tx.clone());
         let near = rx.iter().cycle().take(rx.len() * ROUNDS).copied();
         let gate = self.line.segment();
-        let [more_rx, mut more_tx] = gate.map_or_else(Default::default, |own| own.given().clone());
-        let others: Vec<_> = gate.into_iter().flat_map(|own| own.places()).collect();
+        let [more_rx, mut more_tx] = gate.map(|gate| gate.given().clone()).unwrap_or_default();
+        let others: Vec<_> = gate.into_iter().flat_map(|gate| gate.places()).collect();
         more_tx.retain(|id| {
             others
                 .iter()
-                .all(|own| own.first == first || !own.tx.contains(id))
+                .all(|place| place.first == first || !place.tx.contains(id))
         });
         more_tx.extend(&tx);
         let far = more_rx
             .into_iter()
-            .chain(others.iter().flat_map(|own| own.rx.clone()));
+            .chain(others.iter().flat_map(|place| place.rx.clone()));
         let far: Vec<_> = far
             .filter(|id| !rx.contains(id))
             .map(|rx| (rx, more_tx.clone()))
             .collect();
-        let near: Vec<_> = near.map(|own| (own, tx.clone())).collect();
+        let near: Vec<_> = near.map(|id| (id, tx.clone())).collect();
         let found = near.into_iter().chain(far).find_map(|(rx, tx)| {
             let tx = self.answers(rx, &tx)?;
             Some((rx, tx))
@@ -170,9 +170,9 @@ impl<L: Line> Search<'_, L> {
             (IDENTIFIERS[1], first.1, at.1),
             (IDENTIFIERS[0], first.0, at.0),
         ];
-        let needed = needed.iter().filter(|own| at == first || own.1 != own.2);
-        let frames = needed.filter_map(|own| Some(back(at.0, own.0, own.1).ok()?.to_string()));
-        let frames: Vec<_> = frames.collect();
+        let needed = needed.iter().filter(|row| at == first || row.1 != row.2);
+        let frames = needed.filter_map(|row| back(at.0, row.0, row.1).ok());
+        let frames: Vec<_> = frames.map(|frame| frame.to_string()).collect();
         let set = if frames.len() == 1 { "sets" } else { "set" };
         let frames = format!("{} {set} it back", frames.join(" and "));
         let place = match at == first {
@@ -201,9 +201,9 @@ pub(super) fn still_sent<L: Line>(line: &mut Guarded<L>, first: u16, at: (u16, u
     let gate = line.segment();
     let started: Vec<_> = gate
         .into_iter()
-        .flat_map(|own| own.started(first))
+        .flat_map(|gate| gate.started(first))
         .collect();
-    let Some(longest) = started.iter().map(|own| own.1).max() else {
+    let Some(longest) = started.iter().map(|cycle| cycle.1).max() else {
         return Vec::new();
     };
     let mut left = Vec::new();
@@ -216,11 +216,11 @@ pub(super) fn still_sent<L: Line>(line: &mut Guarded<L>, first: u16, at: (u16, u
                 let Heard::Frame(can::CanEvent::Frame(frame)) = heard else {
                     continue;
                 };
-                let own = Reply::decode(&frame, at.1).map(|own| own.register);
-                let own = own
+                let shown = Reply::decode(&frame, at.1).map(|reply| reply.register);
+                let register = shown
                     .ok()
-                    .filter(|own| started.iter().any(|(register, _)| register == own));
-                left.extend(own.filter(|own| !left.contains(own)));
+                    .filter(|number| started.iter().any(|(register, _)| register == number));
+                left.extend(register.filter(|register| !left.contains(register)));
             }
         }
         if left.is_empty() && line.trouble().is_none() {

@@ -13,7 +13,6 @@ use harness_sim::segment::{Host, Placed, Segment};
 use harness_sim::unitek::{Control, Drive, Inputs, Member};
 use std::fmt;
 
-/// The stations.
 const MASTER: usize = 0;
 const DRIVE: usize = 1;
 
@@ -28,7 +27,6 @@ const REST: Span = Span::from_millis(300);
 pub(crate) enum JobEnd {
     /// The outcome of a job; the stuff byte of a reply is left out.
     Job(Outcome),
-    /// A wait has passed.
     Waited,
 }
 

@@ -12,7 +12,6 @@ use serde::Deserialize;
 /// The longest wait, in ms.
 const LONGEST: u64 = 10_000;
 
-/// A campaign file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct FrameCampaignFile {
@@ -24,7 +23,6 @@ struct FrameCampaignFile {
     title: String,
     /// What the master does, see [`CampaignStep`].
     steps: Vec<String>,
-    /// The kinds of faults.
     faults: Vec<FaultName>,
     /// By how much `late` delays.
     #[serde(default)]
@@ -38,15 +36,12 @@ struct FrameCampaignFile {
     expect: FrameExpect,
 }
 
-/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum FaultName {
     /// No station receives it, and its sender does not notice.
     Lost,
-    /// It arrives twice.
     Doubled,
-    /// It arrives later.
     Late,
     /// It is damaged, and repeated by its sender's controller.
     Corrupt,
@@ -67,7 +62,6 @@ struct FrameExpect {
     unnoticed: Option<u64>,
 }
 
-/// A step of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CampaignStep {
     /// `read REGISTER`, `write REGISTER = HEX`, `cycle REGISTER MS`, `stop REGISTER`, `start-up`: a job, to its end.
@@ -91,7 +85,6 @@ impl FrameCampaignFile {
         faults.collect()
     }
 
-    /// The settings of the master.
     fn options(&self) -> Options {
         let usual = Options::default();
         Options {
@@ -139,7 +132,6 @@ pub(super) fn read(text: &str) -> Result<(Frames, LineText), String> {
     Ok((frames, text))
 }
 
-/// One step.
 fn step(text: &str) -> Result<CampaignStep, String> {
     let words: Vec<_> = text.split_whitespace().collect();
     let register = |name: &str| Register::named(name).map_err(|error| error.to_string());

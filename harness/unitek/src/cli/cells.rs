@@ -6,7 +6,6 @@ use harness_bench::command::output::Output;
 use harness_proto::unitek::units::usual;
 use harness_proto::unitek::{ALIASES, REGISTERS, Register};
 
-/// The names of all registers.
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     REGISTERS.iter().map(|register| register.name)
 }

@@ -82,7 +82,6 @@ pub(super) fn stop(
     })
 }
 
-/// How a drive was stopped.
 pub(super) const fn how(stopped: Stopped) -> &'static str {
     match stopped {
         Stopped::OnRamp => "its speed command is 0",
@@ -110,7 +109,6 @@ pub(super) fn block(
     )
 }
 
-/// Clears errors.
 pub(super) fn delete_error(
     bench: PortBench<'_, UnitekDrives>,
     arguments: &DeleteErrorArguments,

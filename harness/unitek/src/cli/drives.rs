@@ -39,7 +39,8 @@ impl CommandDrives for UnitekDrives {
         let mut driver = session.driver();
         let mut found = Vec::new();
         for &axis in drives {
-            let scaling = match registers.iter().any(|own| usual(own.unit).is_some()) {
+            let mut units = registers.iter().map(|register| register.unit);
+            let scaling = match units.any(|unit| usual(unit).is_some()) {
                 true => scaling(&mut driver, axis)?,
                 false => Scaling::default(),
             };

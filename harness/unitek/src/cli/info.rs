@@ -95,8 +95,8 @@ pub(super) fn top(session: &Session) -> LineTop<UnitekDrives> {
 /// The row of a drive of which the registers of `top` were read.
 fn row(found: &[Found]) -> TopRow {
     let raw = |register: u8| {
-        let own = found.iter().find(|own| own.reply.register == register);
-        own.map_or(0, |own| own.reply.data.bits())
+        let found_register = found.iter().find(|found| found.reply.register == register);
+        found_register.map_or(0, |found| found.reply.data.bits())
     };
     let errors = raw(0x8F) & ERRORS_NOT_READY;
     let state = if errors != 0 {
@@ -111,11 +111,11 @@ fn row(found: &[Found]) -> TopRow {
         "released"
     };
     let node = found.first().map_or(0, |found| found.axis.node);
-    let speed = found.iter().find(|own| own.reply.register == 0x30);
+    let speed = found.iter().find(|found| found.reply.register == 0x30);
     TopRow {
         state: FORM.state(state),
         in_error: errors != 0,
-        speed: speed.map(|own| own.reply.number() as f64),
+        speed: speed.map(|found| found.reply.number() as f64),
         error: Some(errors).filter(|errors| *errors != 0),
         cells: std::iter::once(node.to_string())
             .chain(found.iter().map(words))

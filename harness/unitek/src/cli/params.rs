@@ -49,7 +49,7 @@ pub(super) const PARAMETERS: ParameterFile<UnitekDrives, RegisterValue> = Parame
 
 /// The parameters of a drive, read.
 fn parameters(session: &mut Session, axis: Axis) -> Result<Vec<Found>, Failure> {
-    let all: Vec<_> = REGISTERS.iter().filter(|own| is_parameter(own)).collect();
+    let all: Vec<_> = REGISTERS.iter().filter(|row| is_parameter(row)).collect();
     UnitekDrives::read(session, &[axis], &all)
 }
 

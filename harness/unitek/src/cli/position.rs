@@ -91,7 +91,7 @@ fn make_ready(driver: &mut Driver<'_>, axis: Axis, output: &mut Output) -> Resul
     if !driver.permits(axis, destination) {
         // The highest limit that `max_speed` lets pass; none where motors may not turn at all.
         let all: Vec<u16> = (0..=0x7FFF).collect();
-        let permitted = all.partition_point(|own| driver.permits_write(axis, 0x34, *own));
+        let permitted = all.partition_point(|speed| driver.permits_write(axis, 0x34, *speed));
         if let Some(most) = permitted.checked_sub(1).and_then(|last| all.get(last)) {
             driver.write(axis, 0x34, Data::Short(*most))?;
             output.say(&format!(

@@ -7,7 +7,6 @@ use harness_bench::command::output::Output;
 use harness_bench::command::sim::{SimArguments, SimSpeed, header, options, refuse};
 use harness_bench::medium::ErrorMarks;
 
-/// Serves drives.
 pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Served {
     let rings = [
         ("--tcp", !arguments.tcp.is_empty()),

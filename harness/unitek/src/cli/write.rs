@@ -41,9 +41,9 @@ pub(super) fn write(
         let mut orders = Vec::new();
         for axis in drives {
             let scaling = scaling(&mut driver, axis)?;
-            for own in &values {
-                let data = own.value.data(own.register, scaling);
-                orders.push((axis, own.register, data.map_err(Failure::refused)?));
+            for assignment in &values {
+                let data = assignment.value.data(assignment.register, scaling);
+                orders.push((axis, assignment.register, data.map_err(Failure::refused)?));
             }
         }
         refuse_denied(&mut driver, &orders)?;

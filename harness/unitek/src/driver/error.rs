@@ -17,7 +17,6 @@ pub(crate) enum Error {
         counted(*.tries, "request")
     )]
     NoReply {
-        /// Which drive.
         node: u8,
         register: u8,
         /// How often it was asked.
@@ -29,12 +28,9 @@ pub(crate) enum Error {
         name(*.register), hex(*.wrote), hex(.reads.data)
     )]
     Differs {
-        /// Which drive.
         node: u8,
         register: u8,
-        /// What was written.
         wrote: Data,
-        /// What was read.
         reads: Reply,
     },
     /// A drive is not ready, or its hardware enable is open.
@@ -42,37 +38,25 @@ pub(crate) enum Error {
         "drive {node} was not released: register {:02X} ({}) reads {}, 1 expected{}",
         .reads.register, name(.reads.register), hex(.reads.data), hint(.reads.register)
     )]
-    NotReady {
-        /// Which drive.
-        node: u8,
-        /// What was read.
-        reads: Reply,
-    },
+    NotReady { node: u8, reads: Reply },
     /// A drive behaves in another way than the profile of the rig's file says.
     #[error(
         "drive {node} has {property} = {shows}, and the profile of the rig's file says {says}: the profile is of another drive; qualify this one, or take `profile` out of the file"
     )]
     OtherThanProfile {
-        /// Which drive.
         node: u8,
         property: &'static str,
-        /// What the profile says.
         says: String,
-        /// What the drive has shown.
         shows: String,
     },
     /// A time-out of the bus was provoked, and nothing clears it.
     #[error(
         "drive {node}: its BUS-TIMEOUT stays: neither 8E (FUN_ERRCANCEL) nor a lock and its release clears it (UNITEK dump)"
     )]
-    TimeOutStays {
-        /// Which drive.
-        node: u8,
-    },
+    TimeOutStays { node: u8 },
     /// The request is impossible.
     #[error("{0}")]
     Refused(Refused),
-    /// The bench has no drive of this number.
     #[error("the bench has no drive {0}")]
     NoSuchDrive(u8),
     /// The line carries nothing more.

@@ -39,7 +39,6 @@ const COMMANDS: [u8; 2] = [0x31, 0x90];
 /// MODE (ex 2).
 const MODE: u8 = 0x51;
 
-/// How a drive was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stopped {
     /// Its speed command is 0: it stops on its ramp.
@@ -298,10 +297,10 @@ impl<'l> Driver<'l> {
         let submitted = self.drives[place].master.submit(job);
         let id = submitted.map_err(Error::Refused)?;
         let has_ended =
-            move |drives: &[Drive]| drives[place].ended.iter().any(|(own, _)| *own == id);
+            move |drives: &[Drive]| drives[place].ended.iter().any(|(ended, _)| *ended == id);
         self.pump(Instant::NEVER, has_ended)?;
         let ended = &mut self.drives[place].ended;
-        let found = ended.iter().position(|(own, _)| *own == id);
+        let found = ended.iter().position(|(ended, _)| *ended == id);
         found.map_or(Err(Error::NoSuchDrive(axis.node)), |at| {
             Ok(ended.swap_remove(at).1)
         })
@@ -323,7 +322,7 @@ impl<'l> Driver<'l> {
             let due = self
                 .drives
                 .iter()
-                .filter_map(|own| own.master.poll_timeout());
+                .filter_map(|drive| drive.master.poll_timeout());
             let next = due.chain([end]).min().unwrap_or(end);
             let _all_is_over = self.line.wait(next);
         }

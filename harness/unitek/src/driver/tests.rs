@@ -10,11 +10,11 @@ use harness_proto::unitek::guard::Limits;
 const PATIENCE: Span = Span::from_millis(20);
 
 fn axis(node: u8) -> Axis {
-    let own = DriveSetup::new(node);
+    let drive = DriveSetup::new(node);
     Axis {
         node,
-        rx: own.identifiers.0,
-        tx: own.identifiers.1,
+        rx: drive.identifiers.0,
+        tx: drive.identifiers.1,
     }
 }
 
@@ -28,7 +28,7 @@ fn released() -> Setup {
 }
 
 fn line(setup: &Setup, limits: Limits) -> Guarded<Bench> {
-    let drives: Vec<_> = setup.drives.iter().map(|own| own.identifiers).collect();
+    let drives: Vec<_> = setup.drives.iter().map(|drive| drive.identifiers).collect();
     guarded(Bench::new(setup), limits, &drives, false)
 }
 
@@ -47,7 +47,7 @@ fn registers_are_read_and_written() {
     assert_eq!(position.data, Data::Long(0x86B9));
     let reads = driver.write(axis(2), 0x31, Data::Short(0x0CCD));
     assert_eq!(
-        reads.expect("written").map(|own| own.data),
+        reads.expect("written").map(|reply| reply.data),
         Some(Data::Short(0x0CCD))
     );
     assert_eq!(

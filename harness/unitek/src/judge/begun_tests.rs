@@ -22,7 +22,7 @@ fn log(frames: &[(u64, &str)]) -> Vec<LineFrame> {
         }
     };
     let mut all: Vec<_> = frames.iter().map(frame).collect();
-    all.sort_by_key(|own| own.start);
+    all.sort_by_key(|frame| frame.start);
     all
 }
 
@@ -54,7 +54,7 @@ const READ: [(u64, &str); 2] = [(100, "201#3DE200"), (104, "181#E2010000")];
 
 /// This number of frames, one each `every` tenths of a millisecond.
 fn cycle(text: &'static str, every: u64, count: u64) -> Vec<(u64, &'static str)> {
-    (0..count).map(|own| (own * every, text)).collect()
+    (0..count).map(|place| (place * every, text)).collect()
 }
 
 /// UNITEK 5.2: a cycle of any register, also where MODE is written meanwhile, which ends events and no cycle.
@@ -98,7 +98,7 @@ fn events() {
     let asks = asks
         .into_iter()
         .zip(0..)
-        .map(|((at, own), place)| (at + 200 + place / 20 * 4, own));
+        .map(|((at, text), place)| (at + 200 + place / 20 * 4, text));
     let asks: Vec<_> = asks.collect();
     right(&[&asks[..], &events, &[off]].concat());
     wrong(
@@ -137,7 +137,7 @@ fn a_full_table() {
     let mut frames: Vec<_> = READ.to_vec();
     for (place, text) in OLD.into_iter().enumerate() {
         let text = if place == 2 { "181#350000000000" } else { text };
-        let frame = |(at, own): (u64, &'static str)| (at + place as u64 * 3, own);
+        let frame = |(at, text): (u64, &'static str)| (at + place as u64 * 3, text);
         frames.extend(cycle(text, 1_000, 20).into_iter().map(frame));
     }
     let ninth = (8_000, "201#3DA00A");
@@ -161,7 +161,7 @@ fn long_replies() {
     let long = |at: u64| [(at, "201#3DE200"), (at + 4, "181#E20100000000")];
     right(&[long(1_000), long(2_000)].concat());
     wrong(
-        &[long(800), READ.map(|own| (own.0 + 900, own.1))].concat(),
+        &[long(800), READ.map(|(at, text)| (at + 900, text))].concat(),
         FrameSymptom::Length,
         "App 2",
     );
@@ -210,7 +210,8 @@ fn counts(frames: &[(u64, &str)]) -> (usize, usize) {
 
 /// These frames at a later time, in tenths of a millisecond.
 fn at<'t>(later: u64, frames: &[(u64, &'t str)]) -> Vec<(u64, &'t str)> {
-    frames.iter().map(|own| (own.0 + later, own.1)).collect()
+    let frames = frames.iter();
+    frames.map(|(at, text)| (at + later, *text)).collect()
 }
 
 /// UNITEK ex 12: homing that was asked for before sets the destination at its end; a lock ends it.
@@ -255,11 +256,11 @@ fn a_gap_in_a_cycle() {
     let polls = cycle("201#3DE200", 1_000, 10);
     let polls: Vec<_> = polls
         .iter()
-        .flat_map(|own| [*own, (own.0 + 4, "181#E2010000")])
+        .flat_map(|poll| [*poll, (poll.0 + 4, "181#E2010000")])
         .collect();
     let frames = at(5_000, &cycle("181#30010200", 1_000, 10));
     let before = [&polls[..], &asks, &at(4_000, &READ), &frames].concat();
-    let gap = |own: &String| own.starts_with("the log has a gap of 3600");
+    let gap = |remark: &String| remark.starts_with("the log has a gap of 3600");
     for gone_on in [true, false] {
         let goes_on = cycle("181#30010200", 1_000, if gone_on { 10 } else { 0 });
         let behind = at(HOUR, &[goes_on, at(400, &polls)].concat());
@@ -275,7 +276,8 @@ fn a_gap_in_a_cycle() {
     // The host goes on, however slowly.
     for every in [1_000, 20_000, 100_000] {
         let on = at(16_000, &cycle("201#3DE200", every, 8));
-        let replies = at(4, &on).into_iter().map(|own| (own.0, "181#E2010000"));
+        let replies = at(4, &on).into_iter();
+        let replies = replies.map(|(at, _)| (at, "181#E2010000"));
         let replies: Vec<_> = replies.collect();
         wrong(
             &[&before[..], &on, &replies].concat(),

@@ -54,7 +54,7 @@ impl Follower {
             mode.is_some_and(|mode| mode & u32::from(MODE_LOCK) != 0)
         };
         if reply.register == 0x40
-            && asked.is_some_and(|own| locks(&own.held) && locks(&self.held[0x51]))
+            && asked.is_some_and(|asked| locks(&asked.held) && locks(&self.held[0x51]))
             && raw & status::ENABLED != 0
         {
             let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();

@@ -9,7 +9,6 @@ const GAP: Span = Span::from_millis(2);
 /// From how many intervals on their mean is judged.
 const ENOUGH: u64 = 10;
 
-/// The cycle of a register.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Cycle {
     /// It may run since before the first frame.
@@ -17,11 +16,9 @@ pub(super) enum Cycle {
     Unknown,
     /// It does not run since then; one frame may still be in flight.
     Off(Instant),
-    /// It runs.
     On(Running),
 }
 
-/// A cycle that runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Running {
     every: Span,
@@ -40,7 +37,6 @@ pub(super) struct Running {
 /// How a frame of a cycle is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Untimely {
-    /// One gap.
     Gap(Span),
     /// The mean of a number of gaps.
     Mean(Span, u64),
@@ -103,7 +99,7 @@ impl Running {
         }
         self.used = used;
         self.series = Some((first, at, count + 1));
-        let off = |own: Span, wanted: Span| own.units().abs_diff(wanted.units());
+        let off = |interval: Span, wanted: Span| interval.units().abs_diff(wanted.units());
         if off(gap, self.every) > permitted.units() {
             self.series = Some((at, at, 0));
             return Some(Untimely::Gap(gap));

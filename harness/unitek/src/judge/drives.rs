@@ -15,7 +15,6 @@ pub(super) const MOST_BREACHES: usize = 50;
 /// Something that a drive does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Breach {
-    /// How it differs.
     pub(crate) what: FrameSymptom,
     /// The number of the frame where it shows, counted from 1.
     pub(crate) frame: usize,
@@ -79,9 +78,9 @@ impl<'f> HeardFrames<'f> {
 
     fn recordings(&self) -> impl Iterator<Item = Recording> {
         let begins = self.seams.iter();
-        let begins = begins.filter(|own| own.kind == SeamKind::Recording);
+        let begins = begins.filter(|seam| seam.kind == SeamKind::Recording);
         let mut places = vec![0];
-        places.extend(begins.map(|own| own.piece));
+        places.extend(begins.map(|seam| seam.piece));
         places.push(self.frames.len());
         let frames = self.frames;
         (1..places.len()).filter_map(move |end| {
@@ -92,7 +91,7 @@ impl<'f> HeardFrames<'f> {
 
     /// Whether the clock was set in front of a frame.
     fn clock_set(&self, piece: usize) -> bool {
-        let here = self.seams.binary_search_by_key(&piece, |own| own.piece);
+        let here = self.seams.binary_search_by_key(&piece, |seam| seam.piece);
         here.is_ok_and(|place| self.seams[place].kind == SeamKind::ClockSet)
     }
 }
@@ -108,11 +107,11 @@ struct Recording {
 
 impl Recording {
     fn of(before: usize, frames: &[LineFrame]) -> Self {
-        let mut gaps = gap::gaps(frames.iter().map(|own| (own.start, own.at)));
+        let mut gaps = gap::gaps(frames.iter().map(|frame| (frame.start, frame.at)));
         let mut frames = frames.to_vec();
         for gap in &mut gaps {
-            for own in frames.iter_mut().skip(gap.piece) {
-                (own.start, own.at) = (own.start - gap.silence, own.at - gap.silence);
+            for frame in frames.iter_mut().skip(gap.piece) {
+                (frame.start, frame.at) = (frame.start - gap.silence, frame.at - gap.silence);
             }
             gap.piece += before;
         }
@@ -157,9 +156,9 @@ fn judge_with(
         }
         for recording in &recordings {
             let mut follower = of(drive, identifiers).with_tolerance(heard.tolerance);
-            follower.others = drives.iter().map(|own| own.0).collect();
+            follower.others = drives.iter().map(|drive| drive.0).collect();
             if !follower.guessed {
-                let others = drives.iter().map(|own| own.1.0);
+                let others = drives.iter().map(|drive| drive.1.0);
                 follower.elsewhere.declared = others.collect();
             }
             let (frames, mut gaps) = (&recording.frames, recording.gaps.iter().peekable());
@@ -167,33 +166,33 @@ fn judge_with(
                 if heard.clock_set(index) {
                     follower.clock_set(frame.start);
                 }
-                if let Some(gap) = gaps.next_if(|own| own.piece == index) {
+                if let Some(gap) = gaps.next_if(|gap| gap.piece == index) {
                     follower.gap(index + 1, frame.start, gap.silence);
                 }
                 follower.hear(index + 1, frame);
             }
             used.extend(follower.identifiers().map(u32::from));
-            let own = follower.end(recording.before + frames.len(), frames);
-            all.breaches.extend(own.breaches);
-            all.compared += own.compared;
-            all.replies += own.replies;
-            all.heard.extend((own.compared > 0).then_some(drive));
-            all.values += own.values;
-            all.doubts.extend(own.doubts);
-            let new = own.remarks.into_iter();
-            let known = |own: &String| all.remarks.contains(own);
-            let new: Vec<_> = new.filter(|own| !known(own)).collect();
+            let judged = follower.end(recording.before + frames.len(), frames);
+            all.breaches.extend(judged.breaches);
+            all.compared += judged.compared;
+            all.replies += judged.replies;
+            all.heard.extend((judged.compared > 0).then_some(drive));
+            all.values += judged.values;
+            all.doubts.extend(judged.doubts);
+            let new = judged.remarks.into_iter();
+            let known = |remark: &String| all.remarks.contains(remark);
+            let new: Vec<_> = new.filter(|remark| !known(remark)).collect();
             all.remarks.extend(new);
         }
     }
-    let not_compared = |own: &&LineFrame| shared_by_two.contains(&own.frame.id().number());
+    let not_compared = |frame: &&LineFrame| shared_by_two.contains(&frame.frame.id().number());
     all.replies += heard.frames.iter().filter(not_compared).count();
-    let numbers: Vec<u8> = drives.iter().map(|own| own.0).collect();
-    let gaps = recordings.iter().flat_map(|own| &own.gaps);
+    let numbers: Vec<u8> = drives.iter().map(|drive| drive.0).collect();
+    let gaps = recordings.iter().flat_map(|recording| &recording.gaps);
     let gaps: Vec<Gap> = gaps.copied().collect();
     all.remarks.extend(gap::note(&gaps, "frame"));
     all.remarks.extend(others(heard.frames, &numbers, &used));
-    all.breaches.sort_by_key(|own| own.frame);
+    all.breaches.sort_by_key(|breach| breach.frame);
     all
 }
 
@@ -202,14 +201,14 @@ const MOST_SHOWN: usize = 8;
 
 /// How many frames are neither to nor from one of the drives, and with which identifiers.
 fn others(frames: &[LineFrame], drives: &[u8], used: &BTreeSet<u32>) -> Option<String> {
-    let other = |own: &&LineFrame| {
-        let id = own.frame.id();
-        let of_drive = own.from.is_some_and(|drive| drives.contains(&drive));
+    let other = |frame: &&LineFrame| {
+        let id = frame.frame.id();
+        let of_drive = frame.from.is_some_and(|drive| drives.contains(&drive));
         !of_drive && (id.is_extended() || !used.contains(&id.number()))
     };
-    let frames = frames.iter().filter(other).map(|own| own.frame.id());
+    let frames = frames.iter().filter(other).map(|frame| frame.frame.id());
     let ids: Vec<_> = frames.collect();
-    let all: BTreeSet<String> = ids.iter().map(|own| identifier(*own)).collect();
+    let all: BTreeSet<String> = ids.iter().map(|id| identifier(*id)).collect();
     let shown: Vec<_> = all.iter().take(MOST_SHOWN).map(String::as_str).collect();
     let more = if all.len() > MOST_SHOWN { ", ..." } else { "" };
     (!all.is_empty()).then(|| {

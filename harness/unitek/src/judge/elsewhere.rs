@@ -21,7 +21,7 @@ pub(super) struct Elsewhere {
 impl Elsewhere {
     pub(super) fn hear(&mut self, frame: &Frame, at: Instant) {
         let id = u16::try_from(frame.id().number()).ok();
-        let Some(id) = id.filter(|own| !self.declared.contains(own)) else {
+        let Some(id) = id.filter(|id| !self.declared.contains(id)) else {
             return;
         };
         match Request::decode(frame, id, Dlc4::As3) {

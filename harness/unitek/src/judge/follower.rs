@@ -208,50 +208,49 @@ impl Follower {
     /// Whether a request waits for its reply.
     #[must_use]
     pub(crate) fn waits(&self) -> bool {
-        self.asked.iter().any(|own| own.sure)
+        self.asked.iter().any(|asked| asked.sure)
     }
 
-    /// A frame of the bus.
-    pub(crate) fn hear(&mut self, number: usize, own: &LineFrame) {
-        let sends = self.sent_it(own) && !matches!(own.ended, FrameEnd::Error(_));
-        if sends && self.supply.may_have_failed(own.start + self.tolerance) {
-            let restarted = self.restarted(own.start);
+    pub(crate) fn hear(&mut self, number: usize, frame: &LineFrame) {
+        let sends = self.sent_it(frame) && !matches!(frame.ended, FrameEnd::Error(_));
+        if sends && self.supply.may_have_failed(frame.start + self.tolerance) {
+            let restarted = self.restarted(frame.start);
             self.supply
                 .may_be(restarted, self.judged.breaches.len(), number);
         }
         if let Some(restarted) = &mut self.supply.restarted {
-            restarted.hear(number, own);
+            restarted.hear(number, frame);
         }
-        self.hear_one(number, own);
+        self.hear_one(number, frame);
         self.explain_by_silence(number);
         if sends {
-            self.supply.sent = Some(own.at);
+            self.supply.sent = Some(frame.at);
         }
     }
 
-    fn hear_one(&mut self, number: usize, own: &LineFrame) {
-        self.used = self.used + own.at.since(own.start);
-        self.begin.get_or_insert(own.start);
-        if self.sent_it(own) {
+    fn hear_one(&mut self, number: usize, frame: &LineFrame) {
+        self.used = self.used + frame.at.since(frame.start);
+        self.begin.get_or_insert(frame.start);
+        if self.sent_it(frame) {
             // An error frame ends a frame that is repeated.
-            if !matches!(own.ended, FrameEnd::Error(_)) {
-                self.missing(number, own.start);
-                self.sends(number, own);
+            if !matches!(frame.ended, FrameEnd::Error(_)) {
+                self.missing(number, frame.start);
+                self.sends(number, frame);
             }
-        } else if among(&self.rx, &own.frame) || among(&self.second[0], &own.frame) {
-            self.hears(number, own);
+        } else if among(&self.rx, &frame.frame) || among(&self.second[0], &frame.frame) {
+            self.hears(number, frame);
         } else {
-            self.elsewhere.hear(&own.frame, own.at);
+            self.elsewhere.hear(&frame.frame, frame.at);
         }
     }
 
     /// Whether a frame is the drive's: by its number, or by an identifier that it may have taken.
-    fn sent_it(&self, own: &LineFrame) -> bool {
-        let moved = among(&self.tx, &own.frame) || among(&self.second[1], &own.frame);
-        match own.from {
+    fn sent_it(&self, frame: &LineFrame) -> bool {
+        let moved = among(&self.tx, &frame.frame) || among(&self.second[1], &frame.frame);
+        match frame.from {
             Some(drive) if drive == self.drive => true,
             Some(drive) => moved && !self.others.contains(&drive),
-            None => moved && sender_of(&own.frame).is_none(),
+            None => moved && sender_of(&frame.frame).is_none(),
         }
     }
 
@@ -276,7 +275,7 @@ impl Follower {
     /// Whether something asks the drive for a frame.
     fn is_asked(&self) -> bool {
         let cycles = &self.cycles;
-        !self.asked.is_empty() || cycles.iter().any(|own| matches!(own, Cycle::On(_)))
+        !self.asked.is_empty() || cycles.iter().any(|cycle| matches!(cycle, Cycle::On(_)))
     }
 
     pub(super) fn breach(
@@ -314,40 +313,40 @@ impl Follower {
     }
 
     /// What the drive may read out of a frame.
-    fn hears(&mut self, number: usize, own: &LineFrame) {
-        let id = own.frame.id().number();
+    fn hears(&mut self, number: usize, frame: &LineFrame) {
+        let id = frame.frame.id().number();
         let rx = u16::try_from(id).unwrap_or(0);
-        let Ok(request) = Request::decode(&own.frame, rx, Dlc4::As3) else {
+        let Ok(request) = Request::decode(&frame.frame, rx, Dlc4::As3) else {
             return;
         };
         // What an error ended may have been taken before; 4 bytes may be ignored (`dlc4`).
         let heard = self.rx == [rx] && !self.other_rate;
-        let sure = own.ended == FrameEnd::Good && heard && own.frame.dlc() != 4;
+        let sure = frame.ended == FrameEnd::Good && heard && frame.frame.dlc() != 4;
         match request {
             Request::Read { register } => {
                 if let Cycle::On(running) = &mut self.cycles[usize::from(register)] {
                     // It may end the cycle (`oneshot-stops`).
                     running.sure = false;
-                    running.blur(own.at);
+                    running.blur(frame.at);
                 }
                 let silent = Register::of(register).dump == 0xFACE;
-                self.ask(register, own.at, number, sure && !silent);
+                self.ask(register, frame.at, number, sure && !silent);
             }
             Request::Cycle { register, every } => {
                 self.owes(number, register);
-                self.starts(register, every, own.at, sure);
+                self.starts(register, every, frame.at, sure);
             }
             Request::Stop { register } => {
                 self.owes(number, register);
                 let cycle = &mut self.cycles[usize::from(register)];
                 match (sure, &mut *cycle) {
                     (true, Cycle::Off(_)) => {}
-                    (true, _) => *cycle = Cycle::Off(own.at),
+                    (true, _) => *cycle = Cycle::Off(frame.at),
                     (false, Cycle::On(running)) => running.sure = false,
                     (false, _) => {}
                 }
             }
-            Request::Write { register, data } => self.writes(register, data, own.at, sure),
+            Request::Write { register, data } => self.writes(register, data, frame.at, sure),
         }
     }
 
@@ -376,7 +375,7 @@ impl Follower {
     pub(super) fn may_come_later(&mut self, asked: &Asked, at: Instant) {
         let held = self.held[usize::from(shown_in(asked.register))].or(&asked.held);
         let later = self.asked.iter_mut();
-        for other in later.filter(|own| own.register == asked.register) {
+        for other in later.filter(|other| other.register == asked.register) {
             other.held = other.held.or(&held);
         }
         self.loose.insert(asked.register, (at, held));
@@ -416,7 +415,7 @@ impl Follower {
             // A load brings every parameter back; the EEPROM is not known.
             0x83 => {
                 self.supply.stored();
-                for other in REGISTERS.iter().filter(|own| own.access == Access::RW) {
+                for other in REGISTERS.iter().filter(|row| row.access == Access::RW) {
                     self.held[usize::from(other.number)] = Held::any();
                 }
                 (self.wide, self.wide_at) = (None, at);
@@ -438,7 +437,7 @@ impl Follower {
         let takes = sure && !matches!(number, 0x68 | 0x69);
         self.held[place] = before.written(register, data, takes);
         let waiting = self.asked.iter_mut();
-        for asked in waiting.filter(|own| shown_in(own.register) == number) {
+        for asked in waiting.filter(|asked| shown_in(asked.register) == number) {
             asked.held = asked.held.or(&self.held[place]);
         }
         self.supply
@@ -515,43 +514,42 @@ impl Follower {
         }
     }
 
-    /// A frame of the drive.
-    fn sends(&mut self, number: usize, own: &LineFrame) {
+    fn sends(&mut self, number: usize, frame: &LineFrame) {
         self.judged.replies += 1;
-        let tx = u16::try_from(own.frame.id().number()).unwrap_or(0);
-        let first = own.frame.data().first().copied().unwrap_or(0);
+        let tx = u16::try_from(frame.frame.id().number()).unwrap_or(0);
+        let first = frame.frame.data().first().copied().unwrap_or(0);
         let may_use = self.tx.contains(&tx) || self.second[1].contains(&tx);
-        if !may_use || own.frame.id().is_extended() {
+        if !may_use || frame.frame.id().is_extended() {
             self.judged.compared += 1;
-            return self.named_otherwise(number, own, first);
+            return self.named_otherwise(number, frame, first);
         }
         self.named = true;
-        let reply = match Reply::decode(&own.frame, tx) {
+        let reply = match Reply::decode(&frame.frame, tx) {
             Ok(reply) => reply,
             Err(_) if self.timed && !self.is_asked() => {
                 return self.judged.doubt(format!(
                     "frame {number}, {}: nothing asks drive {} for a frame, and another station may have sent this one with its identifier",
-                    written(&own.frame),
+                    written(&frame.frame),
                     self.drive
                 ));
             }
             Err(why) => {
                 self.judged.compared += 1;
-                let about = format!("{} is no reply: {why}", written(&own.frame));
+                let about = format!("{} is no reply: {why}", written(&frame.frame));
                 return self.breach((number, first), (Length, "4.5"), about);
             }
         };
         self.judged.compared += 1;
-        let asked = self.why(number, own, &reply);
-        self.length(number, own.start, &reply);
+        let asked = self.why(number, frame, &reply);
+        self.length(number, frame.start, &reply);
         self.value(number, &reply, asked.as_ref());
     }
 
     /// A frame of the drive has another identifier. It may have been set before the first frame (ex 1), or in a gap of the log.
-    fn named_otherwise(&mut self, number: usize, own: &LineFrame, register: u8) {
-        let id = identifier(own.frame.id());
+    fn named_otherwise(&mut self, number: usize, frame: &LineFrame, register: u8) {
+        let id = identifier(frame.frame.id());
         let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
-        let sure = self.named || !self.timed || own.frame.id().is_extended();
+        let sure = self.named || !self.timed || frame.frame.id().is_extended();
         let why = (!sure).then(|| {
             format!(
                 "it may have been set where the log has no frames, as a setup with `drive {} tx {id}` says",
@@ -559,7 +557,7 @@ impl Follower {
             )
         });
         self.differs((number, register), (Name, "3.1"), (about, why));
-        self.may_use(0x69, own.frame.id().number());
+        self.may_use(0x69, frame.frame.id().number());
     }
 }
 
@@ -567,12 +565,12 @@ impl Follower {
 const fn shown_in(register: u8) -> u8 {
     match register {
         0x40 => 0x51,
-        own => own,
+        register => register,
     }
 }
 
 /// Whether a frame has one of these identifiers.
 fn among(all: &[u16], frame: &Frame) -> bool {
     let id = frame.id();
-    !id.is_extended() && all.iter().any(|own| u32::from(*own) == id.number())
+    !id.is_extended() && all.iter().any(|known| u32::from(*known) == id.number())
 }

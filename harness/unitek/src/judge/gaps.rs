@@ -16,8 +16,9 @@ const IN_A_GAP: &str =
 impl Follower {
     /// The log has a gap in front of frame `number`. From now on the frames come at times that do not count it.
     pub(super) fn gap(&mut self, number: usize, at: Instant, silence: Span) {
-        let (waits, known): (Vec<_>, Vec<_>) = self.asked.drain(..).partition(|own| own.excused);
-        waits.iter().for_each(|own| self.unanswered(own));
+        let all = self.asked.drain(..);
+        let (waits, known): (Vec<_>, Vec<_>) = all.partition(|asked| asked.excused);
+        waits.iter().for_each(|asked| self.unanswered(asked));
         self.asked = known.into();
         for asked in &mut self.asked {
             (asked.excused, asked.sure, asked.at) = (asked.sure, false, at);
@@ -50,7 +51,7 @@ impl Follower {
     pub(super) fn answered(&self, register: u8) -> Option<usize> {
         let place = |excused: bool| {
             let mut asked = self.asked.iter();
-            asked.position(|own| own.register == register && own.excused == excused)
+            asked.position(|asked| asked.register == register && asked.excused == excused)
         };
         place(false).or_else(|| place(true))
     }

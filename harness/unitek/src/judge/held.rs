@@ -28,22 +28,20 @@ pub(super) fn is_live(number: u8) -> bool {
 }
 
 impl Held {
-    /// One content.
     pub(super) fn one(raw: u32) -> Self {
         Self(Some(vec![(raw, u32::MAX)]))
     }
 
-    /// Anything.
     pub(super) const fn any() -> Self {
         Self(None)
     }
 
     pub(super) fn or(&self, other: &Self) -> Self {
-        let (Some(own), Some(others)) = (&self.0, &other.0) else {
+        let (Some(ours), Some(others)) = (&self.0, &other.0) else {
             return Self::any();
         };
-        let mut all = own.clone();
-        all.extend(others.iter().filter(|bits| !own.contains(bits)));
+        let mut all = ours.clone();
+        all.extend(others.iter().filter(|bits| !ours.contains(bits)));
         match all.len() <= MOST {
             true => Self(Some(all)),
             false => Self::any(),
@@ -59,7 +57,7 @@ impl Held {
             (Width::Bits32, Data::Short(value)) => {
                 let low = u32::from(value);
                 let kept = match &self.0 {
-                    Some(own) => own
+                    Some(all) => all
                         .iter()
                         .map(|(raw, mask)| (raw & 0xFFFF_0000 | low, mask | 0xFFFF))
                         .collect(),
@@ -81,8 +79,8 @@ impl Held {
 
     /// Whether it can read this, as far as `mask` is compared.
     pub(super) fn can_be(&self, raw: u32, mask: u32) -> bool {
-        let fits = |(own, known): &Bits| (own ^ raw) & known & mask == 0;
-        self.0.as_ref().is_none_or(|own| own.iter().any(fits))
+        let fits = |(bits, known): &Bits| (bits ^ raw) & known & mask == 0;
+        self.0.as_ref().is_none_or(|all| all.iter().any(fits))
     }
 
     /// What it was known to hold, where that is one thing.

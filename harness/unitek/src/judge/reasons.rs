@@ -12,7 +12,7 @@ use harness_sim::record::LineFrame;
 
 impl Follower {
     /// Why the drive sends it: the request that it answers, if it is one. What nothing asks for differs.
-    pub(super) fn why(&mut self, number: usize, own: &LineFrame, reply: &Reply) -> Option<Asked> {
+    pub(super) fn why(&mut self, number: usize, frame: &LineFrame, reply: &Reply) -> Option<Asked> {
         let register = reply.register;
         let used = self.used;
         let place = self.answered(register);
@@ -21,25 +21,25 @@ impl Follower {
             // A frame of a cycle or an event would not show how long a reply takes.
             let may_be_other = match cycle {
                 Cycle::On(running) => {
-                    running.blur(own.start);
+                    running.blur(frame.start);
                     true
                 }
                 Cycle::Unknown => self.unsolicited.contains_key(&register),
                 Cycle::Off(_) => false,
             };
-            if may_be_other || self.may_be_event(register, own.start) {
-                self.may_come_later(&asked, own.start);
+            if may_be_other || self.may_be_event(register, frame.start) {
+                self.may_come_later(&asked, frame.start);
             } else {
-                let late = own.start.since(asked.at);
+                let late = frame.start.since(asked.at);
                 self.slowest = Some(self.slowest.map_or(late, |slowest| slowest.max(late)));
             }
             return Some(asked);
         }
-        if self.may_be_event(register, own.start) {
+        if self.may_be_event(register, frame.start) {
             match &mut self.cycles[usize::from(register)] {
-                Cycle::On(running) => running.blur(own.start),
+                Cycle::On(running) => running.blur(frame.start),
                 // A cycle from before the first frame may send it, and goes on when events are switched off (5.2).
-                Cycle::Unknown => drop(self.unsolicited.insert(register, own.start)),
+                Cycle::Unknown => drop(self.unsolicited.insert(register, frame.start)),
                 Cycle::Off(_) => {}
             }
             return None;
@@ -47,18 +47,19 @@ impl Follower {
         let cycle = &mut self.cycles[usize::from(register)];
         let untimely = match cycle {
             Cycle::On(running) => {
-                let why = running.comes(own.start, used, self.tolerance);
+                let why = running.comes(frame.start, used, self.tolerance);
                 why.filter(|_| self.timed).map(|why| (why, running.every()))
             }
             Cycle::Unknown => {
-                self.older_cycle(number, own);
+                self.older_cycle(number, frame);
                 None
             }
             Cycle::Off(_) => {
                 let patience = self.patience;
-                if !self.cycles[usize::from(register)].in_flight(own.start, patience, !self.timed) {
-                    let why = self.asked_elsewhere(register, own.start);
-                    self.differs((number, register), (Unasked, "5.2"), (unasked(own), why));
+                if !self.cycles[usize::from(register)].in_flight(frame.start, patience, !self.timed)
+                {
+                    let why = self.asked_elsewhere(register, frame.start);
+                    self.differs((number, register), (Unasked, "5.2"), (unasked(frame), why));
                 }
                 None
             }
@@ -79,23 +80,23 @@ impl Follower {
 
     /// A frame that no request of these frames asks for: of a cycle that runs since before the first of them. Such a cycle shows itself
     /// within 254 ms, again and again.
-    fn older_cycle(&mut self, number: usize, own: &LineFrame) {
-        let register = own.frame.data().first().copied().unwrap_or(0);
+    fn older_cycle(&mut self, number: usize, frame: &LineFrame) {
+        let register = frame.frame.data().first().copied().unwrap_or(0);
         let before = self.unsolicited.get(&register).copied().or(self.begin);
         let before = before.max(self.gap);
         let longest = LONGEST_CYCLE + self.tolerance;
-        if before.is_some_and(|before| own.start.since(before) > longest) {
-            let about = format!("{}: no cycle is as long", unasked(own));
+        if before.is_some_and(|before| frame.start.since(before) > longest) {
+            let about = format!("{}: no cycle is as long", unasked(frame));
             let guessed = (self.guessed && self.slowest.is_none()).then(|| {
                 format!(
                     "it has answered no request on {:03X}, and may receive on another identifier",
                     self.rx[0]
                 )
             });
-            let why = self.asked_elsewhere(register, own.start).or(guessed);
+            let why = self.asked_elsewhere(register, frame.start).or(guessed);
             self.differs((number, register), (Unasked, "5.2"), (about, why));
         }
-        self.unsolicited.insert(register, own.start);
+        self.unsolicited.insert(register, frame.start);
     }
 
     /// Whether a frame can have been sent by event (ex 10).
@@ -107,8 +108,8 @@ impl Follower {
 }
 
 /// What differs where nothing asks for a frame.
-fn unasked(own: &LineFrame) -> String {
-    let register = own.frame.data().first().copied().unwrap_or(0);
-    let (frame, name) = (written(&own.frame), Register::of(register).name);
+fn unasked(line_frame: &LineFrame) -> String {
+    let register = line_frame.frame.data().first().copied().unwrap_or(0);
+    let (frame, name) = (written(&line_frame.frame), Register::of(register).name);
     format!("{frame} comes, and nothing asks for register {register:02X} ({name})")
 }

@@ -47,7 +47,7 @@ impl Supply {
     /// Whether a frame of the drive that begins at `at` at the latest ends a silence in which a restart fits.
     pub(super) fn may_have_failed(&mut self, at: Instant) -> bool {
         // A drive that has sent nothing yet is silent since the last write to it.
-        let wrote = || self.written.values().map(|own| own.1).max();
+        let wrote = || self.written.values().map(|write| write.1).max();
         let last = self.sent.or_else(wrote).filter(|_| !self.always_on);
         let silent = last.filter(|last| at.since(*last) >= RESTART);
         self.silent = silent.unwrap_or(self.silent);
@@ -85,8 +85,8 @@ impl Supply {
     /// supply has not failed.
     pub(super) fn kept(&mut self, register: u8, value: u32) {
         let written = self.written.get(&register);
-        let differs = |own: &(Option<u32>, Instant)| {
-            own.0.is_some_and(|before| before != value) && own.1 <= self.silent
+        let differs = |write: &(Option<u32>, Instant)| {
+            write.0.is_some_and(|before| before != value) && write.1 <= self.silent
         };
         if written.is_some_and(differs) && !self.has_gaps {
             self.restarted = None;
@@ -101,40 +101,41 @@ impl Follower {
         let (Some(rx), Some(tx)) = (self.rx.first(), self.tx.first()) else {
             return Self::new(self.drive, (0, 0));
         };
-        let mut own = Self::new(self.drive, (*rx, *tx));
-        own.held.fill(Held::any());
+        let mut follower = Self::new(self.drive, (*rx, *tx));
+        follower.held.fill(Held::any());
         let late = |written: &Instant| at.since(*written) + self.tolerance < RESTART;
-        let written = self.supply.written.iter().map(|(own, (_, at))| (*own, *at));
-        let kept: BTreeMap<u8, Instant> = written.filter(|own| late(&own.1)).collect();
+        let written = self.supply.written.iter();
+        let written = written.map(|(register, (_, at))| (*register, *at));
+        let kept: BTreeMap<u8, Instant> = written.filter(|(_, at)| late(at)).collect();
         for register in kept.keys() {
             let place = usize::from(*register);
-            own.held[place] = self.held[place].clone();
+            follower.held[place] = self.held[place].clone();
         }
-        own.mode_at = self.mode_at;
+        follower.mode_at = self.mode_at;
         // No cycle survives; one that was asked for in the silence may run, or not.
-        own.cycles = self.cycles.map(|cycle| match cycle {
+        follower.cycles = self.cycles.map(|cycle| match cycle {
             Cycle::On(_) => Cycle::Unknown,
             Cycle::Off(_) | Cycle::Unknown => Cycle::Off(Instant::START),
         });
-        (own.rx, own.tx) = (self.rx.clone(), self.tx.clone());
-        (own.second, own.other_rate) = (self.second.clone(), self.other_rate);
-        own.asked = self.asked.clone();
-        for asked in &mut own.asked {
+        (follower.rx, follower.tx) = (self.rx.clone(), self.tx.clone());
+        (follower.second, follower.other_rate) = (self.second.clone(), self.other_rate);
+        follower.asked = self.asked.clone();
+        for asked in &mut follower.asked {
             (asked.sure, asked.excused) = (false, false);
             let written = kept.get(&asked.register);
             if written.is_none_or(|written| *written > asked.at) {
                 asked.held = Held::any();
             }
         }
-        (own.slowest, own.short_map) = (self.slowest, self.short_map);
-        (own.others, own.used) = (self.others.clone(), self.used);
-        own.elsewhere = self.elsewhere.clone();
+        (follower.slowest, follower.short_map) = (self.slowest, self.short_map);
+        (follower.others, follower.used) = (self.others.clone(), self.used);
+        follower.elsewhere = self.elsewhere.clone();
         // A restart makes no register writable.
-        own.refused = self.refused.clone();
-        own.guessed = self.guessed;
-        (own.patience, own.tolerance) = (self.patience, self.tolerance);
-        own.supply = Supply::always_on();
-        own
+        follower.refused = self.refused.clone();
+        follower.guessed = self.guessed;
+        (follower.patience, follower.tolerance) = (self.patience, self.tolerance);
+        follower.supply = Supply::always_on();
+        follower
     }
 
     /// What differs since the last silence, and does not where the supply was switched off and on in it or the log has a gap, accuses no drive.
@@ -147,7 +148,8 @@ impl Follower {
             return;
         };
         let is_gap = self.supply.is_gap;
-        let shown = is_gap || since.len() >= OFF || since.iter().any(|own| own.what != Missing);
+        let any = || since.iter().any(|breach| breach.what != Missing);
+        let shown = is_gap || since.len() >= OFF || any();
         if !shown || !restarted.judged.breaches.is_empty() {
             return;
         }

@@ -6,17 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum FrameSymptom {
-    /// A frame has other contents.
     Value,
-    /// A frame has another length.
     Length,
     /// A frame names another register, or has another identifier.
     Name,
-    /// A frame is missing.
     Missing,
-    /// A frame was not asked for.
     Unasked,
-    /// A frame came at another time.
     Time,
 }
 

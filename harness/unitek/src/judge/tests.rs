@@ -31,13 +31,13 @@ const UNSEEN: [&str; 9] = [
 
 pub(super) fn scenarios() -> Vec<Source> {
     let all = sources(&[]).expect("built-in scenarios");
-    let seen = |own: &Source| {
+    let seen = |source: &Source| {
         UNSEEN
             .iter()
-            .all(|word| !own.text.contains(word) && !own.name.contains(word))
+            .all(|word| !source.text.contains(word) && !source.name.contains(word))
     };
     all.into_iter()
-        .filter(|own| own.text.contains(BUS) && seen(own))
+        .filter(|source| source.text.contains(BUS) && seen(source))
         .collect()
 }
 
@@ -59,7 +59,7 @@ fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) 
     if idle {
         later(&mut frames, IDLE);
         // Another device sends all the time.
-        let end = frames.last().map_or(Instant::START, |own| own.at);
+        let end = frames.last().map_or(Instant::START, |frame| frame.at);
         let mut at = Instant::START;
         while at < end {
             frames.push(LineFrame {
@@ -71,21 +71,23 @@ fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) 
             });
             at += Span::from_millis(40);
         }
-        frames.sort_by_key(|own| own.start);
+        frames.sort_by_key(|frame| frame.start);
     }
     let header = crate::serve::bench(None, Some(&source)).expect("a header");
     let drives = header.setup.drives.iter();
     (
         frames,
-        drives.map(|own| (own.node, own.identifiers)).collect(),
+        drives
+            .map(|setup| (setup.node, setup.identifiers))
+            .collect(),
     )
 }
 
 /// The same frames at a later time.
 fn later(frames: &mut [LineFrame], by: Span) {
-    for own in frames {
-        own.start += by;
-        own.at += by;
+    for frame in frames {
+        frame.start += by;
+        frame.at += by;
     }
 }
 
@@ -150,7 +152,7 @@ fn right_drives(share: usize) {
     let mut lines = vec![String::new(), "profile fw472".to_owned()];
     for property in PROPERTIES {
         let values: Vec<_> = match property.accepts {
-            Accepts::Words(words) => words.iter().skip(1).map(|own| (*own).to_owned()).collect(),
+            Accepts::Words(words) => words[1..].iter().copied().map(str::to_owned).collect(),
             Accepts::Byte => vec!["A5".to_owned()],
             Accepts::TimeUpTo(_) => ["3ms", "30ms"].map(str::to_owned).to_vec(),
         };
@@ -162,7 +164,7 @@ fn right_drives(share: usize) {
     }
     let mut values = 0;
     for (place, source) in scenarios().into_iter().enumerate() {
-        let all = lines.iter().flat_map(|own| [(own, false), (own, true)]);
+        let all = lines.iter().flat_map(|line| [(line, false), (line, true)]);
         for (number, (line, idle)) in all.enumerate() {
             if !line.is_empty() && !(place + number).is_multiple_of(share) {
                 continue;
@@ -177,7 +179,7 @@ fn right_drives(share: usize) {
             let judged = judge(HeardFrames::exact(&frames), &drives);
             let table: Vec<_> = frames
                 .iter()
-                .map(|own| format!("{} {}", own.start, own.frame))
+                .map(|frame| format!("{} {}", frame.start, frame.frame))
                 .collect();
             assert!(
                 judged.breaches.is_empty(),
@@ -229,6 +231,6 @@ fn missed(share: usize) -> Vec<&'static str> {
                 .is_empty()
         })
     };
-    let names = deviations().step_by(share).map(|own| own.name);
+    let names = deviations().step_by(share).map(|deviation| deviation.name);
     names.filter(|name| !found(name)).collect()
 }

@@ -91,11 +91,8 @@ const INPUTS: u32 = status::LIMIT_PLUS | status::LIMIT_MINUS | status::CONTINUOU
 /// How a register is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Compared {
-    /// These bits.
     Bits(u32),
-    /// Within a band.
     Near(i64),
-    /// Between these numbers.
     Between(i64, i64),
 }
 
@@ -118,7 +115,6 @@ pub(crate) struct World {
     /// Whether its moves to positions are followed, and the one that it makes.
     follows: bool,
     way: Option<Way>,
-    /// Its clock.
     now: Instant,
     /// Whether it is known how long homing takes, and whether homing ran before the last step.
     homing: (bool, bool),
@@ -199,7 +195,7 @@ impl World {
         while let Some((ready, frame)) = self.drive.wants()
             && ready <= now
         {
-            let cause = self.drive().wants().map(|own| own.cause);
+            let cause = self.drive().wants().map(|wish| wish.cause);
             self.said.push_back((frame, cause == Some(Cause::Asked)));
             self.drive.sent(now);
         }
@@ -214,7 +210,7 @@ impl World {
     /// Where its axis stands, and where it is to go.
     fn places(&self) -> [i64; 2] {
         [self.drive().register(POSITION), self.cell(DESTINATION)]
-            .map(|own| i64::from(own.cast_signed()))
+            .map(|raw| i64::from(raw.cast_signed()))
     }
 
     /// Follows a move to a position. Returns whether all that moves is followed.
@@ -233,7 +229,7 @@ impl World {
             None if travels && !self.astray && place != destination => {
                 let scale = self.cell(FULL_SPEED);
                 let limit = Register::of(LIMIT).number_of(self.cell(LIMIT)).abs();
-                let ramps = RAMPS.map(|own| self.cell(own) & 0xFFFF);
+                let ramps = RAMPS.map(|register| self.cell(register) & 0xFFFF);
                 self.way = Some(Way::new([place, destination], scale, limit, ramps));
             }
             None => {}
@@ -244,7 +240,7 @@ impl World {
     /// Between which positions its axis is.
     fn whereabouts(&self) -> (i64, i64) {
         let [place, _] = self.places();
-        let slowest = self.way.map_or(place, |own| own.place());
+        let slowest = self.way.map_or(place, |way| way.place());
         let between = (place.min(slowest), place.max(slowest));
         (between.0 - POSITION_BAND, between.1 + POSITION_BAND)
     }
@@ -284,7 +280,7 @@ impl World {
         if self.disturbed {
             return match number {
                 ERRORS => Some(Compared::Bits(ERROR_TIME_OUT)),
-                own if CONSTANT.contains(&own) || own == SCALE || is_parameter(own) => {
+                _ if CONSTANT.contains(&number) || number == SCALE || is_parameter(number) => {
                     Some(Compared::Bits(!0))
                 }
                 _ => None,
@@ -297,18 +293,21 @@ impl World {
             Compared::Between(least - SPEED_BAND, most + SPEED_BAND)
         };
         match number {
-            own if CONSTANT.contains(&own) || LOGIC.contains(&own) || INPUT.contains(&own) => {
+            _ if CONSTANT.contains(&number)
+                || LOGIC.contains(&number)
+                || INPUT.contains(&number) =>
+            {
                 Some(Compared::Bits(!0))
             }
-            own if SPEEDS.contains(&own) && !moves => {
+            _ if SPEEDS.contains(&number) && !moves => {
                 let near = Compared::Near(SPEED_BAND);
                 Some(self.way.map_or(near, speed))
             }
-            own if CURRENTS.contains(&own) && self.drive().control() == Control::Torque => {
+            _ if CURRENTS.contains(&number) && self.drive().control() == Control::Torque => {
                 Some(Compared::Near(CURRENT_BAND))
             }
             SCALE => Some(Compared::Bits(!0)),
-            own if FUNCTIONS.contains(&own) && !self.called => Some(Compared::Bits(!0)),
+            _ if FUNCTIONS.contains(&number) && !self.called => Some(Compared::Bits(!0)),
             IO => Some(Compared::Bits(IO_LOGIC)),
             POSITION if self.placed && !self.astray => {
                 let (least, most) = self.whereabouts();
@@ -325,7 +324,7 @@ impl World {
                 false => PRINTED & !status::TOLERANCE,
             })),
             ERRORS => Some(Compared::Bits(ERRORS_NOT_READY)),
-            own if is_parameter(own) => Some(Compared::Bits(!0)),
+            _ if is_parameter(number) => Some(Compared::Bits(!0)),
             _ => None,
         }
     }
@@ -343,7 +342,7 @@ impl RightDrive for World {
     const SCAN: Span = Span::from_millis(1);
 
     fn due(&self) -> Option<Instant> {
-        let waits = self.drive.wants().map(|own| own.0);
+        let waits = self.drive.wants().map(|wish| wish.0);
         let scan = self.drive.next_action();
         let way = self.way.map(|_| self.now + Self::SCAN);
         [waits, scan, way].into_iter().flatten().min()
@@ -358,7 +357,7 @@ impl RightDrive for World {
         }
         self.speak(to);
         // The slowest drive has arrived, too.
-        self.way = self.way.filter(|own| own.place() != own.destination());
+        self.way = self.way.filter(|way| way.place() != way.destination());
     }
 
     fn hear(&mut self, at: Instant, piece: &Frame) {
@@ -391,18 +390,19 @@ impl RightDrive for World {
     }
 
     fn is(&self, said: &Frame, came: &Frame) -> bool {
-        let head = |own: &Frame| {
+        let head = |frame: &Frame| {
             (
-                own.id(),
-                own.is_remote(),
-                own.dlc(),
-                own.data().first().copied(),
+                frame.id(),
+                frame.is_remote(),
+                frame.dlc(),
+                frame.data().first().copied(),
             )
         };
         if head(said) != head(came) {
             return false;
         }
-        let reply = |own: &Frame| Reply::decode(own, u16::try_from(own.id().number()).unwrap_or(0));
+        let id = |frame: &Frame| u16::try_from(frame.id().number()).unwrap_or(0);
+        let reply = |frame: &Frame| Reply::decode(frame, id(frame));
         let (Ok(said), Ok(came)) = (reply(said), reply(came)) else {
             return false;
         };
@@ -434,7 +434,7 @@ impl RightDrive for World {
 
     fn state(&self) -> u64 {
         let place = (!self.astray).then(|| self.drive().register(0x6D));
-        let place = place.map_or(1, |own| u64::from(own) << 1);
+        let place = place.map_or(1, |position| u64::from(position) << 1);
         // The destination alone changes without a frame, at the end of homing.
         let place = place ^ u64::from(self.cell(0x6E)) << 31;
         self.drive.state()
@@ -442,6 +442,6 @@ impl RightDrive for World {
             ^ u64::from(self.placed)
             ^ u64::from(self.interrupted) << 1
             ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15)
-            ^ self.way.map_or(0, |own| own.state())
+            ^ self.way.map_or(0, |way| way.state())
     }
 }

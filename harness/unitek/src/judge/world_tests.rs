@@ -19,7 +19,7 @@ fn is_disturbed(source: &Source) -> bool {
     let fault = source.text.lines().any(|line| line.contains("! "));
     let mut steps = source.text.split("\n\n").skip(1).flat_map(str::lines);
     // A time stands in front of some.
-    fault || steps.any(|line| line.split(' ').find(|own| !own.starts_with('+')) == Some("drive"))
+    fault || steps.any(|line| line.split(' ').find(|word| !word.starts_with('+')) == Some("drive"))
 }
 
 /// A scenario of one drive played on a simulated one with this line in its header, and judged where each frame may have been this late.
@@ -41,20 +41,21 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
     let mut link = plan.simulate();
     plan.play(&mut *link, AtMismatch::GoOn);
     let frames = link.trace(0).channels[0].frames().to_vec();
-    let good = frames.iter().filter(|own| own.ended == FrameEnd::Good);
+    let good = frames.iter().filter(|frame| frame.ended == FrameEnd::Good);
     let timed = |drives: bool| {
-        let own = good.clone().filter(move |own| own.from.is_some() == drives);
-        let own = own.enumerate().map(|(place, own)| {
+        let good = good.clone();
+        let frames = good.filter(move |frame| frame.from.is_some() == drives);
+        let frames = frames.enumerate().map(|(place, frame)| {
             // Its true time is anywhere in between.
             let part = place as u64 * 7 % 11;
             let before = Span::from_units(late.units() / 10 * part);
             Timed {
-                earliest: own.at - before,
-                latest: own.at + late.saturating_sub(before),
-                piece: own.frame,
+                earliest: frame.at - before,
+                latest: frame.at + late.saturating_sub(before),
+                piece: frame.frame,
             }
         });
-        own.collect()
+        frames.collect()
     };
     let talk = Dialogue {
         sent: timed(false),
@@ -75,7 +76,7 @@ fn judged(source: &Source, right: &str, wrong: &str, late: Span) -> Option<Judge
 
 fn undisturbed() -> Vec<Source> {
     let all = scenarios().into_iter();
-    all.filter(|own| !is_disturbed(own)).collect()
+    all.filter(|source| !is_disturbed(source)).collect()
 }
 
 /// UNITEK 7: with every value of an open point, and frames that are up to 10 ms late.
@@ -133,9 +134,9 @@ fn is_found(deviation: &str, all: &[Source]) -> bool {
 #[test]
 fn wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
-    let names = deviations().map(|own| own.name);
-    let names = names.filter(|own| !NOT_FOUND.contains(own)).step_by(4);
-    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    let names = deviations().map(|deviation| deviation.name);
+    let names = names.filter(|name| !NOT_FOUND.contains(name)).step_by(4);
+    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
     assert_eq!(missed, [""; 0]);
 }
 
@@ -143,8 +144,8 @@ fn wrong_drives_are_found_by_what_they_send() {
 #[ignore = "every wrong drive; .ci/nightly runs it"]
 fn which_wrong_drives_are_found_by_what_they_send() {
     let all = undisturbed();
-    let names = deviations().map(|own| own.name);
-    let missed: Vec<_> = names.filter(|own| !is_found(own, &all)).collect();
+    let names = deviations().map(|deviation| deviation.name);
+    let missed: Vec<_> = names.filter(|name| !is_found(name, &all)).collect();
     assert_eq!(missed, NOT_FOUND);
 }
 

@@ -56,7 +56,7 @@ pub(super) fn incomplete(header: &Header) -> Option<Problem> {
 fn rate(scanner: &mut Scanner<'_>) -> Result<BitRate, Problem> {
     let mut ahead = scanner.clone();
     let digits = ahead.take_while(|c| c.is_ascii_digit());
-    let bits = digits.and_then(|own| own.value.parse::<u32>().ok()?.checked_mul(1000));
+    let bits = digits.and_then(|digits| digits.value.parse::<u32>().ok()?.checked_mul(1000));
     let most = BitRate::M1.bits_per_second();
     let rate = bits
         .filter(|bits| *bits <= most)
@@ -85,7 +85,7 @@ fn master(
     let here = scanner.here();
     let names: Vec<(&str, &'static MasterDeviation)> = MASTER_DEVIATIONS
         .iter()
-        .map(|own| (own.name, own))
+        .map(|deviation| (deviation.name, deviation))
         .collect();
     let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
     let span = scanner.since(here);

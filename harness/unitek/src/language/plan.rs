@@ -33,11 +33,9 @@ const MOST_NODES: i64 = 127;
 /// A frame that the master must receive.
 #[derive(Clone, Debug)]
 pub(crate) struct WantedFrame {
-    /// Its identifier.
     pub(crate) id: Id,
     /// The length that it asks for, if it is a remote frame.
     pub(crate) remote: Option<u8>,
-    /// Its data bytes.
     pub(crate) data: Vec<Expected>,
 }
 
@@ -45,7 +43,6 @@ pub(crate) struct WantedFrame {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct WantedValue {
     pub(crate) register: u8,
-    /// Its contents.
     pub(crate) raw: u32,
     /// How far its number may be off.
     pub(crate) tolerance: u64,
@@ -127,7 +124,7 @@ pub(super) fn settle(
     Ok(resume(&Setup {
         rate,
         drives,
-        master: header.master.as_ref().map(|own| own.value),
+        master: header.master.as_ref().map(|deviation| deviation.value),
     }))
 }
 
@@ -143,36 +140,36 @@ pub(super) fn resume(setup: &Setup) -> Planner {
 /// A header line about a drive. One about a drive that no line has named before adds it.
 fn apply(line: &DriveLine, drives: &mut Vec<DriveSetup>, rate: BitRate) -> Result<(), Problem> {
     let node = node(&line.drive, Scope::default())?;
-    let place = drives.iter().position(|own| own.node == node);
+    let place = drives.iter().position(|drive| drive.node == node);
     let place = place.unwrap_or_else(|| {
         drives.push(DriveSetup::new(node));
         drives.len() - 1
     });
-    let own = &mut drives[place];
+    let drive = &mut drives[place];
     match &line.what {
         SetupKind::There { rx, tx } => {
-            own.identifiers.0 = rx.unwrap_or(own.identifiers.0);
-            own.identifiers.1 = tx.unwrap_or(own.identifiers.1);
+            drive.identifiers.0 = rx.unwrap_or(drive.identifiers.0);
+            drive.identifiers.1 = tx.unwrap_or(drive.identifiers.1);
         }
         SetupKind::Profile(name) => {
-            own.properties = Properties::profile(name).unwrap_or(own.properties);
+            drive.properties = Properties::profile(name).unwrap_or(drive.properties);
         }
         SetupKind::Property(property, value) => {
             let setting = match value {
                 PropertyValue::Word(word) => Setting::Word(word),
                 PropertyValue::Time(time) => Setting::Time(time.on(octet_time(rate))),
             };
-            if !property.set(&mut own.properties, setting) {
+            if !property.set(&mut drive.properties, setting) {
                 let what = format!("the property {} does not take this value", property.name);
                 return Err(Problem::new(line.span, what, "a time up to 10s expected"));
             }
         }
-        SetupKind::Mode(mode) => own.control = Some(*mode),
-        SetupKind::Deviates(deviation) => own.deviation = Some(deviation),
+        SetupKind::Mode(mode) => drive.control = Some(*mode),
+        SetupKind::Deviates(deviation) => drive.deviation = Some(deviation),
         SetupKind::Outside(outside) => {
-            let scaling = scaling(own);
+            let scaling = scaling(drive);
             if let Some(stimulus) = stimulus(outside, Scope::default(), scaling)? {
-                own.apply(stimulus);
+                drive.apply(stimulus);
             }
         }
     }
@@ -184,7 +181,6 @@ pub(crate) fn octet_time(rate: BitRate) -> Span {
     rate.time_of(8)
 }
 
-/// The number of a drive.
 pub(crate) fn node(drive: &Located, scope: Scope) -> Result<u8, Problem> {
     let number = drive.value(scope)?;
     let fits = (1..=MOST_NODES).contains(&number);
@@ -199,8 +195,8 @@ pub(crate) fn node(drive: &Located, scope: Scope) -> Result<u8, Problem> {
 fn scaling(drive: &DriveSetup) -> Scaling {
     let usual = Scaling::default();
     let set = |number: u8, usual: u16| {
-        let own = drive.registers.iter().rev().find(|(own, _)| *own == number);
-        own.map_or(usual, |(_, raw)| (raw & 0xFFFF) as u16)
+        let setting = drive.registers.iter().rev().find(|(set, _)| *set == number);
+        setting.map_or(usual, |(_, raw)| (raw & 0xFFFF) as u16)
     };
     Scaling {
         rpm_max: set(0xC8, usual.rpm_max),
@@ -308,13 +304,13 @@ fn raw(
         ValueKind::Given(decimal, given) => to_raw(register, *decimal, *given, scaling)
             .map_err(|bad| Problem::new(value.span, bad.to_string(), "another value expected")),
         ValueKind::Counted(number) => {
-            let own = number.value(scope)?;
+            let number = number.value(scope)?;
             let most = i64::from(register.mask());
             let least = -(most / 2 + 1);
-            if !(least..=most).contains(&own) {
-                return Err(too_wide(own.to_string()));
+            if !(least..=most).contains(&number) {
+                return Err(too_wide(number.to_string()));
             }
-            Ok((own & most) as u32)
+            Ok((number & most) as u32)
         }
     }
 }
@@ -343,8 +339,8 @@ impl DriveSetup {
 impl Planner {
     fn drive(&self, drive: &Located) -> Result<&DriveSetup, Problem> {
         let node = node(drive, self.scope)?;
-        let own = self.setup.drives.iter().find(|own| own.node == node);
-        own.ok_or_else(|| {
+        let found = self.setup.drives.iter().find(|drive| drive.node == node);
+        found.ok_or_else(|| {
             let what = format!("the scenario has no drive {node}");
             let problem = Problem::new(drive.span, what, "a drive of the header expected here");
             problem.help(format!("add the line `drive {node}` to the header"))
@@ -360,8 +356,8 @@ impl Planner {
         let scaling = scaling(drive);
         let tolerance = match &expect.tolerance {
             None => 0,
-            Some(own) => {
-                let raw = raw(own, register, self.scope, scaling)?;
+            Some(value) => {
+                let raw = raw(value, register, self.scope, scaling)?;
                 register.number_of(raw).unsigned_abs()
             }
         };
@@ -373,11 +369,10 @@ impl Planner {
     }
 
     fn outside(&self, drive: &Located, outside: &Outside) -> Result<Act, Problem> {
-        let own = self.drive(drive)?;
-        let stimulus = stimulus(outside, self.scope, scaling(own))?;
-        Ok(stimulus.map_or(Act::Restart(own.node), |own_stimulus| {
-            Act::Outside(own.node, own_stimulus)
-        }))
+        let setup = self.drive(drive)?;
+        let stimulus = stimulus(outside, self.scope, scaling(setup))?;
+        let restart = Act::Restart(setup.node);
+        Ok(stimulus.map_or(restart, |stimulus| Act::Outside(setup.node, stimulus)))
     }
 
     /// A job that is compiled to one frame.
@@ -397,7 +392,7 @@ impl Planner {
             JobKind::Read(name, expect) => {
                 let register = register(name, self.scope)?;
                 let wanted = expect.as_ref();
-                let wanted = wanted.map(|own| self.wanted(own, register, drive));
+                let wanted = wanted.map(|expect| self.wanted(expect, register, drive));
                 return Ok(Act::Read {
                     request: encoded(Request::Read {
                         register: register.number,
@@ -430,12 +425,12 @@ impl Planner {
     /// A job of the driver.
     fn by_driver(&self, job: &JobStep) -> Result<Act, Problem> {
         let drive = self.drive(&job.drive)?;
-        let number = |name| register(name, self.scope).map(|own| own.number);
-        let (own, wanted) = match &job.what {
+        let number = |name| register(name, self.scope).map(|register| register.number);
+        let (task, wanted) = match &job.what {
             JobKind::Read(name, expect) => {
                 let register = register(name, self.scope)?;
                 let wanted = expect.as_ref();
-                let wanted = wanted.map(|own| self.wanted(own, register, drive));
+                let wanted = wanted.map(|expect| self.wanted(expect, register, drive));
                 let register = register.number;
                 (master::Job::Read { register }, wanted.transpose()?)
             }
@@ -464,7 +459,7 @@ impl Planner {
             JobKind::StartUp(true) => WantedOutcome::NotReady,
             _ => wanted.map_or(WantedOutcome::Done, WantedOutcome::Reads),
         };
-        Ok(Act::Driver(drive.node, own, wanted))
+        Ok(Act::Driver(drive.node, task, wanted))
     }
 
     fn bytes(&self, pattern: &Pattern) -> Result<Vec<Expected>, Problem> {
@@ -484,14 +479,13 @@ impl Planner {
     }
 }
 
-/// The interval of a cycle.
 fn interval(time: Duration) -> Result<u8, Problem> {
     let span = time.on(Span::ZERO);
     let millis = span.units() / Span::from_millis(1).units();
     let whole = Span::from_millis(millis) == span;
     let every = u8::try_from(millis)
         .ok()
-        .filter(|own| whole && (1..=254).contains(own));
+        .filter(|every| whole && (1..=254).contains(every));
     every.ok_or_else(|| {
         let what = format!("{time} is no interval of a cycle");
         let problem = Problem::new(time.span(), what, "1ms to 254ms expected here");
@@ -523,11 +517,11 @@ impl Settle<Unitek> for Planner {
             Content::Remote(length) => Frame::remote(message.id, (*length).into()),
             Content::Data(pattern) => {
                 let known = self.bytes(pattern)?;
-                let unknown = known.iter().any(|own| !matches!(own, Expected::Byte(_)));
+                let unknown = known.iter().any(|byte| !matches!(byte, Expected::Byte(_)));
                 if unknown {
                     let _refused = pattern.expand_known(self.scope, MAX_CELLS)?;
                 }
-                let bytes = known.iter().map(|own| match own {
+                let bytes = known.iter().map(|expected| match expected {
                     Expected::Byte(byte) => *byte,
                     _ => 0,
                 });
@@ -559,7 +553,7 @@ impl Settle<Unitek> for Planner {
             FrameStep::Frame(number, harm) => {
                 needs.push(Capability::Interposer);
                 let frame = number.value(self.scope)?;
-                let Some(frame) = u64::try_from(frame).ok().filter(|own| *own > 0) else {
+                let Some(frame) = u64::try_from(frame).ok().filter(|number| *number > 0) else {
                     let what = format!("there is no frame {frame}");
                     return Err(Problem::new(number.span, what, "1 or more expected here"));
                 };
@@ -582,9 +576,9 @@ impl Settle<Unitek> for Planner {
             }
             FrameStep::Quiet => Act::Quiet,
             FrameStep::Register(drive, name, expect) => {
-                let own = self.drive(drive)?;
+                let setup = self.drive(drive)?;
                 let register = register(name, self.scope)?;
-                Act::Register(own.node, self.wanted(expect, register, own)?)
+                Act::Register(setup.node, self.wanted(expect, register, setup)?)
             }
             FrameStep::Job(job) => self.job(job, span)?,
             FrameStep::Master(job) => self.by_driver(job)?,

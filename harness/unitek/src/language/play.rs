@@ -115,8 +115,8 @@ pub(super) fn matches(wanted: &WantedFrame, frame: &Frame) -> bool {
         && frame.is_remote() == wanted.remote.is_some()
         && frame.dlc() == length;
     let mut pairs = wanted.data.iter().zip(frame.data());
-    same && pairs.all(|(own, byte)| match own {
-        Expected::Byte(own) => own == byte,
+    same && pairs.all(|(expected, byte)| match expected {
+        Expected::Byte(value) => value == byte,
         _ => true,
     })
 }
@@ -147,9 +147,9 @@ pub(crate) fn written(frame: &Frame) -> String {
 
 /// A value with its unit behind the raw number.
 fn value(register: u8, raw: u32) -> String {
-    let own = Register::of(register);
-    let digits = own.width.bits() as usize / 4;
-    let unit = usual(own.unit).and_then(|unit| shown(own, raw, unit, Scaling::default()));
+    let register = Register::of(register);
+    let digits = register.width.bits() as usize / 4;
+    let unit = usual(register.unit).and_then(|unit| shown(register, raw, unit, Scaling::default()));
     match unit {
         Some(unit) => format!("{raw:0digits$X} ({unit})"),
         None => format!("{raw:0digits$X}"),
@@ -176,13 +176,13 @@ impl WantedValue {
         if self.is_met(number) {
             return Ok(());
         }
-        let own = Register::of(self.register);
+        let register = Register::of(self.register);
         Err(Stop::failed(
             span,
             format!(
                 "register {:02X} ({}) reads {} where {} is expected",
                 self.register,
-                own.name,
+                register.name,
                 value(self.register, raw),
                 value(self.register, self.raw)
             ),
@@ -202,7 +202,6 @@ pub(super) fn begin(runner: &mut Runner<'_, Unitek>) {
     }
 }
 
-/// Plays a step.
 pub(super) fn act(
     runner: &mut Runner<'_, Unitek>,
     act: &Act,
@@ -239,7 +238,7 @@ pub(super) fn act(
             happen(
                 runner,
                 now,
-                &faults.map(|own| PlacedFault::Drive(*node, own)),
+                &faults.map(|fault| PlacedFault::Drive(*node, fault)),
             );
         }
         Act::Quiet => {
@@ -276,10 +275,10 @@ pub(super) fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault 
 /// The write that sets a register of a drive which is not simulated beside the bus.
 fn over_bus(runner: &Runner<'_, Unitek>, node: u8, register: u8, raw: u32) -> Option<Frame> {
     let drives = &runner.plan.setup.drives;
-    let own = drives.iter().find(|own| own.node == node)?;
+    let setup = drives.iter().find(|drive| drive.node == node)?;
     let data = Data::of(Register::of(register), raw);
     let request = Request::Write { register, data };
-    request.encode(own.identifiers.0).ok()
+    request.encode(setup.identifiers.0).ok()
 }
 
 /// What happens to a drive. Without a time in front of the line it happens when everything that was sent has left and is answered.
@@ -302,17 +301,18 @@ fn look(
 ) -> Result<(), Stop> {
     runner.settle();
     let bench = runner.link.beside();
-    let drive = bench.and_then(|own| own.downcast_ref::<Bench>()?.drive(node));
+    let drive = bench.and_then(|bench| bench.downcast_ref::<Bench>()?.drive(node));
     if let Some(drive) = drive {
         return wanted.compare(span, drive.register(wanted.register));
     }
     let drives = &runner.plan.setup.drives;
-    let own = drives.iter().find(|own| own.node == node);
-    let request = own.and_then(|own| {
+    let setup = drives.iter().find(|drive| drive.node == node);
+    let request = setup.and_then(|drive| {
+        let (receives, sends) = drive.identifiers;
         let request = Request::Read {
             register: wanted.register,
         };
-        Some((request.encode(own.identifiers.0).ok()?, own.identifiers.1))
+        Some((request.encode(receives).ok()?, sends))
     });
     let Some((request, tx)) = request else {
         return Ok(());
@@ -362,8 +362,8 @@ fn drive(
 ) -> Result<Outcome, Stop> {
     runner.fetch();
     let plan = runner.plan;
-    let setup = plan.setup.drives.iter().find(|own| own.node == node);
-    let (rx, tx) = setup.map_or((0, 0), |own| own.identifiers);
+    let setup = plan.setup.drives.iter().find(|drive| drive.node == node);
+    let (rx, tx) = setup.map_or((0, 0), |drive| drive.identifiers);
     let deviation = runner.own.deviation;
     let driver = runner.own.drivers.entry(node).or_insert_with(|| Driver {
         master: DeviantMaster::new(rx, tx, Options::default(), deviation),
@@ -384,7 +384,7 @@ fn drive(
         }
         let frames: Vec<_> = std::iter::from_fn(|| driver.master.poll_transmit(now)).collect();
         driver.reports();
-        let ended = driver.ended.iter().find(|(own, _)| *own == id);
+        let ended = driver.ended.iter().find(|(ended, _)| *ended == id);
         let ended = ended.map(|(_, outcome)| *outcome);
         let due = driver.master.poll_timeout();
         if !frames.is_empty() {

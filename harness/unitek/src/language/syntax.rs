@@ -25,11 +25,8 @@ pub(crate) struct Header {
 /// A header line about a drive.
 #[derive(Clone, Debug)]
 pub(crate) struct DriveLine {
-    /// The drive's number.
     pub(crate) drive: Located,
-    /// What the line says.
     pub(crate) what: SetupKind,
-    /// The whole line.
     pub(crate) span: TextSpan,
 }
 
@@ -91,9 +88,7 @@ pub(crate) enum RegisterName {
 /// Contents of a register as written.
 #[derive(Clone, Debug)]
 pub(crate) struct WrittenValue {
-    /// What is written.
     pub(crate) kind: ValueKind,
-    /// Where it stands.
     pub(crate) span: TextSpan,
 }
 
@@ -119,11 +114,9 @@ pub(crate) struct Expect {
 /// A frame behind `>` or `<`.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
-    /// The identifier.
     pub(crate) id: Id,
     /// The data, or the length of a remote frame.
     pub(crate) content: Content,
-    /// Where it stands.
     pub(crate) span: TextSpan,
 }
 
@@ -132,13 +125,11 @@ pub(crate) struct Message {
 pub(crate) enum Content {
     /// No data bytes.
     Empty,
-    /// Data bytes.
     Data(Pattern),
     /// `rtr 3`.
     Remote(u8),
 }
 
-/// A step of this bus.
 #[derive(Clone, Debug)]
 pub(crate) enum FrameStep {
     /// `! frame 3: lost`.
@@ -160,28 +151,20 @@ pub(crate) enum FrameStep {
 /// What happens to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameHarm {
-    /// `lost`.
     Lost,
-    /// `doubled`.
     Doubled,
     /// `delay 3ms`.
     Delay(Duration),
-    /// `corrupt`.
     Corrupt,
-    /// `no-acknowledge`.
     NoAcknowledge,
-    /// `bus-off`.
     BusOff,
 }
 
 /// What happens to a drive as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DriveHarm {
-    /// `off`.
     Off,
-    /// `on`.
     On,
-    /// `bus-off`.
     BusOff,
 }
 
@@ -189,7 +172,6 @@ pub(crate) enum DriveHarm {
 #[derive(Clone, Debug)]
 pub(crate) struct JobStep {
     pub(crate) drive: Located,
-    /// What is to be done.
     pub(crate) what: JobKind,
 }
 

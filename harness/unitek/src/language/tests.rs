@@ -26,7 +26,8 @@ fn played(lines: &str) -> (Verdict, String) {
     let (_, plan) = found.unwrap_or_else(|p| panic!("{lines}\n{:#?}", p.all()));
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, harness_bench::scenario::run::AtMismatch::Stop);
-    let message = outcome.finding.map_or(String::new(), |own| own.message);
+    let message = outcome.finding.map(|finding| finding.message);
+    let message = message.unwrap_or_default();
     (outcome.verdict, message)
 }
 
@@ -316,11 +317,11 @@ fn a_full_bus_ends() {
 #[test]
 fn damaged_scenarios() {
     let sources = harness_bench::scenario::files::sources(&[]).expect("built-in scenarios");
-    let own = sources
+    let ours = sources
         .into_iter()
-        .filter(|own| own.name.starts_with("unitek/"));
-    let texts: Vec<_> = own
-        .map(|own| own.text.to_string())
+        .filter(|source| source.name.starts_with("unitek/"));
+    let texts: Vec<_> = ours
+        .map(|source| source.text.to_string())
         .filter(|text| text.len() < 700)
         .collect();
     let words = [
@@ -371,7 +372,7 @@ fn damaged_scenarios() {
             match random(3) {
                 0 => text.insert_str(at, words[random(words.len())]),
                 1 => {
-                    let end = places.iter().find(|own| **own > at + random(6));
+                    let end = places.iter().find(|place| **place > at + random(6));
                     text.replace_range(at..end.copied().unwrap_or(text.len()), "");
                 }
                 _ => text.truncate(at.max(1)),
@@ -394,7 +395,8 @@ fn damaged_scenarios() {
                 let inside = |span: harness_bench::scenario::problem::TextSpan| {
                     text.get(span.start..span.end).is_some()
                 };
-                assert!(problems.all().iter().all(|own| inside(own.span)), "{text}");
+                let mut spans = problems.all().iter().map(|problem| problem.span);
+                assert!(spans.all(inside), "{text}");
                 refused += 1;
             }
         }

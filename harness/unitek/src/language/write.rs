@@ -19,7 +19,7 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
         format!("drive {}{blank}{what}", line.drive.expression)
     });
     let master = header.master.as_ref();
-    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    let master = master.map(|deviation| format!("master deviates {}", deviation.value.name));
     (rate.into_iter().collect(), drives.chain(master).collect())
 }
 
@@ -41,17 +41,17 @@ fn setup(what: &SetupKind) -> String {
         }
         SetupKind::Mode(mode) => format!("mode {}", mode_word(*mode)),
         SetupKind::Deviates(deviation) => format!("deviates {}", deviation.name),
-        SetupKind::Outside(own) => outside(own),
+        SetupKind::Outside(stimulus) => outside(stimulus),
     }
 }
 
 fn outside(what: &Outside) -> String {
     match what {
-        Outside::Register(name, own) => format!("register {} = {}", register(name), value(own)),
+        Outside::Register(name, raw) => format!("register {} = {}", register(name), value(raw)),
         Outside::Input(name, high) => {
             format!("input {name} {}", if *high { "high" } else { "low" })
         }
-        Outside::Force(name, Some(own)) => format!("force {name} = {}", value(own)),
+        Outside::Force(name, Some(raw)) => format!("force {name} = {}", value(raw)),
         Outside::Force(name, None) => format!("force {name} off"),
         Outside::Restart => "restart".to_owned(),
     }
@@ -90,10 +90,10 @@ fn value(value: &WrittenValue) -> String {
     }
 }
 
-fn expect(own: &Expect) -> String {
-    match &own.tolerance {
-        Some(tolerance) => format!("{} +- {}", value(&own.value), value(tolerance)),
-        None => value(&own.value),
+fn expect(expect: &Expect) -> String {
+    match &expect.tolerance {
+        Some(tolerance) => format!("{} +- {}", value(&expect.value), value(tolerance)),
+        None => value(&expect.value),
     }
 }
 
@@ -138,18 +138,18 @@ pub(super) fn step(step: &FrameStep) -> String {
             };
             format!("! drive {}: {harm}", drive.expression)
         }
-        FrameStep::Outside(drive, own) => format!("drive {} {}", drive.expression, outside(own)),
+        FrameStep::Outside(drive, what) => format!("drive {} {}", drive.expression, outside(what)),
         FrameStep::Quiet => "? quiet".to_owned(),
-        FrameStep::Register(drive, name, own) => {
+        FrameStep::Register(drive, name, expected) => {
             let drive = &drive.expression;
             format!(
                 "? drive {drive} register {} = {}",
                 register(name),
-                expect(own)
+                expect(expected)
             )
         }
-        FrameStep::Job(own) => job(own),
-        FrameStep::Master(own) => format!("master {}", job(own)),
+        FrameStep::Job(step) => job(step),
+        FrameStep::Master(step) => format!("master {}", job(step)),
     }
 }
 
@@ -157,10 +157,10 @@ fn job(job: &JobStep) -> String {
     let drive = &job.drive.expression;
     match &job.what {
         JobKind::Read(name, None) => format!("read {drive} {}", register(name)),
-        JobKind::Read(name, Some(own)) => {
-            format!("read {drive} {} = {}", register(name), expect(own))
+        JobKind::Read(name, Some(expected)) => {
+            format!("read {drive} {} = {}", register(name), expect(expected))
         }
-        JobKind::Write(name, own) => format!("write {drive} {} = {}", register(name), value(own)),
+        JobKind::Write(name, raw) => format!("write {drive} {} = {}", register(name), value(raw)),
         JobKind::Every(name, time) => format!("every {drive} {} {time}", register(name)),
         JobKind::StopEvery(name) => format!("stop-every {drive} {}", register(name)),
         JobKind::Lock => format!("lock {drive}"),

@@ -20,9 +20,9 @@ use std::io::Write;
 pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     writeln!(out, "t_ns,from,id,remote,dlc,data,ended,meaning")?;
     let channels = traces.iter().flat_map(|trace| &trace.channels);
-    for own in channels.flat_map(|channel| channel.frames()) {
-        let frame = &own.frame;
-        let from = own
+    for line_frame in channels.flat_map(|channel| channel.frames()) {
+        let frame = &line_frame.frame;
+        let from = line_frame
             .from
             .map_or("master".to_owned(), |drive| drive.to_string());
         let data: String = frame
@@ -30,7 +30,7 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
             .iter()
             .map(|byte| format!("{byte:02X}"))
             .collect();
-        let ended = match own.ended {
+        let ended = match line_frame.ended {
             FrameEnd::Good => "",
             FrameEnd::Lost => "lost",
             FrameEnd::Error(error) => error.name(),
@@ -38,11 +38,11 @@ pub(crate) fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()
         writeln!(
             out,
             "{},{from},{},{},{},{data},{ended},\"{}\"",
-            own.at.since_start().as_nanos(),
+            line_frame.at.since_start().as_nanos(),
             frame.id(),
             u8::from(frame.is_remote()),
             frame.dlc(),
-            meaning(frame, own.from.is_some()).replace('"', "\"\"")
+            meaning(frame, line_frame.from.is_some()).replace('"', "\"\"")
         )?;
     }
     out.flush()

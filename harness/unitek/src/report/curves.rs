@@ -17,12 +17,12 @@ const MOST: usize = 20;
 pub(crate) fn curves(html: &mut Html, id: &str, trace: &Trace) -> bool {
     let mut found: BTreeMap<(u8, u8), Points> = BTreeMap::new();
     for frame in trace.channels.iter().flat_map(|channel| channel.frames()) {
-        let own = u16::try_from(frame.frame.id().number()).unwrap_or(0);
+        let id = u16::try_from(frame.frame.id().number()).unwrap_or(0);
         let good = frame.ended == FrameEnd::Good;
         let Some((drive, Ok(reply))) = frame
             .from
             .filter(|_| good)
-            .map(|drive| (drive, Reply::decode(&frame.frame, own)))
+            .map(|drive| (drive, Reply::decode(&frame.frame, id)))
         else {
             continue;
         };
@@ -90,8 +90,8 @@ fn number(register: &Register, data: Data) -> Option<f64> {
         HEX => f64::from(raw),
         _ => register.number_of(raw) as f64,
     };
-    let own = usual(register.unit);
-    own.map_or(Some(plain), |unit| {
+    let usual_unit = usual(register.unit);
+    usual_unit.map_or(Some(plain), |unit| {
         value(register, raw, unit, Scaling::default())
     })
 }

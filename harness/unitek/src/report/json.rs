@@ -19,7 +19,6 @@ use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use serde::{Serialize, Serializer};
 use std::io::Write;
 
-/// The version of the form.
 pub(crate) const SCHEMA: u32 = 2;
 
 #[derive(Serialize)]
@@ -60,14 +59,14 @@ fn frames(traces: &[Trace]) -> impl Iterator<Item = &LineFrame> {
 /// # Errors
 /// Those of `out`.
 pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
-    let frames = frames(traces).map(|own| FrameObject {
-        t_ns: own.at.since_start().as_nanos(),
-        id: own.frame.id().number(),
-        extended: own.frame.id().is_extended(),
-        remote: own.frame.is_remote().then(|| own.frame.dlc()),
-        data: own.frame.data().to_vec(),
-        from: own.from,
-        fault: match own.ended {
+    let frames = frames(traces).map(|frame| FrameObject {
+        t_ns: frame.at.since_start().as_nanos(),
+        id: frame.frame.id().number(),
+        extended: frame.frame.id().is_extended(),
+        remote: frame.frame.is_remote().then(|| frame.frame.dlc()),
+        data: frame.frame.data().to_vec(),
+        from: frame.from,
+        fault: match frame.ended {
             FrameEnd::Good => None,
             FrameEnd::Lost => Some("lost"),
             FrameEnd::Error(error) => Some(error.name()),
@@ -89,10 +88,10 @@ pub(crate) fn write(bus: BusName, traces: &[Trace], mut out: impl Write) -> std:
 /// # Errors
 /// Those of `out`.
 pub(crate) fn candump(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
-    for own in frames(traces).filter(|own| own.ended == FrameEnd::Good) {
-        let micros = own.at.since_start().as_nanos() / 1000;
+    for frame in frames(traces).filter(|frame| frame.ended == FrameEnd::Good) {
+        let micros = frame.at.since_start().as_nanos() / 1000;
         let (seconds, rest) = (micros / 1_000_000, micros % 1_000_000);
-        writeln!(out, "({seconds}.{rest:06}) can0 {}", own.frame)?;
+        writeln!(out, "({seconds}.{rest:06}) can0 {}", frame.frame)?;
     }
     out.flush()
 }

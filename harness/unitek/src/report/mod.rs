@@ -61,9 +61,9 @@ impl SegmentReport for FrameReport {
 /// What a frame says: of the bench to a drive, or of a drive.
 #[must_use]
 pub(crate) fn meaning(frame: &Frame, of_drive: bool) -> String {
-    let own = u16::try_from(frame.id().number()).unwrap_or(0);
+    let id = u16::try_from(frame.id().number()).unwrap_or(0);
     if of_drive {
-        return match Reply::decode(frame, own) {
+        return match Reply::decode(frame, id) {
             Ok(reply) => format!(
                 "{} = {}",
                 name(reply.register),
@@ -72,7 +72,7 @@ pub(crate) fn meaning(frame: &Frame, of_drive: bool) -> String {
             Err(odd) => format!("no reply: {odd}"),
         };
     }
-    match Request::decode(frame, own, Dlc4::As3) {
+    match Request::decode(frame, id, Dlc4::As3) {
         Ok(Request::Read { register }) => format!("read {}", name(register)),
         Ok(Request::Cycle { register, every }) => format!("every {every} ms {}", name(register)),
         Ok(Request::Stop { register }) => format!("stop {}", name(register)),
@@ -91,23 +91,23 @@ fn name(register: u8) -> String {
 
 /// The raw number, and what it means.
 fn contents(register: u8, data: Data) -> String {
-    let own = Register::of(register);
+    let register = Register::of(register);
     let raw = match data {
-        Data::Short(value) if own.width.bits() == 32 => own.extend(value),
-        data => data.bits() & own.mask(),
+        Data::Short(value) if register.width.bits() == 32 => register.extend(value),
+        data => data.bits() & register.mask(),
     };
     let digits = match data {
         Data::Short(_) => 4,
         Data::Long(_) => 8,
     };
     let mut text = format!("{:0digits$X}", data.bits());
-    let meaning = match own.unit {
+    let meaning = match register.unit {
         Unit::Status => bits(STATUS, raw),
         Unit::Errors => bits(ERRORS, raw),
         Unit::Io => bits(IO, raw),
         Unit::Mode => bits(MODE, raw),
         unit => usual(unit)
-            .and_then(|given| shown(own, raw, given, Scaling::default()))
+            .and_then(|given| shown(register, raw, given, Scaling::default()))
             .map_or(String::new(), |shown| shown.to_string()),
     };
     if !meaning.is_empty() {

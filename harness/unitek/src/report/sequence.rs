@@ -59,10 +59,10 @@ fn drives(trace: &Trace) -> Vec<u8> {
 /// The drive with the identifier of 3.1 to which the master sends: 200 + n.
 fn receiver(frame: &LineFrame) -> Option<u8> {
     let number = frame.frame.id().number();
-    let own = (0x201..=0x27F).contains(&number) && !frame.frame.id().is_extended();
+    let to_drive = (0x201..=0x27F).contains(&number) && !frame.frame.id().is_extended();
     u8::try_from(number & 0x7F)
         .ok()
-        .filter(|_| own && frame.from.is_none())
+        .filter(|_| to_drive && frame.from.is_none())
 }
 
 /// The arrows. A frame is folded into the one before it of the same drive and register where the gaps are those of a cycle, and the
@@ -80,12 +80,12 @@ fn folded(trace: &Trace) -> Vec<Folded<'_>> {
             continue;
         };
         let before = begun.get_mut(&key);
-        let gap = before.as_ref().map(|own| frame.at.since(own.at));
+        let gap = before.as_ref().map(|last| frame.at.since(last.at));
         match (before, gap) {
-            (Some(own), Some(gap)) if own.gap.is_some_and(|last| alike(last, gap)) => {
-                own.at = frame.at;
-                arrows[own.arrow].last = frame;
-                arrows[own.arrow].times += 1;
+            (Some(series), Some(gap)) if series.gap.is_some_and(|last| alike(last, gap)) => {
+                series.at = frame.at;
+                arrows[series.arrow].last = frame;
+                arrows[series.arrow].times += 1;
             }
             _ => {
                 let arrow = arrows.len();

@@ -20,7 +20,7 @@ struct Row<'t> {
 /// left out.
 #[must_use]
 pub(crate) fn table(trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
-    let frames = trace.channels.iter().flat_map(|own| own.frames());
+    let frames = trace.channels.iter().flat_map(|channel| channel.frames());
     let mut rows: Vec<Row<'_>> = Vec::new();
     for frame in frames {
         match rows.last_mut() {
@@ -112,11 +112,11 @@ impl LiveText for FrameText {
         let Piece::Frame(frame) = piece else {
             return Vec::new();
         };
-        let own = Row {
+        let row = Row {
             first: frame,
             last: frame,
             times: 1,
         };
-        vec![(frame.at.since_start().as_nanos(), text(&own))]
+        vec![(frame.at.since_start().as_nanos(), text(&row))]
     }
 }

@@ -76,11 +76,11 @@ fn json_survives() {
 fn a_candump_log_survives_but_for_what_it_cannot_hold() {
     let capture = every_kind();
     let again = read(&written(&capture, FileForm::Candump), None).expect("a capture");
-    let frames = |own: &Capture| own.traces[0].channels[0].frames().to_vec();
+    let frames = |capture: &Capture| capture.traces[0].channels[0].frames().to_vec();
     let good = frames(&capture)
         .into_iter()
-        .filter(|own| own.ended == FrameEnd::Good);
-    let good: Vec<_> = good.map(|own| own.frame).collect();
-    let read: Vec<_> = frames(&again).iter().map(|own| own.frame).collect();
+        .filter(|frame| frame.ended == FrameEnd::Good);
+    let good: Vec<_> = good.map(|frame| frame.frame).collect();
+    let read: Vec<_> = frames(&again).iter().map(|frame| frame.frame).collect();
     assert_eq!(read, good);
 }

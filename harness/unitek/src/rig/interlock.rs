@@ -46,17 +46,19 @@ impl PartialOrd for RegisterBound {
 ///
 /// # Errors
 /// What is wrong with it.
-pub(super) fn checked(own: &Interlock) -> Result<(), Mistake> {
-    read(own).map(|_| ())
+pub(super) fn checked(interlock: &Interlock) -> Result<(), Mistake> {
+    read(interlock).map(|_| ())
 }
 
-fn read(own: &Interlock) -> Result<(&'static Register, PortCondition<RegisterBound>), Mistake> {
-    let name = own.register.as_deref().unwrap_or_default();
+fn read(
+    interlock: &Interlock,
+) -> Result<(&'static Register, PortCondition<RegisterBound>), Mistake> {
+    let name = interlock.register.as_deref().unwrap_or_default();
     let expected = "a register of `drivebench cells --bus unitek` expected here";
     let register = register(name).map_err(|message| ("register", message, expected.to_owned()))?;
     let bits = bits(register.unit).iter();
-    let bits: Vec<_> = bits.map(|own| (own.number, own.name)).collect();
-    let condition = own.condition_of("register", &bits, |text| bound(text, register))?;
+    let bits: Vec<_> = bits.map(|bit| (bit.number, bit.name)).collect();
+    let condition = interlock.condition_of("register", &bits, |text| bound(text, register))?;
     Ok((register, condition))
 }
 
@@ -79,7 +81,10 @@ fn bound(text: &str, register: &Register) -> Result<RegisterBound, (String, Stri
             "the register has no unit: a whole number in quotes expected here".to_owned(),
         ),
     };
-    let parsed = number.parse::<f64>().ok().filter(|own| own.is_finite());
+    let parsed = number
+        .parse()
+        .ok()
+        .filter(|parsed: &f64| parsed.is_finite());
     match parsed.filter(|_| fits) {
         Some(parsed) => Ok(RegisterBound(parsed, given)),
         None => Err((
@@ -89,7 +94,6 @@ fn bound(text: &str, register: &Register) -> Result<RegisterBound, (String, Stri
     }
 }
 
-/// The interlocks of a rig.
 #[derive(Debug)]
 pub(super) struct RegisterInterlocks {
     all: Vec<RegisterInterlock>,
@@ -103,7 +107,7 @@ struct RegisterInterlock {
     axis: Axis,
     register: &'static Register,
     condition: PortCondition<RegisterBound>,
-    own: Interlock,
+    interlock: Interlock,
     every: Span,
     /// On a clock that is never set back.
     next: Instant,
@@ -113,7 +117,6 @@ struct RegisterInterlock {
     sends_itself: bool,
 }
 
-/// What a look has found.
 enum LookedAt {
     Holds,
     Broken(String),
@@ -123,15 +126,16 @@ enum LookedAt {
 impl RegisterInterlocks {
     /// Those of a rig with these drives; `None` where it has none.
     pub(super) fn of(rig: &Rig, axes: &[Axis], patience: Span) -> Option<Self> {
-        let entry = |own: &Interlock| {
+        let entry = |interlock: &Interlock| {
             // The file was checked.
-            let (register, condition) = read(own).ok()?;
-            let every = u64::try_from(own.every.0.as_nanos()).unwrap_or(u64::MAX);
+            let (register, condition) = read(interlock).ok()?;
+            let every = u64::try_from(interlock.every.0.as_nanos()).unwrap_or(u64::MAX);
+            let axis = axes.iter().find(|axis| axis.node == interlock.drive)?;
             Some(RegisterInterlock {
-                axis: axes.iter().copied().find(|axis| axis.node == own.drive)?,
+                axis: *axis,
                 register,
                 condition,
-                own: own.clone(),
+                interlock: interlock.clone(),
                 every: Span::from_nanos(every),
                 next: Instant::START,
                 scaling: None,
@@ -150,12 +154,12 @@ impl RegisterInterlocks {
 impl Watch for RegisterInterlocks {
     fn due(&self) -> Option<Instant> {
         let asked = self.all.iter();
-        let asked = asked.filter(|own| !own.sends_itself || own.lacks_scale());
-        asked.map(|own| own.next).min()
+        let asked = asked.filter(|entry| !entry.sends_itself || entry.lacks_scale());
+        asked.map(|entry| entry.next).min()
     }
 
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String> {
-        for entry in self.all.iter_mut().filter(|own| own.next <= now) {
+        for entry in self.all.iter_mut().filter(|entry| entry.next <= now) {
             entry.next = now + entry.every;
             let mut asks = Asks {
                 line,
@@ -187,7 +191,7 @@ impl Watch for RegisterInterlocks {
                 LookedAt::Silent => {
                     let why = format!(
                         "{} cannot be read: the drive does not answer",
-                        entry.own.words(entry.register.name)
+                        entry.interlock.words(entry.register.name)
                     );
                     return Err(Trouble::Lost(why));
                 }
@@ -208,7 +212,7 @@ impl Watch for RegisterInterlocks {
 
     fn hear(&mut self, heard: &Heard) -> Result<(), String> {
         let all = self.all.iter();
-        for entry in all.filter(|own| own.sends_itself && !own.lacks_scale()) {
+        for entry in all.filter(|entry| entry.sends_itself && !entry.lacks_scale()) {
             if let Some(reply) = entry.reply(heard, entry.register.number)
                 && let Some(why) = entry.broken(reply)
             {
@@ -247,7 +251,7 @@ impl RegisterInterlock {
         if self.lacks_scale() {
             let read = [0xCE, 0xC6, 0xD9].map(|number| asks.ask(self, number));
             let [Some(rpm_max), Some(device_current), Some(units_at_200)] =
-                read.map(|own| own.map(|reply| low(reply.data)))
+                read.map(|answer| answer.map(|reply| low(reply.data)))
             else {
                 return LookedAt::Silent;
             };
@@ -284,7 +288,7 @@ impl RegisterInterlock {
             None => Some(self.register.number_of(raw) as f64),
         };
         let unit = match self.condition {
-            PortCondition::Within(min, max) => min.or(max).and_then(|own| own.1),
+            PortCondition::Within(min, max) => min.or(max).and_then(|bound| bound.1),
             PortCondition::Bit(..) => None,
         };
         let read = unit.and_then(|unit| shown(self.register, raw, unit, scaling));
@@ -293,12 +297,17 @@ impl RegisterInterlock {
             (None, PortCondition::Bit(..)) => format!("{raw:X}"),
             (None, PortCondition::Within(..)) => self.register.number_of(raw).to_string(),
         };
-        let why = self.own.broken(&self.condition, raw, &read, |min, max| {
-            // What has no meaning is within no bounds.
-            min.is_none_or(|own| number(own.1).is_some_and(|is| is >= own.0))
-                && max.is_none_or(|own| number(own.1).is_some_and(|is| is <= own.0))
-        })?;
-        Some(format!("{}: {why}", self.own.words(self.register.name)))
+        let why = self
+            .interlock
+            .broken(&self.condition, raw, &read, |min, max| {
+                // What has no meaning is within no bounds.
+                min.is_none_or(|bound| number(bound.1).is_some_and(|is| is >= bound.0))
+                    && max.is_none_or(|bound| number(bound.1).is_some_and(|is| is <= bound.0))
+            })?;
+        Some(format!(
+            "{}: {why}",
+            self.interlock.words(self.register.name)
+        ))
     }
 }
 

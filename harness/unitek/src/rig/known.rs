@@ -65,8 +65,8 @@ impl Known {
     /// # Errors
     /// The link is in trouble, or the drive does not answer for its firmware.
     pub(super) fn read_all(&mut self, driver: &mut Driver<'_>) -> Result<(), Error> {
-        let assigned = REGISTERS.iter().filter(|own| own.dump != UNASSIGNED);
-        let read = self.read(driver, assigned.map(|own| own.number));
+        let assigned = REGISTERS.iter().filter(|row| row.dump != UNASSIGNED);
+        let read = self.read(driver, assigned.map(|row| row.number));
         for (register, read) in &self.cells {
             self.first.entry(*register).or_insert(*read);
         }
@@ -86,8 +86,8 @@ impl Known {
         if written.contains(&(self.axis.rx, 0x83)) {
             return self.read_all(driver);
         }
-        let own = written.iter().filter(|(rx, _)| *rx == self.axis.rx);
-        let all: BTreeSet<u8> = own.map(|(_, register)| *register).chain(LIVE).collect();
+        let ours = written.iter().filter(|(rx, _)| *rx == self.axis.rx);
+        let all: BTreeSet<u8> = ours.map(|(_, register)| *register).chain(LIVE).collect();
         self.read(driver, all.into_iter())
     }
 
@@ -97,7 +97,7 @@ impl Known {
         registers: impl Iterator<Item = u8>,
     ) -> Result<(), Error> {
         self.note(driver.read(self.axis, FIRMWARE)?);
-        for register in registers.filter(|own| *own != FIRMWARE) {
+        for register in registers.filter(|register| *register != FIRMWARE) {
             match driver.read(self.axis, register) {
                 Ok(reply) => self.note(reply),
                 Err(Error::NoReply { .. }) => {
@@ -139,7 +139,6 @@ impl Known {
         }
     }
 
-    /// Settles a property.
     pub(super) fn settle(&mut self, name: &str, word: &str) {
         if let Some(property) = Description::of(name)
             && property.set(&mut self.properties, Setting::Word(word))
@@ -222,7 +221,7 @@ impl Known {
         let mut all = Vec::new();
         let open = PROPERTIES
             .iter()
-            .filter(|own| !self.settled.contains(own.name));
+            .filter(|property| !self.settled.contains(property.name));
         for property in open {
             let (words, times) = values(property, self.reply_delay);
             let words = words.into_iter().map(Setting::Word);

@@ -28,7 +28,6 @@ pub(super) type Written = BTreeSet<(Addressed, u8)>;
 /// An identifier that was written to this register of a drive.
 pub(super) type Given = (u8, u16, Addressed);
 
-/// What was noted.
 #[derive(Debug, Default)]
 pub(super) struct FrameNotes {
     /// The registers that frames may have written.
@@ -74,7 +73,7 @@ impl Exchange {
     pub(super) fn begin(&mut self, now: Instant) {
         self.behind = Some(
             self.behind
-                .map_or(Span::ZERO, |own| own + now.since_start()),
+                .map_or(Span::ZERO, |behind| behind + now.since_start()),
         );
         self.came_before = self.came.len();
     }
@@ -83,8 +82,8 @@ impl Exchange {
     pub(super) fn asks_before_it_began(&self, register: u8) -> bool {
         let began = Instant::START + self.behind.unwrap_or_default();
         let mut sent = self.sent.iter();
-        let asks = |own: &&(Instant, Frame)| own.1.data().starts_with(&[READ, register]);
-        sent.rfind(asks).is_some_and(|own| own.0 < began)
+        let asks = |sent: &&(Instant, Frame)| sent.1.data().starts_with(&[READ, register]);
+        sent.rfind(asks).is_some_and(|sent| sent.0 < began)
     }
 
     /// What came since the clock of the link began again.
@@ -94,8 +93,8 @@ impl Exchange {
 
     /// Whether something came behind the last frame that was sent.
     pub(super) fn answers_last(&self) -> bool {
-        let sent = self.sent.last().map(|own| own.0);
-        let came = self.came.last().map(|own| own.1);
+        let sent = self.sent.last().map(|sent| sent.0);
+        let came = self.came.last().map(|came| came.1);
         came >= sent
     }
 
@@ -124,11 +123,11 @@ impl Exchange {
         let breaks = streams.iter().flat_map(|((_, register), times)| {
             let gap = |place: usize| Some(times.get(place + 1)?.since(*times.get(place)?));
             (0..times.len()).filter_map(move |place| {
-                let own = gap(place)?;
+                let between = gap(place)?;
                 let near = [place.checked_sub(1).and_then(gap), gap(place + 1)];
-                let often = near.into_iter().flatten().any(|other| other * 2 <= own);
+                let often = near.into_iter().flatten().any(|other| other * 2 <= between);
                 let by_itself = || !asked(*register, times[place], times[place + 1]);
-                (often && by_itself()).then_some(own)
+                (often && by_itself()).then_some(between)
             })
         });
         let held_up = self.came.iter().map(|(at, read, _)| read.since(*at));
@@ -138,7 +137,7 @@ impl Exchange {
 
     /// For how long nothing came while several requests were sent that were all answered then: a drive that loses replies does not send them later.
     fn replies_held_up(&self) -> impl Iterator<Item = Span> {
-        let came = self.came.iter().map(|own| own.0);
+        let came = self.came.iter().map(|came| came.0);
         let begins = std::iter::once(Instant::START).chain(came.clone());
         begins.zip(came).filter_map(|(begin, end)| {
             let waiting = self.sent.iter().filter(|(at, frame)| {
@@ -146,12 +145,12 @@ impl Exchange {
                 read && (begin..end).contains(at)
             });
             let first = waiting.clone().nth(1).and(waiting.clone().next())?.0;
-            let mut registers = waiting.filter_map(|own| own.1.data().get(1));
+            let mut registers = waiting.filter_map(|sent| sent.1.data().get(1));
             let answered = |register: &u8| {
-                let sent = self.sent.iter().filter(|own| own.0 >= first);
-                let sent = sent.filter(|own| own.1.data().starts_with(&[READ, *register]));
-                let came = self.came.iter().filter(|own| own.0 >= first);
-                let came = came.filter(|own| own.2.data().first() == Some(register));
+                let sent = self.sent.iter().filter(|sent| sent.0 >= first);
+                let sent = sent.filter(|sent| sent.1.data().starts_with(&[READ, *register]));
+                let came = self.came.iter().filter(|came| came.0 >= first);
+                let came = came.filter(|came| came.2.data().first() == Some(register));
                 came.count() >= sent.count()
             };
             registers.all(answered).then(|| end.since(first))
@@ -181,8 +180,8 @@ impl FrameNotes {
     /// The drive to which a frame with this identifier goes.
     fn addressed(&self, id: u16) -> Addressed {
         let mut given = self.given.iter().rev();
-        let own = given.find(|own| own.0 != 0x69 && own.1 == id);
-        own.map_or(id, |own| own.2)
+        let found = given.find(|given| given.0 != 0x69 && given.1 == id);
+        found.map_or(id, |given| given.2)
     }
 
     /// The levels of the EEPROM that may have been stored, with the drives.
@@ -231,7 +230,7 @@ impl LinkNotes for FrameNotes {
                 }
                 Ok(Request::Read { register }) => {
                     // One that is repeated may get the reply to the first.
-                    let first = self.asked.filter(|own| own.0 == register);
+                    let first = self.asked.filter(|asked| asked.0 == register);
                     self.asked = first.or(Some((register, end)));
                     self.awaited.push(register);
                 }
@@ -254,13 +253,13 @@ impl LinkNotes for FrameNotes {
         if let (Some(at), Some(now)) = (self.exchange.at(at), self.exchange.at(now)) {
             self.exchange.came.push((at, now, frame));
         }
-        if let Some((frames, _)) = self.kept.as_mut().filter(|own| own.0.len() < MOST_KEPT) {
+        if let Some((frames, _)) = self.kept.as_mut().filter(|kept| kept.0.len() < MOST_KEPT) {
             frames.push(frame);
         }
         for byte in frame.to_string().bytes() {
             self.heard.add(u32::from(byte));
         }
-        let answers = |own: &u8| frame.data().first() == Some(own);
+        let answers = |register: &u8| frame.data().first() == Some(register);
         if let Some(place) = self.awaited.iter().position(answers) {
             self.awaited.remove(place);
         }
@@ -269,7 +268,7 @@ impl LinkNotes for FrameNotes {
         {
             let took = at.since(end);
             self.longest = self.longest.max(now.since(end));
-            self.shortest = Some(self.shortest.map_or(took, |own| own.min(took)));
+            self.shortest = Some(self.shortest.map_or(took, |shortest| shortest.min(took)));
             self.asked = None;
         }
     }
@@ -302,8 +301,8 @@ mod tests {
     fn longest(came: &[u64], asked: &[u64]) -> Span {
         let came = came
             .iter()
-            .map(|own| (at(own), at(own), frame("181#300000")));
-        let sent = asked.iter().map(|own| (at(own), frame("201#3D3000")));
+            .map(|time| (at(time), at(time), frame("181#300000")));
+        let sent = asked.iter().map(|time| (at(time), frame("201#3D3000")));
         let talk = Exchange {
             came: came.collect(),
             sent: sent.collect(),

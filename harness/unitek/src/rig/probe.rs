@@ -87,7 +87,7 @@ pub(super) fn settle(
     probe.known.settle("can-counters", word);
     // A reply on an idle bus takes less.
     let delay = probe.link.noted.shortest;
-    probe.known.reply_delay = delay.filter(|own| *own > Span::from_micros(500));
+    probe.known.reply_delay = delay.filter(|delay| *delay > Span::from_micros(500));
     Ok(())
 }
 
@@ -227,7 +227,7 @@ impl Probe<'_, '_> {
     fn by_replies(&mut self) -> Result<(), Error> {
         let mut stuffs = self.known.replies.values().map(|reply| reply.stuff);
         if let Some(first) = stuffs.next()
-            && stuffs.all(|own| own == first)
+            && stuffs.all(|stuff| stuff == first)
         {
             let word = format!("{first:02X}");
             self.known.settle("stuff", &word);
@@ -270,7 +270,7 @@ impl Probe<'_, '_> {
         let enabled = self.known.cell(STATUS) & status::ENABLED != 0;
         let known = [0xE8, 0xD8, 0xE2, MODE, STATUS]
             .iter()
-            .all(|own| self.known.cells.contains_key(own));
+            .all(|register| self.known.cells.contains_key(register));
         known && closed && self.known.cell(MODE) & u32::from(MODE_LOCK) == 0 && !enabled
     }
 
@@ -365,7 +365,7 @@ impl Probe<'_, '_> {
     fn wide(&mut self) -> Result<(), Error> {
         let cells = self.known.cells.iter();
         let negative = cells.map(|(register, raw)| (*register, *raw));
-        let negative = negative.clone().find(|(own, raw)| is_negative(*own, *raw));
+        let negative = negative.clone().find(|(row, raw)| is_negative(*row, *raw));
         let (false, Some((register, _))) = (self.known.is_wide(), negative) else {
             return Ok(());
         };
@@ -407,15 +407,15 @@ impl Probe<'_, '_> {
             if self.link.take_late() > SLACK {
                 continue;
             }
-            let own = |all: &[(Instant, Reply)]| -> Vec<Instant> {
-                let own = all.iter().filter(|(_, reply)| reply.register == register);
-                own.map(|(at, _)| *at).collect()
+            let times = |all: &[(Instant, Reply)]| -> Vec<Instant> {
+                let replies = all.iter().filter(|(_, reply)| reply.register == register);
+                replies.map(|(at, _)| *at).collect()
             };
-            if let [one, two, ..] = own(&first)[..] {
+            if let [one, two, ..] = times(&first)[..] {
                 let (wait, gap) = (one.since(sent), two.since(one));
                 let regular = gap + SLACK > CYCLE && gap < CYCLE + SLACK;
                 let exact = self.link.time_tolerance() == Span::ZERO;
-                if let (true, Some(word)) = (exact && regular, accuracy(&own(&first))) {
+                if let (true, Some(word)) = (exact && regular, accuracy(&times(&first))) {
                     self.known.settle("interval-accuracy", word);
                 }
                 if regular && wait < HALF {
@@ -424,7 +424,7 @@ impl Probe<'_, '_> {
                     self.known.settle("cyclic-first", "after");
                 }
             }
-            match own(&then).len() {
+            match times(&then).len() {
                 0 => {}
                 1 => self.known.settle("oneshot-stops", "yes"),
                 _ => self.known.settle("oneshot-stops", "no"),
@@ -460,7 +460,7 @@ impl Probe<'_, '_> {
             return Ok(());
         };
         let frame = reply.encode(self.known.axis.tx);
-        let length = frame.map_or(Span::ZERO, |own| rate.time_of(own.wire_bits()));
+        let length = frame.map_or(Span::ZERO, |frame| rate.time_of(frame.wire_bits()));
         // The drive begins with the next millisecond of its clock, and sends at the end of one.
         let took = (at.since(began).saturating_sub(length)).as_nanos();
         let took = Span::from_millis(took.div_ceil(1_000_000));
@@ -531,7 +531,7 @@ impl Probe<'_, '_> {
         self.listen(now + SLACK)?;
         let there = |register| heard.iter().any(|(_, reply)| reply.register == register);
         let [first, .., ninth] = NINE;
-        let others = NINE[1..8].iter().all(|own| there(*own));
+        let others = NINE[1..8].iter().all(|register| there(*register));
         match (there(first), there(ninth)) {
             (true, false) if others => self.known.settle("table-full", "refuse"),
             (false, true) if others => self.known.settle("table-full", "oldest"),

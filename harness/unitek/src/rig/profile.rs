@@ -30,7 +30,7 @@ impl Profiled {
         };
         // The file was checked.
         let read: Result<Scenario<Unitek>, Problems> = read(&source, Part::Header);
-        let lines = read.map_or_else(|_| Vec::new(), |own| own.header.drives);
+        let lines = read.map_or_else(|_| Vec::new(), |scenario| scenario.header.drives);
         let properties = lines.into_iter().filter_map(|line| match line.what {
             SetupKind::Property(property, value) => {
                 Some((node(&line.drive, Scope::default()).ok()?, property, value))
@@ -45,8 +45,8 @@ impl Profiled {
     /// # Errors
     /// The drive has shown another value: the profile is of another drive. How long something takes is not compared.
     pub(super) fn settle(&self, known: &mut Known, rate: BitRate) -> Result<(), Error> {
-        let own = self.0.iter().filter(|own| own.0 == known.axis.node);
-        for (drive, property, value) in own {
+        let stated = self.0.iter().filter(|line| line.0 == known.axis.node);
+        for (drive, property, value) in stated {
             let setting = match value {
                 PropertyValue::Word(word) => Setting::Word(word),
                 PropertyValue::Time(time) => Setting::Time(time.on(octet_time(rate))),

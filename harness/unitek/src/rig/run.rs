@@ -82,8 +82,8 @@ impl PortPlayer for Player {
         Own::read(source)
     }
 
-    fn not_begun(&self, own: &Own) -> Option<Skip> {
-        Self::not_begun(self, own)
+    fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+        Self::not_begun(self, scenario)
     }
 
     fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
@@ -91,8 +91,8 @@ impl PortPlayer for Player {
     }
 
     /// Waits until 84 may be written again, as the guard sees it.
-    fn wait(&mut self, own: &Own, link: &mut dyn Link) {
-        let Some(stores) = own.frames().find(|own| stores(own)) else {
+    fn wait(&mut self, scenario: &Own, link: &mut dyn Link) {
+        let Some(stores) = scenario.frames().find(|frame| stores(frame)) else {
             return;
         };
         let stores = [*stores];
@@ -107,13 +107,13 @@ impl PortPlayer for Player {
         }
     }
 
-    fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
-        Self::attempt(self, own, link)
+    fn attempt(&mut self, scenario: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+        Self::attempt(self, scenario, link)
     }
 
     /// Sets registers back that a scenario has changed.
-    fn set_back(&mut self, own: &Own, session: &mut Session) -> Vec<String> {
-        if own.frames().any(stores) {
+    fn set_back(&mut self, scenario: &Own, session: &mut Session) -> Vec<String> {
+        if scenario.frames().any(stores) {
             self.note_stored();
         }
         let changed = (self.written(), self.stored_levels());

@@ -26,7 +26,6 @@ const FIRMWARE: u8 = 0x1B;
 /// The registers that a highest speed is measured by: the rpm of 100 %, and the limit of the speed.
 const SPEEDS: [u8; 2] = [0xC8, 0x34];
 
-/// The drives of a rig.
 #[derive(Clone, Debug)]
 pub(crate) struct UnitekDrives {
     axes: Vec<Axis>,
@@ -60,12 +59,12 @@ impl PortDrives for UnitekDrives {
         let link = guarded(ends, limits, &identifiers, port.listen_only);
         let patience = patience(port);
         let way_back = rig.file.limits.port.bit_rate_way_back.clone();
-        let own = Self {
+        let drives = Self {
             axes,
             patience,
             way_back,
         };
-        Ok((own, link, locks))
+        Ok((drives, link, locks))
     }
 
     /// Asks every drive for its firmware.
@@ -76,7 +75,7 @@ impl PortDrives for UnitekDrives {
 
     fn watch(&self, rig: &Rig) -> Option<Box<dyn Watch>> {
         RegisterInterlocks::of(rig, &self.axes, self.patience)
-            .map(|own| Box::new(own) as Box<dyn Watch>)
+            .map(|interlocks| Box::new(interlocks) as Box<dyn Watch>)
     }
 
     fn listed(&self) -> Vec<Axis> {

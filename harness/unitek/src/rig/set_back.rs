@@ -124,26 +124,26 @@ pub(super) fn set_back(
     for known in drives {
         let axis = known.axis;
         let gate = session.link().segment();
-        let moved = gate.is_some_and(|own| own.has_moved(axis.rx));
+        let moved = gate.is_some_and(|gate| gate.has_moved(axis.rx));
         let mut driver = session.driver();
-        let mut own = SetBack {
+        let mut set_back = SetBack {
             driver: &mut driver,
             axis,
             rig: &rig,
         };
-        let registers = own.registers(known, written);
+        let registers = set_back.registers(known, written);
         let silent = registers.is_err();
         let moved_back = match moved && !silent {
-            true => own.moved_back(known),
+            true => set_back.moved_back(known),
             false => Ok(false),
         };
         notes.extend(registers.unwrap_or_else(|error| vec![error.to_string()]));
         if !silent {
-            let errors = own.errors(known, may_release);
+            let errors = set_back.errors(known, may_release);
             notes.extend(errors.unwrap_or_else(|error| Some(error.to_string())));
         }
-        let levels = stored.iter().filter(|own| own.0 == axis.rx);
-        notes.extend(levels.map(|(_, level)| own.level(*level)));
+        let levels = stored.iter().filter(|level| level.0 == axis.rx);
+        notes.extend(levels.map(|(_, level)| set_back.level(*level)));
         drop(driver);
         if let (Ok(true), Some(gate)) = (moved_back, session.link().segment_mut()) {
             gate.moved_back(axis.rx);
@@ -158,7 +158,7 @@ pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, g
     let origin = left.origin();
     let of_drive = |known: &Known| {
         let mut before = held_before(known, written);
-        let has = |register| before.iter().any(|own: &(u8, u32)| own.0 == register);
+        let has = |register| before.iter().any(|cell: &(u8, u32)| cell.0 == register);
         let node = known.axis.node;
         let cleared = match has(TIME_OUT) {
             true => {
@@ -168,12 +168,12 @@ pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, g
             false => String::new(),
         };
         let moved = moved(known.axis, given, origin);
-        before.retain(|own| !IDENTIFIERS.contains(&own.0));
-        let moves = before.iter().any(|own| needs_motion(own.0));
+        before.retain(|cell| !IDENTIFIERS.contains(&cell.0));
+        let moves = before.iter().any(|cell| needs_motion(cell.0));
         let moves = if moves { "--move " } else { "" };
         let values: String = before
             .iter()
-            .map(|own| assignment(own.0, own.1) + " ")
+            .map(|cell| assignment(cell.0, cell.1) + " ")
             .collect();
         let command = format!("drivebench write {node} {values}{moves}--rig {origin}");
         let note =
@@ -182,8 +182,8 @@ pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, g
     };
     let all = drives.iter().flat_map(of_drive).flatten().collect();
     let elsewhere = drives.iter().flat_map(|known| {
-        let own = places(known.axis, given, 0x68).skip(1);
-        own.map(|rx| Axis { rx, ..known.axis })
+        let others = places(known.axis, given, 0x68).skip(1);
+        others.map(|rx| Axis { rx, ..known.axis })
     });
     let elsewhere: Vec<_> = elsewhere.take(MOST_STOPPED).collect();
     let stops = Pieces::Frames(last_words(&elsewhere));
@@ -193,11 +193,11 @@ pub(super) fn foretell(left: &NotPutBack, drives: &[Known], written: &Written, g
 /// The identifiers that a drive may have: that of the rig's file first, and those that were written to a register.
 fn places(axis: Axis, given: &[Given], register: u8) -> impl Iterator<Item = u16> {
     let first = if register == 0x68 { axis.rx } else { axis.tx };
-    let own = given
+    let ids = given
         .iter()
-        .filter(move |own| (own.0, own.2) == (register, axis.rx));
-    let own: BTreeSet<u16> = own.map(|own| own.1).filter(|id| *id != first).collect();
-    std::iter::once(first).chain(own)
+        .filter(move |given| (given.0, given.2) == (register, axis.rx));
+    let others: BTreeSet<u16> = ids.map(|given| given.1).filter(|id| *id != first).collect();
+    std::iter::once(first).chain(others)
 }
 
 /// On which identifiers a drive may be found, and the command that sets them back; `None` for those of the rig's file.
@@ -260,7 +260,6 @@ const fn digits(register: &Register) -> usize {
     }
 }
 
-/// One drive.
 struct SetBack<'d, 'l> {
     driver: &'d mut Driver<'l>,
     axis: Axis,
@@ -282,7 +281,7 @@ impl SetBack<'_, '_> {
         for register in BUS_SETTINGS {
             let mask = Register::of(register).mask();
             let reads = self.driver.read(self.axis, register)?.data.bits() & mask;
-            if known.first.get(&register).map(|own| own & mask) != Some(reads) {
+            if known.first.get(&register).map(|first| first & mask) != Some(reads) {
                 return Ok(false);
             }
         }
@@ -302,7 +301,9 @@ impl SetBack<'_, '_> {
             }
             match self.driver.write(self.axis, register, data) {
                 Ok(_) => return Ok(None),
-                Err(Error::Differs { reads: own, .. }) => reads = own.data.bits() & about.mask(),
+                Err(Error::Differs { reads: reply, .. }) => {
+                    reads = reply.data.bits() & about.mask()
+                }
                 Err(error) => return Err(error),
             }
         }

@@ -30,7 +30,7 @@ fn line(limits: Limits) -> Guarded<Bench> {
 }
 
 fn of(setup: &Setup, limits: Limits) -> Guarded<Bench> {
-    let drives: Vec<_> = setup.drives.iter().map(|own| own.identifiers).collect();
+    let drives: Vec<_> = setup.drives.iter().map(|drive| drive.identifiers).collect();
     guarded(Bench::new(setup), limits, &drives, false)
 }
 
@@ -98,7 +98,7 @@ fn a_motor_that_does_not_stand_is_not_confirmed() {
 /// A computer that stands still, for longer than drives need to stand, is not taken for a drive that does not.
 #[test]
 fn a_computer_that_stands_still_accuses_no_drive() {
-    for (after, coasts) in (1..12).flat_map(|own| [(own, false), (own, true)]) {
+    for (after, coasts) in (1..12).flat_map(|place| [(place, false), (place, true)]) {
         let mut line = line(Limits::unlimited());
         send(&mut line, &["201#31FF7F"]);
         let standing = Standstill {
@@ -152,9 +152,9 @@ fn a_drive_that_answers_late_is_confirmed() {
     assert!(safe.confirmed, "{safe}");
     let trace = line.inner().trace(0);
     let frames = trace.channels[0].frames().iter();
-    let texts: Vec<_> = frames.map(|own| own.frame.to_string()).collect();
-    let first = |text| texts.iter().position(|own| own == text);
-    let last = texts.iter().rposition(|own| own == "201#510400");
+    let texts: Vec<_> = frames.map(|frame| frame.frame.to_string()).collect();
+    let first = |text| texts.iter().position(|sent| sent == text);
+    let last = texts.iter().rposition(|text| text == "201#510400");
     assert!(first("202#510400") < last, "{texts:?}");
 }
 
@@ -206,7 +206,8 @@ fn two_drives_are_set_back_whichever_frame_is_lost() {
             assert_eq!(registers(&line, node)[..3], [4, 0, 0], "frame {lost}");
         }
         let gate = line.segment().expect("a gate");
-        assert!(!gate.places().any(|own| own.has_moved()), "frame {lost}");
+        let moved = gate.places().any(|place| place.has_moved());
+        assert!(!moved, "frame {lost}");
     }
 }
 
@@ -228,7 +229,7 @@ fn a_cycle_is_stopped_although_its_stop_was_lost() {
             assert_eq!(running, 0, "{texts:?}, frame {lost}");
             let trace = line.inner().trace(0);
             let frames = trace.channels[0].frames().iter();
-            let stops = frames.filter(|own| own.frame.to_string() == "201#3D1BFF");
+            let stops = frames.filter(|frame| frame.frame.to_string() == "201#3D1BFF");
             met += usize::from(stops.count() == 2);
         }
     }
@@ -253,7 +254,7 @@ fn an_identifier_that_is_not_used_yet_is_set_back() {
 #[test]
 fn two_drives_on_one_identifier_are_named() {
     let mut setup = Setup::of(2);
-    let wrong = deviations().find(|own| own.name == "hears-its-neighbour");
+    let wrong = deviations().find(|deviation| deviation.name == "hears-its-neighbour");
     setup.drives[0].deviation = wrong;
     let mut line = of(&setup, Limits::unlimited());
     send(&mut line, &["202#687E02"]);

@@ -57,8 +57,8 @@ const MODES: [(&str, Control); 3] = [
 
 /// The word of a control mode.
 pub(in super::super) fn mode_word(mode: Control) -> &'static str {
-    let own = MODES.iter().find(|(_, own)| *own == mode);
-    own.map_or("", |(word, _)| word)
+    let row = MODES.iter().find(|(_, control)| *control == mode);
+    row.map_or("", |(word, _)| word)
 }
 
 /// Reads what stands behind `drive`.
@@ -81,10 +81,10 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, DriveLine), Pr
         Word::Property => DriveLine::Setup(property(scanner)?),
         Word::Mode => DriveLine::Setup(SetupKind::Mode(named(scanner, &MODES, "a control mode")?)),
         Word::Deviates => {
-            let names: Vec<(&str, &'static Deviation)> =
-                deviations().map(|own| (own.name, own)).collect();
-            let own = deviation(scanner, &names, "a drive", "`drive 1 deviates NAME`")?;
-            DriveLine::Setup(SetupKind::Deviates(own))
+            let names = deviations().map(|wrong| (wrong.name, wrong));
+            let names: Vec<(&str, &'static Deviation)> = names.collect();
+            let deviant = deviation(scanner, &names, "a drive", "`drive 1 deviates NAME`")?;
+            DriveLine::Setup(SetupKind::Deviates(deviant))
         }
         Word::Register => {
             let register = value::register(scanner)?;
@@ -130,7 +130,7 @@ fn identifiers(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
         let before = scanner.clone();
         let id = identifier(scanner)?;
         let number = u16::try_from(id.number()).ok();
-        let number = number.filter(|own| !id.is_extended() && *own != 0);
+        let number = number.filter(|number| !id.is_extended() && *number != 0);
         let Some(number) = number else {
             *scanner = before;
             return Err(scanner.unexpected("an identifier from 001 to 7FF"));
@@ -146,15 +146,15 @@ fn identifiers(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
 
 /// `map-reply = native`, `homing-time = 20ms`; without `=` as well.
 fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
-    let names: Vec<(&str, &'static Description)> =
-        PROPERTIES.iter().map(|own| (own.name, own)).collect();
+    let names = PROPERTIES.iter().map(|property| (property.name, property));
+    let names: Vec<(&str, &'static Description)> = names.collect();
     let property = named(scanner, &names, "a property")?;
     scanner.eat("=");
     let value = match property.accepts {
         Accepts::Words(words) => {
             let before = scanner.clone();
             let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
-            let word = word.map_or("", |own| own.value);
+            let word = word.map_or("", |word| word.value);
             if !words.contains(&word) {
                 *scanner = before;
                 let problem = scanner.unexpected(&words.join(" or "));
@@ -165,7 +165,7 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
         Accepts::Byte => {
             let before = scanner.clone();
             let digits = scanner.take_while(|c| c.is_ascii_hexdigit());
-            let Some(digits) = digits.filter(|own| own.value.len() == 2) else {
+            let Some(digits) = digits.filter(|digits| digits.value.len() == 2) else {
                 *scanner = before;
                 return Err(scanner.unexpected("two hexadecimal digits"));
             };
@@ -178,7 +178,7 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
 
 /// `tol = 1`, `tol off`
 fn force(scanner: &mut Scanner<'_>) -> Result<Outside, Problem> {
-    let own = Inputs::FORCED.map(|name| (name, name));
+    let forced = Inputs::FORCED.map(|name| (name, name));
     // As the registers that show them are called.
     let others = [
         ("T_MOTOR", "motor-temperature"),
@@ -187,7 +187,7 @@ fn force(scanner: &mut Scanner<'_>) -> Result<Outside, Problem> {
         ("DC_BUS", "bus-voltage"),
         ("voltage", "bus-voltage"),
     ];
-    let names = [&own[..], &others].concat();
+    let names = [&forced[..], &others].concat();
     let name = named(scanner, &names, "what is overruled")?;
     let equal = scanner.eat("=");
     if scanner.eat_word("off") {
@@ -196,6 +196,6 @@ fn force(scanner: &mut Scanner<'_>) -> Result<Outside, Problem> {
     if !equal {
         return Err(scanner.unexpected("`=` and a value, or `off`"));
     }
-    let unit = value::register_of_force(name).map(|own| own.unit);
+    let unit = value::register_of_force(name).map(|register| register.unit);
     Ok(Outside::Force(name, Some(value::value(scanner, unit)?)))
 }

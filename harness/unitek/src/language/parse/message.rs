@@ -20,7 +20,6 @@ pub(in super::super) fn comment(line: &str) -> Option<usize> {
     })
 }
 
-/// Reads a frame.
 pub(in super::super) fn message(scanner: &mut Scanner<'_>) -> Result<Message, Problem> {
     let here = scanner.here();
     let id = identifier(scanner)?;
@@ -59,7 +58,7 @@ pub(super) fn identifier(scanner: &mut Scanner<'_>) -> Result<Id, Problem> {
     let text = digits.map_or("", |digits| digits.value);
     let number = u32::from_str_radix(text, 16).ok();
     let id = match (extended, text.len()) {
-        (false, 3) => number.and_then(|own| Id::base(u16::try_from(own).ok()?)),
+        (false, 3) => number.and_then(|number| Id::base(u16::try_from(number).ok()?)),
         (true, 1..=8) | (false, 8) => number.and_then(Id::extended),
         _ => None,
     };
@@ -84,14 +83,14 @@ fn candump(scanner: &mut Scanner<'_>) -> Result<Content, Problem> {
     let before = scanner.clone();
     let text = scanner
         .take_while(|c| c.is_ascii_alphanumeric())
-        .map_or("", |own| own.value);
+        .map_or("", |text| text.value);
     if let Some(length) = text.strip_prefix(['R', 'r']) {
         let length = if length.is_empty() {
             Ok(0)
         } else {
             length.parse()
         };
-        if let Some(length) = length.ok().filter(|own| usize::from(*own) <= MAX_DATA) {
+        if let Some(length) = length.ok().filter(|bytes| usize::from(*bytes) <= MAX_DATA) {
             return Ok(Content::Remote(length));
         }
     }

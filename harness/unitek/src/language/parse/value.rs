@@ -49,7 +49,7 @@ pub(super) fn register(scanner: &mut Scanner<'_>) -> Result<RegisterName, Proble
     let before = scanner.clone();
     let text = scanner
         .take_while(|c| !c.is_whitespace() && c != '=')
-        .map_or("", |own| own.value);
+        .map_or("", |text| text.value);
     if text.is_empty() {
         return Err(scanner.unexpected("a register: two hexadecimal digits, or a name"));
     }
@@ -127,7 +127,7 @@ fn kind(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<ValueKind, Prob
     let signed = negative || scanner.eat("+");
     let text = scanner
         .take_while(|c| c.is_ascii_alphanumeric() || c == '.' || c == '%')
-        .map_or("", |own| own.value);
+        .map_or("", |text| text.value);
     let unexpected = |help: Option<String>| {
         let problem = before.clone().unexpected(EXPECTED);
         match help {
@@ -154,7 +154,7 @@ fn kind(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<ValueKind, Prob
             let mut ahead = scanner_behind(&before, signed, text);
             let word = ahead
                 .take_while(|c| c.is_ascii_alphabetic() || c == '%')
-                .map_or("", |own| own.value);
+                .map_or("", |word| word.value);
             let given = unit_named(word);
             if given.is_some() {
                 *scanner = ahead;
@@ -194,7 +194,7 @@ fn kind(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<ValueKind, Prob
         return Ok(ValueKind::Raw(raw, text.len()));
     }
     let help = if signed || (!name.is_empty() && !hexadecimal && digits > 0) {
-        let units: Vec<_> = Given::ALL.iter().map(|own| own.name()).collect();
+        let units: Vec<_> = Given::ALL.iter().map(|given| given.name()).collect();
         Some(format!("units are {}", units.join(", ")))
     } else {
         None

@@ -89,9 +89,9 @@ impl<'t> Conversation<'t> {
                 Some(Request::Write { .. }) => return None,
             }
         }
-        let asked = |own: &Came| {
-            let register = own.2.data().first();
-            register.is_some_and(|own| all.cycles.contains_key(own) || all.asks(*own) > 0)
+        let asked = |came: &Came| {
+            let first = came.2.data().first();
+            first.is_some_and(|first| all.cycles.contains_key(first) || all.asks(*first) > 0)
         };
         let answered = came.iter().all(asked);
         ((MANY..=PLACES).contains(&most) && answered).then_some(all)
@@ -99,8 +99,8 @@ impl<'t> Conversation<'t> {
 
     /// How many single requests ask for a register.
     fn asks(&self, number: u8) -> usize {
-        let own = |own: &&(Instant, Option<Request>)| matches!(own.1, Some(Request::Read { register }) if register == number);
-        self.sent.iter().filter(own).count()
+        let reads = |sent: &&(Instant, Option<Request>)| matches!(sent.1, Some(Request::Read { register }) if register == number);
+        self.sent.iter().filter(reads).count()
     }
 
     /// When the reply was read to the first request behind a place whose register is asked for once.
@@ -111,9 +111,9 @@ impl<'t> Conversation<'t> {
                 return None;
             };
             let alone = self.asks(register) == 1 && !self.cycles.contains_key(&register);
-            let reply = |own: &&Came| own.2.data().first() == Some(&register);
+            let reply = |came: &&Came| came.2.data().first() == Some(&register);
             let mut replies = self.came.iter().filter(reply);
-            replies.next().filter(|_| alone).map(|own| own.1)
+            replies.next().filter(|_| alone).map(|came| came.1)
         })
     }
 
@@ -140,8 +140,8 @@ pub(super) fn counted(
     let lossy = tolerance > Span::ZERO;
     let mut shown = Shown::Right;
     for (register, cycle) in &all.cycles {
-        let own = |own: &&Came| own.2.data().first() == Some(register);
-        let frames = came.iter().filter(own).count() as u64;
+        let of_register = |came: &&Came| came.2.data().first() == Some(register);
+        let frames = came.iter().filter(of_register).count() as u64;
         let (fewest, most) = all.bounds(cycle)?;
         let name = Register::of(*register).name;
         let node = axis.node;
@@ -199,9 +199,9 @@ mod tests {
                 frame(format!("201#3D{register:02X}{every:02X}")),
             )
         };
-        let begin = REGISTERS.iter().map(|own| request(10, *own, 0x32));
-        let end = REGISTERS.iter().map(|own| request(620, *own, 0xFF));
-        let sent = begin.chain([request(20, 0xD9, 0)]).chain(end);
+        let begin = REGISTERS.map(|register| request(10, register, 0x32));
+        let end = REGISTERS.map(|register| request(620, register, 0xFF));
+        let sent = begin.into_iter().chain([request(20, 0xD9, 0)]).chain(end);
         let talk = exchange(sent.chain([request(630, 0x67, 0)]).collect());
         let reply = |millis: u64, register: u8| {
             (

@@ -88,7 +88,6 @@ struct Rehearsal {
 enum Gone {
     /// A drive did not become ready.
     Unanswered(Error),
-    /// The rig does not play the scenario.
     Skipped(Skip),
     /// It was played. With what the drives and their models read at rest, and the lines that the models have not met.
     Played(Box<Outcome>, [AtRest; 2], Vec<usize>),
@@ -121,13 +120,11 @@ pub(crate) struct Player {
     before: Option<String>,
     /// Of which register a frame may have been lost, none where something stood still, and in how many attempts one after the other, by scenario.
     lost: BTreeMap<String, (Option<u8>, usize)>,
-    /// Whether the drives are qualified.
     qualifies: bool,
     /// What shows that the program works while it plays on models.
     pub(super) beats: Beats,
     /// Where it says what a scenario or a probe changes, before it does.
     pub(super) left: NotPutBack,
-    /// The attempts of a qualification.
     notes: Vec<DriveNote>,
 }
 
@@ -178,12 +175,10 @@ impl Player {
         drives.for_each(|known| known.doubtful = true);
     }
 
-    /// What may be done.
     pub(super) const fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// The attempts of a qualification.
     pub(super) fn notes(&self) -> &[DriveNote] {
         &self.notes
     }
@@ -225,8 +220,8 @@ impl Player {
     }
 
     /// Why a scenario is not begun, whatever the drives are; `None` if it is.
-    pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
-        let bench = &own.plan.setup;
+    pub(super) fn not_begun(&self, scenario: &Own) -> Option<Skip> {
+        let bench = &scenario.plan.setup;
         let axis = |node: u8| self.axes.iter().find(|axis| axis.node == node);
         for drive in &bench.drives {
             let wanted = drive.identifiers;
@@ -240,7 +235,7 @@ impl Player {
             };
             return Some(Why::OtherDrives(why).into());
         }
-        let stated = own.scenario.header.rate.is_some();
+        let stated = scenario.scenario.header.rate.is_some();
         if stated && bench.rate != self.rate {
             let why = format!(
                 "the rig's bus has {} kbit/s, that of the scenario {}",
@@ -249,11 +244,11 @@ impl Player {
             );
             return Some(Why::OtherDrives(why).into());
         }
-        if !self.remote && own.frames().any(Frame::is_remote) {
+        if !self.remote && scenario.frames().any(Frame::is_remote) {
             let why = "the adapter's language has no remote frames; use SLCAN".to_owned();
             return Some(Why::OtherDrives(why).into());
         }
-        lacks(&own.plan, &self.replay(&[], Span::ZERO))
+        lacks(&scenario.plan, &self.replay(&[], Span::ZERO))
     }
 
     /// What was recorded of the rig, as a link.
@@ -272,17 +267,21 @@ impl Player {
 
     /// One attempt over a link: finds out about the drives, rehearses, makes them ready, plays and judges. With what was received
     /// before the scenario, in words.
-    pub(super) fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
+    pub(super) fn attempt(
+        &mut self,
+        scenario: &Arc<Own>,
+        link: &mut dyn Link,
+    ) -> (Outcome, String) {
         link.begin();
         let begun = self.qualifies.then(|| self.without_notes());
         let mut link = Observed::new(link);
         if begun.is_some() {
             link.noted.keep();
         }
-        let gone = self.go(own, &mut link, true);
-        let own = &Arc::new(own.with_firmware(self.known()));
+        let gone = self.go(scenario, &mut link, true);
+        let scenario = &Arc::new(scenario.with_firmware(self.known()));
         if let Some(begun) = begun {
-            self.note(begun, own, &link, &gone);
+            self.note(begun, scenario, &link, &gone);
         }
         let way = LinkTimes {
             late: link.take_late(),
@@ -295,35 +294,35 @@ impl Player {
             Gone::Played(outcome, [drives, models], foretold) => {
                 let unlike = unlike(&drives, &models);
                 // What differs at rest does so in each attempt: it is judged where a conversation asks for it.
-                let asks = match own.name.starts_with(CONVERSATION) {
-                    true => own.asks_for(),
+                let asks = match scenario.name.starts_with(CONVERSATION) {
+                    true => scenario.asks_for(),
                     false => BTreeSet::new(),
                 };
                 let (asked, mut explained_so): (Vec<_>, Vec<_>) =
-                    unlike.iter().partition(|own| asks.contains(&own.1));
+                    unlike.iter().partition(|differs| asks.contains(&differs.1));
                 explained_so.extend(explained(&asked, &drives));
                 let told = Told {
                     talk: std::mem::take(&mut link.noted.exchange),
                     way,
                     explained: explained_so,
                     unlike,
-                    follows: own.by_frames,
+                    follows: scenario.by_frames,
                 };
                 let exact = way.tolerance == Span::ZERO;
-                let shown = match own.acts_beside_the_bus() {
+                let shown = match scenario.acts_beside_the_bus() {
                     true => Shown::Unknown(BESIDE_THE_BUS),
                     false => self.shown(&told),
                 };
                 let failed = outcome.verdict == Verdict::Failed;
                 let shown = match shown {
-                    Shown::Unknown(BESIDE_THE_BUS) if exact => self.replayed(own, &told),
-                    Shown::Unknown(_) if exact && failed && own.is_foretold() => {
-                        self.replayed(own, &told)
+                    Shown::Unknown(BESIDE_THE_BUS) if exact => self.replayed(scenario, &told),
+                    Shown::Unknown(_) if exact && failed && scenario.is_foretold() => {
+                        self.replayed(scenario, &told)
                     }
-                    shown => self.lost_again(own, shown),
+                    shown => self.lost_again(scenario, shown),
                 };
                 let wrong = matches!(shown, Shown::Wrong(_));
-                let outcome = self.judged(own, *outcome, (&told.unlike, &foretold, shown));
+                let outcome = self.judged(scenario, *outcome, (&told.unlike, &foretold, shown));
                 if let Some(note) = self.notes.last_mut() {
                     note.told(told, wrong);
                 }
@@ -341,37 +340,38 @@ impl Player {
     }
 
     /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
-    fn go(&mut self, own: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
+    fn go(&mut self, scenario: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
         self.before = None;
         self.levels.clear();
         if let Err(error) = self.learn(link) {
             self.take_notes(&link.noted);
             return Gone::Unanswered(error);
         }
-        let own = &own.with_firmware(self.known());
+        let scenario = &scenario.with_firmware(self.known());
         let real = link.time_tolerance() > Span::ZERO;
-        let (model, foretold) = match rehearses.then(|| self.rehearsed(own, real)).transpose() {
-            Ok(rehearsal) => rehearsal.map_or_else(Default::default, |own| {
+        let rehearsal = rehearses.then(|| self.rehearsed(scenario, real));
+        let (model, foretold) = match rehearsal.transpose() {
+            Ok(rehearsal) => rehearsal.map_or_else(Default::default, |rehearsal| {
                 foretell(
                     &self.left,
                     self.known(),
-                    &own.noted.written,
-                    &own.noted.given,
+                    &rehearsal.noted.written,
+                    &rehearsal.noted.given,
                 );
-                (own.at_rest, own.outcome.unmet)
+                (rehearsal.at_rest, rehearsal.outcome.unmet)
             }),
             Err(skip) => return Gone::Skipped(skip),
         };
         outlast(link);
         link.noted.exchange.begin(Instant::START);
-        let at_rest = self.prepare(own, self.limits.motion, link);
+        let at_rest = self.prepare(scenario, self.limits.motion, link);
         self.before = Some(link.noted.received());
         self.take_notes(&link.noted);
         let at_rest = match at_rest {
             Ok(at_rest) => at_rest,
             Err(error) => return Gone::Unanswered(error),
         };
-        if own.may_time_out(self.known()) {
+        if scenario.may_time_out(self.known()) {
             link.without_pauses();
         }
         outlast(link);
@@ -382,7 +382,7 @@ impl Player {
             true => AtMismatch::GoOn,
             false => AtMismatch::Stop,
         };
-        let outcome = play(&own.plan, link, at_mismatch);
+        let outcome = play(&scenario.plan, link, at_mismatch);
         if real || outcome.verdict == Verdict::Failed {
             // What is missing may still be under way. The clock of a drive is not exact even where time is virtual (5.2).
             let tolerance = link.time_tolerance();
@@ -422,29 +422,29 @@ impl Player {
     ///
     /// # Errors
     /// Why the rig does not play it.
-    fn rehearsed(&self, own: &Own, real: bool) -> Result<Rehearsal, Skip> {
-        if let Some(why) = self.other_properties(&own.scenario) {
+    fn rehearsed(&self, scenario: &Own, real: bool) -> Result<Rehearsal, Skip> {
+        if let Some(why) = self.other_properties(&scenario.scenario) {
             return Err(Why::OtherDrives(why).into());
         }
-        let first = self.rehearse(own, &self.limits, Other::default());
+        let first = self.rehearse(scenario, &self.limits, Other::default());
         if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
             return Ok(first);
         }
         // A drive with other registers than that of the scenario is qualified with it all the same, where right drives are compared.
-        if self.qualifies && real && self.limits.motion && own.is_foretold() {
+        if self.qualifies && real && self.limits.motion && scenario.is_foretold() {
             let whole = Other {
                 goes_on: true,
                 ..Other::default()
             };
-            let whole = self.rehearse(own, &self.limits, whole);
+            let whole = self.rehearse(scenario, &self.limits, whole);
             let failed = whole.outcome.verdict == Verdict::Failed;
-            if whole.denied.is_none() && failed && are_judged(own, &whole.outcome) {
+            if whole.denied.is_none() && failed && are_judged(scenario, &whole.outcome) {
                 return Ok(whole);
             }
         }
         let mut limits = self.limits.clone();
         let mut unlocks = BTreeSet::new();
-        let mut last = self.rehearse(own, &limits, Other::default());
+        let mut last = self.rehearse(scenario, &limits, Other::default());
         for _ in 0..4 {
             let wanted = match &last.denied {
                 Some((_, settings)) => settings.clone(),
@@ -460,10 +460,11 @@ impl Player {
             if limits == before {
                 break;
             }
-            last = self.rehearse(own, &limits, Other::default());
+            last = self.rehearse(scenario, &limits, Other::default());
         }
         let found = |outcome: &Outcome| {
-            let finding = outcome.finding.as_ref().map(|own| own.message.clone());
+            let finding = outcome.finding.as_ref();
+            let finding = finding.map(|finding| finding.message.clone());
             let remark = outcome.remarks.first().cloned();
             finding.or(remark).unwrap_or_default()
         };
@@ -491,7 +492,7 @@ impl Player {
     fn other_properties(&self, scenario: &Scenario<Unitek>) -> Option<String> {
         scenario.header.drives.iter().find_map(|line| {
             let node = node(&line.drive, Scope::default()).ok()?;
-            let known = self.known().iter().find(|own| own.axis.node == node)?;
+            let known = self.known().iter().find(|known| known.axis.node == node)?;
             let mut wanted = known.properties;
             let named: Vec<_> = match &line.what {
                 SetupKind::Property(property, value) => {
@@ -504,13 +505,13 @@ impl Player {
                 }
                 SetupKind::Profile(name) => {
                     wanted = Properties::profile(name)?;
-                    let differs = |own: &&_| differs_between_profiles(own);
+                    let differs = |property: &&_| differs_between_profiles(property);
                     PROPERTIES.iter().filter(differs).collect()
                 }
                 _ => return None,
             };
             named.into_iter().find_map(|property| {
-                let (value, own) = (
+                let (value, settled) = (
                     property.of_drive(&wanted),
                     property.of_drive(&known.properties),
                 );
@@ -519,8 +520,8 @@ impl Player {
                     false => Some(format!(
                         "it is for a drive with {name} = {value}; that of drive {node} is not settled"
                     )),
-                    true => (value != own).then(|| {
-                        format!("it is for a drive with {name} = {value}; drive {node} has {own}")
+                    true => (value != settled).then(|| {
+                        format!("it is for a drive with {name} = {value}; drive {node} has {settled}")
                     }),
                 }
             })
@@ -528,12 +529,12 @@ impl Player {
     }
 
     /// Plays a scenario on the model within limits.
-    fn rehearse(&self, own: &Own, limits: &Limits, other: Other) -> Rehearsal {
+    fn rehearse(&self, scenario: &Own, limits: &Limits, other: Other) -> Rehearsal {
         self.beats.beat();
         let known = self.known().iter().enumerate();
         let drives = known.map(|(place, known)| {
-            let other = other.drive.filter(|own| own.0 == place);
-            known.model(other.map_or(known.properties, |own| own.1))
+            let other = other.drive.filter(|changed| changed.0 == place);
+            known.model(other.map_or(known.properties, |changed| changed.1))
         });
         let setup = simulate::Setup::new(self.rate, drives.collect());
         let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
@@ -546,7 +547,7 @@ impl Player {
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut forgotten);
         let mut observed = Observed::new(&mut recording);
-        let at_rest = self.prepare(own, limits.motion, &mut observed);
+        let at_rest = self.prepare(scenario, limits.motion, &mut observed);
         observed.noted.exchange.begin(Instant::START);
         observed.begin();
         let at_mismatch = match other.goes_on {
@@ -554,7 +555,7 @@ impl Player {
             false => AtMismatch::Stop,
         };
         let (outcome, at_rest) = match at_rest {
-            Ok(at_rest) => (play(&own.plan, &mut observed, at_mismatch), at_rest),
+            Ok(at_rest) => (play(&scenario.plan, &mut observed, at_mismatch), at_rest),
             Err(error) => (self.unanswered(&error), Vec::new()),
         };
         let noted = std::mem::take(&mut observed.noted);
@@ -573,7 +574,7 @@ impl Player {
     /// Tells a model's gate what the gate in front of the drives knows of them.
     fn tell(&self, drives: &[Known], gate: &mut guard::Gate) {
         for known in drives {
-            let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
+            let [full, limit] = [0xC8, 0x34].map(|register| (known.cell(register) & 0xFFFF) as u16);
             gate.learn(known.axis.rx, full, limit);
         }
     }
@@ -592,7 +593,8 @@ fn outlast(link: &mut Observed<'_>) {
 /// Whether the profiles have different values of a property.
 fn differs_between_profiles(property: &harness_proto::unitek::properties::Description) -> bool {
     let profiles = PROFILES.iter().filter_map(|name| Properties::profile(name));
-    let values: Vec<_> = profiles.map(|own| property.of_drive(&own)).collect();
+    let values = profiles.map(|profile| property.of_drive(&profile));
+    let values: Vec<_> = values.collect();
     values.windows(2).any(|pair| pair[0] != pair[1])
 }
 

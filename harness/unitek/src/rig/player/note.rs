@@ -39,7 +39,6 @@ pub(crate) enum Other {
     Deviates(usize, &'static Deviation),
 }
 
-/// One attempt.
 #[derive(Clone, Debug)]
 pub(crate) struct DriveNote {
     own: Arc<Own>,
@@ -55,7 +54,6 @@ pub(crate) struct DriveNote {
     noted: Noted,
 }
 
-/// What an attempt has shown.
 #[derive(Clone, Debug, PartialEq)]
 struct Shown {
     /// Why the drives were not ready.
@@ -74,23 +72,23 @@ impl Shown {
         let before = before.iter().map(|frame| meaning(frame, false));
         let mut within: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (head, contents) in frames.iter().map(|frame| meaning(frame, exact)) {
-            let own = within.entry(head).or_default();
-            if own.last() != Some(&contents) {
-                own.push(contents);
+            let all = within.entry(head).or_default();
+            if all.last() != Some(&contents) {
+                all.push(contents);
             }
         }
         let (unanswered, ended) = match gone {
             Gone::Unanswered(error) => (Some(error.clone()), None),
             Gone::Skipped(_) => (None, None),
             Gone::Played(outcome, ..) => {
-                let place = outcome.finding.as_ref().map(|own| own.span.start);
+                let place = outcome.finding.as_ref().map(|finding| finding.span.start);
                 (None, Some((outcome.verdict, place)))
             }
         };
         Self {
             unanswered,
             ended,
-            before: before.map(|(head, own)| head + &own).collect(),
+            before: before.map(|(head, contents)| head + &contents).collect(),
             within,
         }
     }
@@ -105,9 +103,9 @@ const MOVING: [u8; 15] = [
 /// `all` unset what a register that cannot be written reads, which may change by itself.
 pub(super) fn meaning(frame: &Frame, all: bool) -> (String, String) {
     let (register, contents) = frame.data().split_at(frame.data().len().min(1));
-    let changes = register.first().is_some_and(|own| {
-        let read_only = Register::of(*own).access == Access::RO;
-        MOVING.contains(own) || read_only && !all
+    let changes = register.first().is_some_and(|register| {
+        let read_only = Register::of(*register).access == Access::RO;
+        MOVING.contains(register) || read_only && !all
     });
     let shown = match contents {
         [_, _, _] | [_, _, _, _, _] if changes => &[],
@@ -120,7 +118,6 @@ pub(super) fn meaning(frame: &Frame, all: bool) -> (String, String) {
 }
 
 impl DriveNote {
-    /// Notes the verdict.
     pub(super) fn judge(&mut self, outcome: &Outcome) {
         self.noted.verdict = outcome.verdict;
         let unready = match &self.shown.unanswered {
@@ -150,9 +147,9 @@ impl DriveNote {
                 .could_deviate(known, (&setup, heard), told, self.wrong)
         });
         let mut refuted = Some(false);
-        for own in tried {
-            match own {
-                Some(true) => return own,
+        for shows in tried {
+            match shows {
+                Some(true) => return shows,
                 None => refuted = None,
                 Some(false) => {}
             }
@@ -172,9 +169,9 @@ impl DriveNote {
         values: &'v [Properties],
     ) -> Vec<&'v Properties> {
         let explains = |value: &&Properties| {
-            let mut all: Vec<_> = self.drives.iter().map(|own| own.properties).collect();
-            if let Some(own) = all.get_mut(place) {
-                *own = **value;
+            let mut all: Vec<_> = self.drives.iter().map(|known| known.properties).collect();
+            if let Some(properties) = all.get_mut(place) {
+                *properties = **value;
             }
             phases(EACH_PHASE).any(|phase| self.shows(Other::Right, &all, (phase, 0)))
         };
@@ -200,7 +197,7 @@ impl DriveNote {
     }
 
     fn is_shown_by(&self, other: Other) -> bool {
-        let known: Vec<_> = self.drives.iter().map(|own| own.properties).collect();
+        let known: Vec<_> = self.drives.iter().map(|known| known.properties).collect();
         let each = match other {
             Other::Right => 1,
             Other::Deviates(..) => EACH_PHASE,
@@ -213,8 +210,8 @@ impl DriveNote {
                 let mut heard = HEARD_BEFORE;
                 heard.any(|heard| self.shows(other, &known, (Span::ZERO, heard)))
             }
-            Other::Right => self.drives.iter().enumerate().any(|(place, own)| {
-                own.candidates().into_iter().any(|properties| {
+            Other::Right => self.drives.iter().enumerate().any(|(place, drive)| {
+                drive.candidates().into_iter().any(|properties| {
                     let mut all = known.clone();
                     all[place] = properties;
                     self.shows(other, &all, (Span::ZERO, 0))
@@ -229,7 +226,7 @@ impl DriveNote {
         player.beats.beat();
         let drives = self.drives.iter().zip(properties).enumerate();
         let drives = drives.map(|(place, (known, properties))| match other {
-            Other::Deviates(own, deviation) if own == place => {
+            Other::Deviates(deviates, deviation) if deviates == place => {
                 deviant(known, *properties, deviation)
             }
             _ => right(known, *properties),
@@ -272,8 +269,14 @@ impl Note for DriveNote {
         deviations().collect()
     }
 
-    fn words(own: &Deviation) -> String {
-        format!("{} (UNITEK {}): {}", own.name, own.section, own.about)
+    fn words(deviation: &Deviation) -> String {
+        let Deviation {
+            name,
+            section,
+            about,
+            ..
+        } = deviation;
+        format!("{name} (UNITEK {section}): {about}")
     }
 
     fn noted(&self) -> &Noted {
@@ -282,7 +285,7 @@ impl Note for DriveNote {
 
     fn drives(&self) -> Vec<String> {
         let axes = self.begun.axes.iter();
-        axes.map(|own| format!("drive {}", own.node)).collect()
+        axes.map(|axis| format!("drive {}", axis.node)).collect()
     }
 
     fn is_right(&self) -> bool {
@@ -300,7 +303,7 @@ const PHASE: Span = Span::from_nanos(31_250);
 /// Where the clock of a drive may stand: every `each`th place, and the first one.
 pub(super) fn phases(each: usize) -> impl Iterator<Item = Span> {
     let phases = std::iter::once(0).chain((1..32).step_by(each));
-    phases.map(|own| PHASE * own)
+    phases.map(|place| PHASE * place)
 }
 
 /// A drive as it is known; as delivered where nothing was read of it.
@@ -350,8 +353,8 @@ fn read(known: &Known, setup: DriveSetup) -> BTreeMap<u8, u32> {
     };
     let mut bench = Bench::new(&setup);
     let mut driver = Driver::new(Box::new(&mut bench), &[known.axis], Span::from_millis(20));
-    let registers = REGISTERS.iter().map(|own| own.number);
-    let asked = registers.filter(|own| known.cells.contains_key(own));
+    let registers = REGISTERS.iter().map(|register| register.number);
+    let asked = registers.filter(|register| known.cells.contains_key(register));
     asked
         .filter_map(|register| {
             let reply = driver.read(known.axis, register).ok()?;
@@ -370,29 +373,34 @@ impl Player {
         copy
     }
 
-    /// Notes an attempt.
-    pub(super) fn note(&mut self, begun: Self, own: &Arc<Own>, link: &Observed<'_>, gone: &Gone) {
+    pub(super) fn note(
+        &mut self,
+        begun: Self,
+        scenario: &Arc<Own>,
+        link: &Observed<'_>,
+        gone: &Gone,
+    ) {
         let drives = self.known.as_ref().unwrap_or(&self.partly).iter();
         let first = begun.known.is_none();
-        let drives = drives.map(|own| match first {
+        let drives = drives.map(|known| match first {
             // Probes have changed what they read at first.
-            true => own.as_at_first(),
-            false => own.clone(),
+            true => known.as_at_first(),
+            false => known.clone(),
         });
         let exact = link.time_tolerance() == Span::ZERO;
         let shown = Shown::of(gone, link, exact);
         let note = DriveNote {
-            own: Arc::clone(own),
+            own: Arc::clone(scenario),
             begun,
             drives: drives.collect(),
             told: None,
             wrong: false,
             noted: Noted {
-                name: own.name.clone(),
+                name: scenario.name.clone(),
                 verdict: Verdict::Skipped,
                 accuses: false,
                 exact,
-                received: link.noted.kept().iter().map(|own| own.len()).sum(),
+                received: link.noted.kept().iter().map(|piece| piece.len()).sum(),
                 was_ready: shown.ended.is_some(),
                 was_unanswered: shown.unanswered.is_some(),
             },

@@ -30,7 +30,6 @@ const FIRMWARE: u8 = 0x1B;
 /// A scenario of this bus.
 #[derive(Clone, Debug)]
 pub(crate) struct Own {
-    /// The name of its source.
     pub(super) name: String,
     pub(super) scenario: Scenario<Unitek>,
     pub(in super::super) plan: Plan<Unitek>,
@@ -39,13 +38,12 @@ pub(crate) struct Own {
 }
 
 impl Own {
-    /// Reads a scenario.
     pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
         let scenario: Scenario<Unitek> = parse(source)?;
         let mut plan = plan(&scenario, source, None)?;
-        let waits = |own: &Step| {
-            let receives = matches!(own.action, PlannedAction::Receive(..));
-            receives || matches!(own.action, PlannedAction::Own(Act::Quiet))
+        let waits = |step: &Step| {
+            let receives = matches!(step.action, PlannedAction::Receive(..));
+            receives || matches!(step.action, PlannedAction::Own(Act::Quiet))
         };
         let steps = &plan.steps;
         let alone = !steps.iter().any(waits) && steps.iter().any(is_answered);
@@ -74,7 +72,7 @@ impl Own {
     pub(super) fn may_time_out(&self, drives: &[Known]) -> bool {
         let held = drives.iter().any(|known| known.cell(TIME_OUT) != 0);
         let header = self.plan.setup.drives.iter();
-        let mut header = header.flat_map(|own| &own.registers);
+        let mut header = header.flat_map(|drive| &drive.registers);
         held || header.any(|(register, _)| *register == TIME_OUT)
             || self.frames().any(|frame| writes(frame, TIME_OUT))
     }
@@ -105,28 +103,28 @@ impl Own {
     /// The registers whose contents the lines at these places ask for.
     pub(super) fn asks_at(&self, places: &[usize]) -> BTreeSet<u8> {
         let steps = self.plan.steps.iter();
-        let own = steps.filter(|own| places.contains(&own.span.start));
-        own.flat_map(asks).collect()
+        let named = steps.filter(|step| places.contains(&step.span.start));
+        named.flat_map(asks).collect()
     }
 
     /// The scenario in which lines that ask for the firmware ask for what it read on the drive: the scenario is for drives of any. Where its
     /// header or a step states it, it stays.
     pub(super) fn with_firmware(&self, known: &[Known]) -> Self {
-        let mut own = self.clone();
+        let mut scenario = self.clone();
         let stated = |drive: &DriveSetup| {
             drive
                 .registers
                 .iter()
                 .any(|(number, _)| *number == FIRMWARE)
         };
-        if own.plan.setup.drives.iter().any(stated) {
-            return own;
+        if scenario.plan.setup.drives.iter().any(stated) {
+            return scenario;
         }
         let read = |is: &dyn Fn(&Axis) -> bool| {
             let known = known.iter().find(|known| is(&known.axis))?;
             known.cells.get(&FIRMWARE).map(|raw| raw & 0xFFFF)
         };
-        for step in &mut own.plan.steps {
+        for step in &mut scenario.plan.steps {
             match &mut step.action {
                 PlannedAction::Receive(_, wanted) => {
                     for frame in wanted {
@@ -164,7 +162,7 @@ impl Own {
                 _ => {}
             }
         }
-        own
+        scenario
     }
 }
 
@@ -186,7 +184,7 @@ fn is_answered(step: &Step) -> bool {
 fn asks(step: &Step) -> Vec<u8> {
     let first = |wanted: &WantedFrame| match &wanted.data[..] {
         [Expected::Byte(register), contents @ ..] => {
-            let any = contents.iter().all(|own| *own == Expected::Any);
+            let any = contents.iter().all(|expected| *expected == Expected::Any);
             (!any).then_some(*register)
         }
         _ => None,

@@ -27,9 +27,9 @@ impl Player {
             Some(drives) => drives,
             None => {
                 let again = self.axes.iter().map(|axis| {
-                    let partly = self.partly.iter().find(|own| own.axis == *axis);
+                    let partly = self.partly.iter().find(|known| known.axis == *axis);
                     Known {
-                        first: partly.map(|own| own.first.clone()).unwrap_or_default(),
+                        first: partly.map(|known| known.first.clone()).unwrap_or_default(),
                         ..Known::new(*axis)
                     }
                 });
@@ -70,7 +70,7 @@ impl Player {
                 true => (&probe::WRITTEN[..], &[(0x88, free, rx)][..]),
                 false => (&probe::WRITTEN[..1], &[][..]),
             };
-            let written = written.iter().map(|own| (rx, *own)).collect();
+            let written = written.iter().map(|register| (rx, *register)).collect();
             foretell(&self.left, std::slice::from_ref(known), &written, given);
             probe::settle(known, link, self.patience)?;
             if self.qualifies {
@@ -102,7 +102,7 @@ impl Player {
     /// Makes the drives ready: locked, without commands, with the registers of the header, and released where motors may turn.
     pub(super) fn prepare(
         &self,
-        own: &Own,
+        scenario: &Own,
         release: bool,
         link: &mut dyn Link,
     ) -> Result<AtRest, Error> {
@@ -116,8 +116,9 @@ impl Player {
             }
         }
         let mut at_rest = Vec::new();
-        for drive in &own.plan.setup.drives {
-            let known = self.known().iter().find(|own| own.axis.node == drive.node);
+        for drive in &scenario.plan.setup.drives {
+            let mut known = self.known().iter();
+            let known = known.find(|known| known.axis.node == drive.node);
             let Some(known) = known else { continue };
             for (register, raw) in &drive.registers {
                 if known.cells.get(register) != Some(raw) {

@@ -30,37 +30,39 @@ const UNDER_WAY: &str = "right drives could have sent this with another value of
 
 impl Player {
     /// What was shown, where it is compared with the attempts before: a drive that does not send something does not send it each time.
-    pub(super) fn lost_again(&mut self, own: &Own, shown: Shown) -> Shown {
-        let before = self.lost.remove(&own.name);
+    pub(super) fn lost_again(&mut self, scenario: &Own, shown: Shown) -> Shown {
+        let before = self.lost.remove(&scenario.name);
         let Shown::Lost(register, why) = shown else {
             return shown;
         };
-        let same = before.filter(|own| own.0 == register);
-        let times = same.map_or(1, |own| own.1 + 1);
+        let same = before.filter(|lost| lost.0 == register);
+        let times = same.map_or(1, |lost| lost.1 + 1);
         if times > LOST_BY_THE_ADAPTER {
             return Shown::Wrong(why);
         }
-        self.lost.insert(own.name.clone(), (register, times));
+        self.lost.insert(scenario.name.clone(), (register, times));
         Shown::Lost(register, why)
     }
 
     /// The verdict of an attempt by what right drives could have sent. Its lines alone say what was not met.
     pub(super) fn judged(
         &self,
-        own: &Own,
+        scenario: &Own,
         outcome: Outcome,
         (unlike, foretold, shown): (&[(u8, u8)], &[usize], Shown),
     ) -> Outcome {
-        let differs = |register| unlike.iter().any(|own| own.1 == register);
+        let differs = |register| unlike.iter().any(|differs| differs.1 == register);
         let judged = |line: &usize| {
             // That the model does not meet a line either was known before.
             let known = foretold.contains(line);
-            let mut asked = own.asks_at(&[*line]).into_iter();
+            let mut asked = scenario.asks_at(&[*line]).into_iter();
             asked.all(|register| (known || World::compares(register)) && !differs(register))
         };
         let judged_by_worlds = !outcome.unmet.is_empty() && outcome.unmet.iter().all(judged);
         match (outcome.verdict, shown) {
-            (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => wronged(own, outcome, why),
+            (Verdict::Failed | Verdict::Passed, Shown::Wrong(why)) => {
+                wronged(scenario, outcome, why)
+            }
             (Verdict::Failed | Verdict::Passed, Shown::Lost(_, why)) => Outcome {
                 verdict: Verdict::Inconclusive,
                 shows_nothing: true,
@@ -69,23 +71,23 @@ impl Player {
             },
             (Verdict::Failed, Shown::Complete) if judged_by_worlds => right_all_the_same(outcome),
             (Verdict::Failed, Shown::Complete) => inconclusive(outcome, NOT_COMPARED.to_owned()),
-            (Verdict::Passed, Shown::Complete) => outcome.judged_by(&own.plan),
+            (Verdict::Passed, Shown::Complete) => outcome.judged_by(&scenario.plan),
             (Verdict::Failed, Shown::Right) => inconclusive(outcome, UNDER_WAY.to_owned()),
             (Verdict::Failed, Shown::Unknown(why)) => inconclusive(outcome, not_to_its_end(why)),
-            (Verdict::Passed, Shown::Unknown(why)) if own.by_frames || why == STOOD_STILL => {
+            (Verdict::Passed, Shown::Unknown(why)) if scenario.by_frames || why == STOOD_STILL => {
                 inconclusive(outcome, not_to_its_end(why))
             }
-            _ => outcome.judged_by(&own.plan),
+            _ => outcome.judged_by(&scenario.plan),
         }
     }
 
     /// What right drives show in virtual time where their frames alone do not tell it, as where faults are put on frames: the attempt is played
     /// on each of them, wherever its clock stands and whatever the manual leaves open. The lines alone compare times.
-    pub(super) fn replayed(&self, own: &Own, told: &Told) -> Shown {
+    pub(super) fn replayed(&self, scenario: &Own, told: &Told) -> Shown {
         let came = told.talk.came_since_it_began();
         let came: Vec<_> = came.map(|frame| meaning(frame, true)).collect();
         let could_send = |other: &Other| {
-            let played = self.rehearse(own, &self.limits, *other).noted.exchange;
+            let played = self.rehearse(scenario, &self.limits, *other).noted.exchange;
             let sent = played.came_since_it_began();
             sent.map(|frame| meaning(frame, true))
                 .eq(came.iter().cloned())
@@ -101,7 +103,7 @@ impl Player {
                 ..Other::default()
             })
         });
-        match phases.chain(values).any(|own| could_send(&own)) {
+        match phases.chain(values).any(|other| could_send(&other)) {
             true => Shown::Right,
             false if told.unlike.is_empty() => Shown::Wrong(NOT_REPLAYED.to_owned()),
             false => Shown::Unknown(BESIDE_THE_BUS),
@@ -110,8 +112,8 @@ impl Player {
 }
 
 /// An attempt in which a drive did what no right one does, in a sentence.
-fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
-    let last = own.plan.steps.last();
+fn wronged(scenario: &Own, outcome: Outcome, wrong: String) -> Outcome {
+    let last = scenario.plan.steps.last();
     let found = outcome.finding.unwrap_or_else(|| Mismatch {
         span: last.map_or(TextSpan::default(), |step| step.span),
         message: wrong.clone(),
@@ -127,8 +129,8 @@ fn wronged(own: &Own, outcome: Outcome, wrong: String) -> Outcome {
 }
 
 /// Whether right drives are compared in what the lines ask for that the model has not met.
-pub(super) fn are_judged(own: &Own, rehearsed: &Outcome) -> bool {
-    let mut asked = own.asks_at(&rehearsed.unmet).into_iter();
+pub(super) fn are_judged(scenario: &Own, rehearsed: &Outcome) -> bool {
+    let mut asked = scenario.asks_at(&rehearsed.unmet).into_iter();
     !rehearsed.unmet.is_empty() && asked.all(World::compares_partly)
 }
 
@@ -147,7 +149,7 @@ fn not_to_its_end(why: &str) -> String {
 
 /// An attempt in which the drives did what right ones do, and a line is not met since frames were late or the drive has other registers.
 fn right_all_the_same(outcome: Outcome) -> Outcome {
-    let found = outcome.finding.map(|own| own.message);
+    let found = outcome.finding.map(|finding| finding.message);
     let why = std::iter::once(RIGHT_ALL_THE_SAME.to_owned()).chain(found);
     Outcome {
         verdict: Verdict::Passed,
@@ -177,7 +179,7 @@ pub(super) fn explained(unlike: &[(u8, u8)], drives: &AtRest) -> Vec<(u8, u8)> {
         let shown = all.iter().filter_map(|(register, one, zero)| {
             let read = drives
                 .iter()
-                .find(|own| (own.0, own.1) == (node, *register));
+                .find(|cell| (cell.0, cell.1) == (node, *register));
             let read = read.filter(|_| one | zero != 0)?.2;
             Some(read & one != 0 || zero & !read != 0)
         });
@@ -185,7 +187,7 @@ pub(super) fn explained(unlike: &[(u8, u8)], drives: &AtRest) -> Vec<(u8, u8)> {
         shown.len() < 2
     };
     let explained = |(node, register): &(u8, u8)| {
-        let of = |all: &[(u8, u32, u32)]| all.iter().any(|own| own.0 == *register);
+        let of = |all: &[(u8, u32, u32)]| all.iter().any(|cell| cell.0 == *register);
         let other = |all: &[_]| !of(all) || agree(*node, all);
         !FROM_OTHERS.contains(register) && other(&READY) && other(&RUNS)
     };
@@ -221,8 +223,8 @@ mod tests {
             (0xE3, 0),
             (0xF2, 1),
         ];
-        let drives = |own: &[(u8, u32)]| -> AtRest {
-            own.iter()
+        let drives = |all: &[(u8, u32)]| -> AtRest {
+            all.iter()
                 .map(|(register, bits)| (1, *register, *bits))
                 .collect()
         };

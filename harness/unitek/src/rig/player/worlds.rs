@@ -137,7 +137,7 @@ impl Shown {
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Wrong(why), _) | (_, Self::Wrong(why)) => Self::Wrong(why),
-            (own @ Self::Lost(..), _) | (_, own @ Self::Lost(..)) => own,
+            (lost @ Self::Lost(..), _) | (_, lost @ Self::Lost(..)) => lost,
             (Self::Unknown(why), _) | (_, Self::Unknown(why)) => Self::Unknown(why),
             (Self::Complete, Self::Complete) => Self::Complete,
             _ => Self::Right,
@@ -194,9 +194,9 @@ impl Player {
         }
         let right = self.world((known, known.properties), &unlike, told);
         let others = known.candidates().into_iter();
-        let others = others.filter(|own| {
+        let others = others.filter(|properties| {
             self.beats.beat();
-            let other = self.world((known, *own), &unlike, told);
+            let other = self.world((known, *properties), &unlike, told);
             !say_the_same(&right, &other, told)
         });
         let mut wrong = None;
@@ -222,13 +222,13 @@ impl Player {
             })
         };
         let missing = expected.filter(|_| told.way.tolerance > Span::ZERO && loses());
-        let register = missing.and_then(|own| own.data().first().copied());
+        let register = missing.and_then(|frame| frame.data().first().copied());
         let why = words(known, (&came, place), expected);
-        let asked = expected.and_then(|own| own.data().first().copied());
+        let asked = expected.and_then(|frame| frame.data().first().copied());
         match register {
             Some(_) => Shown::Lost(register, format!("{why}: {LOST}")),
             // The drives were made ready, and what the scenario sends has too many worlds behind a loss.
-            None if unclear && asked.is_some_and(|own| talk.asks_before_it_began(own)) => {
+            None if unclear && asked.is_some_and(|first| talk.asks_before_it_began(first)) => {
                 Shown::Unknown(TOO_MANY)
             }
             None => Shown::Wrong(why),
@@ -247,11 +247,12 @@ impl Player {
     ) -> Option<bool> {
         self.beats.beat();
         let came = self.came_from(known, &shown.talk).ok()?;
-        let (mut came, _) = Some(came).filter(|own| !own.1)?;
+        let (mut came, _) = Some(came).filter(|came| !came.1)?;
         // A frame that began before the first request had left belongs to what was before; stamps of adapters are not that exact.
         if let (Some((first, _)), Span::ZERO) = (shown.talk.sent.first(), shown.way.tolerance) {
-            let least = |own: &Frame| self.rate.time_of(own.bits_to_acknowledge());
-            let before = came.iter().take_while(|own| own.0 < *first + least(&own.2));
+            let least = |frame: &Frame| self.rate.time_of(frame.bits_to_acknowledge());
+            let before = came.iter();
+            let before = before.take_while(|came| came.0 < *first + least(&came.2));
             let before = before.count();
             came.drain(..before);
         }
@@ -292,21 +293,22 @@ impl Player {
     /// The registers of a drive that are not compared: at rest, or when they were first read, they held something else than those of its model,
     /// which a right drive may.
     fn unlike(&self, known: &Known, told: &Told) -> Arc<BTreeSet<u8>> {
-        let own = told.explained.iter();
-        let own = own.filter(|own| own.0 == known.axis.node);
+        let explained = told.explained.iter();
+        let explained = explained.filter(|(node, _)| *node == known.axis.node);
         let model = known.model(known.properties);
         let model = model.drive(self.rate, Instant::START);
         let differs = |register: &u8| {
             let read = known.cells.get(register);
             let mask = Register::of(*register).mask();
-            read.is_some_and(|own| (own ^ model.drive().register(*register)) & mask != 0)
+            read.is_some_and(|raw| (raw ^ model.drive().register(*register)) & mask != 0)
         };
         let first = Some(READ_AT_FIRST).filter(differs);
         // One that was called may still work.
-        let other = |own: &u8| known.cells.get(own) != known.first.get(own);
-        let called = REGISTERS.iter().filter(|own| own.access == Access::FN);
-        let called = called.map(|own| own.number).filter(other);
-        Arc::new(own.map(|own| own.1).chain(first).chain(called).collect())
+        let other = |register: &u8| known.cells.get(register) != known.first.get(register);
+        let called = REGISTERS.iter().filter(|row| row.access == Access::FN);
+        let called = called.map(|row| row.number).filter(other);
+        let explained = explained.map(|(_, register)| *register);
+        Arc::new(explained.chain(first).chain(called).collect())
     }
 
     fn world(
@@ -328,11 +330,11 @@ impl Player {
     fn came_from(&self, known: &Known, talk: &Exchange) -> Result<(Vec<Came>, bool), &'static str> {
         let axis = known.axis;
         let [receives, sends] = identifiers(axis, talk);
-        let others = self.axes.iter().filter(|own| **own != axis);
+        let others = self.axes.iter().filter(|other| **other != axis);
         let shared = others
-            .flat_map(|own| identifiers(*own, talk).concat())
-            .any(|own| receives.contains(&own) || sends.contains(&own));
-        let stands = known.cells.get(&0xF5).is_none_or(|own| own & 1 == 1);
+            .flat_map(|other| identifiers(*other, talk).concat())
+            .any(|id| receives.contains(&id) || sends.contains(&id));
+        let stands = known.cells.get(&0xF5).is_none_or(|state| state & 1 == 1);
         let timed_out = known.cell(0x8F) & ERROR_TIME_OUT != 0 && !known.has_timed_out();
         if shared {
             return Err(OTHER_IDENTIFIERS);
@@ -340,22 +342,23 @@ impl Player {
         if !stands || timed_out || known.cells.is_empty() {
             return Err(NOT_AT_REST);
         }
-        let own = |came: &&(Instant, Instant, Frame)| {
+        let of_drive = |came: &&(Instant, Instant, Frame)| {
             sends.contains(&came.2.id().number()) && !came.2.id().is_extended()
         };
-        let came: Vec<_> = talk.came.iter().filter(own).copied().collect();
+        let came: Vec<_> = talk.came.iter().filter(of_drive).copied().collect();
         let changed = came.iter().any(|(_, _, frame)| {
             let tx = u16::try_from(frame.id().number()).unwrap_or(axis.tx);
             let reply = Reply::decode(frame, tx);
-            let differs = |own: &Reply| own.data.bits() ^ known.cell(own.register);
-            reply.is_ok_and(|own| match own.register {
+            let differs = |reply: &Reply| reply.data.bits() ^ known.cell(reply.register);
+            reply.is_ok_and(|reply| match reply.register {
                 0x40 => {
-                    differs(&own) & (status::LIMIT_PLUS | status::LIMIT_MINUS | status::CONTINUOUS)
+                    differs(&reply)
+                        & (status::LIMIT_PLUS | status::LIMIT_MINUS | status::CONTINUOUS)
                         != 0
                 }
-                0x8F => differs(&own) & ERRORS_NOT_READY & !ERROR_TIME_OUT != 0,
-                0xD8 => differs(&own) & INPUT_BITS != 0,
-                register => INPUTS.contains(&register) && differs(&own) & 1 != 0,
+                0x8F => differs(&reply) & ERRORS_NOT_READY & !ERROR_TIME_OUT != 0,
+                0xD8 => differs(&reply) & INPUT_BITS != 0,
+                register => INPUTS.contains(&register) && differs(&reply) & 1 != 0,
             })
         });
         Ok((came, changed))
@@ -364,7 +367,7 @@ impl Player {
 
 /// Whether a drive may send something that no request asks for: a cycle (5.2) or an event (ex 10). Nothing else overtakes a reply.
 fn says_by_itself(talk: &Exchange) -> bool {
-    let mut sent = talk.sent.iter().map(|own| own.1.data());
+    let mut sent = talk.sent.iter().map(|sent| sent.1.data());
     sent.any(|data| match *data {
         [READ, _, interval, ..] => !matches!(interval, 0 | STOP),
         [0x51, low, ..] => u16::from(low) & MODE_EVENT != 0,
@@ -382,7 +385,7 @@ fn follows(world: World, told: &Told) -> World {
 
 /// The identifiers in which a drive may receive and send in a conversation: those that it had and those that are written to it (UNITEK 3.1).
 fn identifiers(axis: Axis, talk: &Exchange) -> [Vec<u32>; 2] {
-    let [mut receives, mut sends] = [axis.rx, axis.tx].map(|own| vec![u32::from(own)]);
+    let [mut receives, mut sends] = [axis.rx, axis.tx].map(|id| vec![u32::from(id)]);
     for (_, frame) in &talk.sent {
         let id = frame.id().number();
         let rx = u16::try_from(id).unwrap_or(0);
@@ -443,7 +446,7 @@ fn said(mut drive: World, talk: &Exchange, late: Span) -> Vec<(Instant, Frame)> 
             said.extend(std::iter::from_fn(|| Some((due, drive.say()?))));
         }
         drive.advance(at);
-        frame.into_iter().for_each(|own| drive.hear(at, own));
+        frame.into_iter().for_each(|frame| drive.hear(at, frame));
         said.extend(std::iter::from_fn(|| Some((at, drive.say()?))));
     }
     said
@@ -453,7 +456,7 @@ fn said(mut drive: World, talk: &Exchange, late: Span) -> Vec<(Instant, Frame)> 
 fn say_the_same(one: &World, other: &World, told: &Told) -> bool {
     let mut late = [Span::ZERO, told.slowest()].into_iter();
     late.all(|late| {
-        let [one, other] = [one, other].map(|own| said(own.clone(), &told.talk, late));
+        let [one, other] = [one, other].map(|world| said(world.clone(), &told.talk, late));
         one == other
     })
 }
@@ -465,8 +468,8 @@ fn words(
     expected: Option<Frame>,
 ) -> String {
     let node = known.axis.node;
-    let came = came.get(place).map(|own| written(&own.2));
-    let expected = expected.map(|own| written(&own));
+    let came = came.get(place).map(|came| written(&came.2));
+    let expected = expected.map(|frame| written(&frame));
     match (came, expected) {
         (Some(came), Some(expected)) => {
             format!("no right drive {node} sends {came} here, where {expected} is expected")

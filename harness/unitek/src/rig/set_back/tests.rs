@@ -64,7 +64,7 @@ fn play(run: &mut PortRun<Player>, text: &str) -> Verdict {
 fn simulated(run: &PortRun<Player>) -> &Bench {
     let beside = run.session().guarded().inner().beside();
     beside
-        .and_then(|own| own.downcast_ref())
+        .and_then(|bench| bench.downcast_ref())
         .expect("simulated drives")
 }
 
@@ -73,9 +73,9 @@ fn state(run: &PortRun<Player>) -> Vec<(u8, u8, u32)> {
     let bench = simulated(run);
     let written = REGISTERS
         .iter()
-        .filter(|own| matches!(own.access, Access::RW | Access::SP));
-    let compared = written.filter(|own| !NOT_COMPARED.contains(&own.number));
-    let all = compared.map(|own| own.number).chain([0x8F]);
+        .filter(|register| matches!(register.access, Access::RW | Access::SP));
+    let compared = written.filter(|register| !NOT_COMPARED.contains(&register.number));
+    let all = compared.map(|register| register.number).chain([0x8F]);
     let of_both = all.flat_map(|register| [1, 2].map(|node| (node, register)));
     let read = |(node, register)| {
         let drive = bench.drive(node).expect("a drive");
@@ -256,8 +256,8 @@ fn what_does_not_end_has_foretold_what_it_changes() {
                     0x8F => format!("`drivebench delete-error {node} "),
                     _ => format!(" 0x{register:02X}=0x"),
                 };
-                let own = format!("drive {node}");
-                let mut lines = said.lines().filter(|line| line.starts_with(&own));
+                let start = format!("drive {node}");
+                let mut lines = said.lines().filter(|line| line.starts_with(&start));
                 let foretold = reads == *held || lines.any(|line| line.contains(&way));
                 assert!(foretold, "{node} {register:02X} {said}");
                 let elsewhere = register == 0x68 && reads != *held;
@@ -337,11 +337,11 @@ fn two_drives_are_qualified_one_after_the_other() {
         let (mut run, _) = bench(ALL, &[&setup], true);
         let before = state(&run);
         let moving = Player::conversations(run.session().rig()).into_iter();
-        for own in moving.filter(|own| own.name.contains("write-identifier")) {
-            let played = run.play(&own, None).expect("a rig");
-            assert_ne!(played.outcome.verdict, Verdict::Skipped, "{}", own.name);
-            assert_eq!(run.over(), None, "{}", own.name);
-            assert_eq!(state(&run), before, "{}", own.name);
+        for source in moving.filter(|source| source.name.contains("write-identifier")) {
+            let played = run.play(&source, None).expect("a rig");
+            assert_ne!(played.outcome.verdict, Verdict::Skipped, "{}", source.name);
+            assert_eq!(run.over(), None, "{}", source.name);
+            assert_eq!(state(&run), before, "{}", source.name);
         }
         assert_eq!(run.notes(), Vec::<String>::new());
     }
@@ -381,11 +381,11 @@ fn a_drive_that_is_lost_is_reported_with_what_it_held() {
     assert!(over.contains("it may be at 250 kbit/s"), "{over}");
     let end = Box::new(run).close(true);
     let words = "drive 1: registers may be left changed; `drivebench write 1 ";
-    let own = end.remarks.iter().find(|own| own.starts_with(words));
-    let own = own.unwrap_or_else(|| panic!("{:?}", end.remarks));
-    assert!(own.contains("0x73=0x4025 "), "{own}");
+    let remark = end.remarks.iter().find(|remark| remark.starts_with(words));
+    let remark = remark.unwrap_or_else(|| panic!("{:?}", end.remarks));
+    assert!(remark.contains("0x73=0x4025 "), "{remark}");
     assert!(
-        own.contains("0xD4=0x00000000 --move --rig desk.toml` sets them back"),
-        "{own}"
+        remark.contains("0xD4=0x00000000 --move --rig desk.toml` sets them back"),
+        "{remark}"
     );
 }
